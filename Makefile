@@ -1,0 +1,35 @@
+# make solve: balance the packaged loom.   make test: the whole suite.   Both make .venv themselves.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: solve test lint types benchmark clean
+
+solve: .venv/installed
+	$(BIN)/loomopt solve beatup --target balance
+
+test: .venv/installed-test
+	$(BIN)/python -m pytest -n auto
+
+lint: .venv/installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: .venv/installed-test
+	$(BIN)/mypy
+
+benchmark: .venv/installed-test
+	$(BIN)/pip install -q -e '.[bench]'
+	$(BIN)/python benchmarks/kinematics_speed.py
+	$(BIN)/python benchmarks/balance_peers.py
+
+.venv/installed: pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install -q -e .
+	touch $@
+
+.venv/installed-test: .venv/installed
+	$(BIN)/pip install -q -e '.[test]'
+	touch $@
+
+clean:
+	rm -rf .venv

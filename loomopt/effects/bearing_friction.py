@@ -1,0 +1,47 @@
+"""Friction in the rocking shaft's bearings: Coulomb and viscous.
+
+Output term T_c sgn q˙ + c q˙. The Coulomb torque jumps at both dead centres; there it may be any value in [−T_c, T_c],
+and both one-sided values are shown. The crank turns forward, so sgn q˙ depends on the crank angle alone.
+"""
+
+from typing import Any
+
+from loomopt.maths import Maths, Number
+from loomopt.quantities import RotaryDamping, Torque
+from loomopt.schema import Load, Table, Values
+
+
+class Own(Table):
+    """coulomb: T_c ≥ 0, N·m; viscous: c ≥ 0, N·m·s/rad."""
+
+    coulomb: Torque
+    viscous: RotaryDamping
+
+
+def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+    """Return front and rear dead centre, rad: β, π + β_r."""
+    return given["beta"], maths.pi + given["beta_r"]
+
+
+def switch(angle: float, corners: tuple[float, ...]) -> float:
+    """Return sgn q˙: −1 from front to rear dead centre, where ψ grows, +1 on the way back; angle in rad."""
+    front, rear = corners
+    turn = 6.283185307179586
+    return -1.0 if (angle - front) % turn < (rear - front) % turn else 1.0
+
+
+def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+    """Return T_c sgn q˙ + c q˙, N·m."""
+    return own["coulomb"] * switch + own["viscous"] * pose.velocity
+
+
+EFFECT = Load(
+    "bearing_friction",
+    "Coulomb and viscous friction of the rocking shaft",
+    Own,
+    "output",
+    force,
+    needs=("operation.speed",),
+    corners=corners,
+    switch=switch,
+)

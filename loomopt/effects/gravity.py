@@ -1,0 +1,38 @@
+"""Weight of the reed system and of its counterweight.
+
+Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt): the reed's centre lies at (r4, ψ + χ) from the rocking
+shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. The rod's weight is left out.
+"""
+
+from typing import Any
+
+from loomopt.maths import Maths, Number
+from loomopt.quantities import Angle
+from loomopt.schema import Load, Table, Values
+
+STANDARD_GRAVITY = 9.80665
+"""m/s²."""
+
+
+class Own(Table):
+    """tilt: angle of A→D from the horizontal, rad; offset: χ, angle of the reed's centre from the rocker, rad."""
+
+    tilt: Angle
+    offset: Angle
+
+
+def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+    """Return −∂U/∂ψ, N·m (q = −ψ)."""
+    moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
+    return -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
+
+
+EFFECT = Load(
+    "gravity",
+    "weight of reed system and counterweight",
+    Own,
+    "output",
+    force,
+    reads=("m4e", "r4e"),
+    needs=("mechanism.m4", "mechanism.r4"),
+)

@@ -1,0 +1,57 @@
+"""Inertia of the connecting rod, inside the drive.
+
+lumped: m2 s2/l2 at C and the rest at B, as [Yuan24] does: J1e and J3e of its eq 7; leaves out JS2 − m2 s2 (l2 − s2).
+exact: ½ Je' ω² + Je ω̇ with Je = (m2 v_S2² + JS2 ω2²)/ω². The ratio s2/l2 stays today's when l2 varies.
+"""
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+from loomopt.maths import Maths, Number
+from loomopt.quantities import Length, PositiveInertia, PositiveMass
+from loomopt.schema import Load, Table, Values
+
+
+class Own(Table):
+    """m2: mass, kg; s2: centre of mass from B, m; JS2: inertia about it, kg·m² (exact only)."""
+
+    m2: PositiveMass
+    s2: Length
+    JS2: PositiveInertia | None = None
+    model: Literal["lumped", "exact"] = "lumped"
+
+
+def lumped(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+    """Return the torque of the two point masses, N·m."""
+    at_rocker = own["m2"] * own["s2"] / given["today.l2"]
+    torque = at_rocker * given["l3"] ** 2 * pose.q1 * pose.acceleration
+    if pose.omega_dot is None:
+        return torque
+    return torque + (own["m2"] - at_rocker) * given["l1"] ** 2 * pose.omega_dot
+
+
+def exact(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+    """Return the torque of the rod as a rigid body, N·m."""
+    rod = pose.joints
+    s2 = own["s2"] * given["l2"] / given["today.l2"]
+    crank_arm = own["m2"] * given["l1"] * s2
+    spin = own["m2"] * s2**2 + own["JS2"]
+    half_slope = spin * rod.rod_1 * rod.rod_2 + crank_arm * (
+        rod.rod_2 * rod.cos_crank_rod - rod.rod_1 * (1 - rod.rod_1) * rod.sin_crank_rod
+    )
+    torque = half_slope * pose.omega**2
+    if pose.omega_dot is None:
+        return torque
+    inertia = spin * rod.rod_1**2 + own["m2"] * given["l1"] ** 2 + 2 * crank_arm * rod.rod_1 * rod.cos_crank_rod
+    return torque + inertia * pose.omega_dot
+
+
+MODELS: dict[str, Callable[[Maths, Any, Values, Values], Number]] = {"lumped": lumped, "exact": exact}
+
+
+def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+    """Return the crank torque that moves the rod, N·m, by the model the scene names."""
+    return MODELS[own["model"]](maths, pose, given, own)
+
+
+EFFECT = Load("rod_inertia", "connecting rod", Own, "drive", force, needs=("operation.speed",))

@@ -1,0 +1,4 @@
+"""The commented scenes that `loomopt new` writes."""
+
+BEATUP_TEMPLATE = """\
+"""

@@ -1,0 +1,216 @@
+"""The crank-rocker A B C D: crank AB = l1 at φ, rod BC = l2, rocker DC = l3, frame AD = l4 along x.
+
+Angles in rad from AD, derivatives with respect to φ; lengths in m (any one unit). `side` = +1 is the branch with C on
+the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cranks and near dead centres.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+
+from loomopt.maths import FLOAT, Maths, Number
+from loomopt.mechanisms import dyad
+from loomopt.mechanisms.dyad import Vector
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Link lengths of one number system; side: +1 or −1."""
+
+    l1: Number
+    l2: Number
+    l3: Number
+    l4: Number
+    side: Number = 1
+
+
+@dataclass(frozen=True)
+class Pose:
+    """The linkage at crank angles φ, any shape; each figure is computed when it is first read."""
+
+    maths: Maths
+    lengths: Lengths
+    phi: Number
+
+    @functools.cached_property
+    def crank(self) -> Vector:
+        """Crank vector A→B, m."""
+        return Vector(self.lengths.l1 * self.maths.cos(self.phi), self.lengths.l1 * self.maths.sin(self.phi))
+
+    @functools.cached_property
+    def dyad(self) -> dyad.Dyad:
+        """Rod (link 1, B→C) and rocker (link 2, D→C)."""
+        base = Vector(self.lengths.l4 - self.crank.x, -self.crank.y)
+        return dyad.close(self.maths, base, self.lengths.l2, self.lengths.l3, self.lengths.side)
+
+    @functools.cached_property
+    def psi(self) -> Number:
+        """Angle ψ of the rocker D→C from AD, rad."""
+        return self.maths.atan2(self.dyad.link2.y, self.dyad.link2.x)
+
+    @functools.cached_property
+    def _rates(self) -> tuple[Number, Number]:
+        return dyad.rates(self.dyad, Vector(self.crank.y, -self.crank.x))
+
+    @functools.cached_property
+    def _second_rates(self) -> tuple[Number, Number]:
+        return dyad.second_rates(self.dyad, self.crank, *self._rates, self.lengths.l2, self.lengths.l3)
+
+    @property
+    def psi_1(self) -> Number:
+        """ψ' = dψ/dφ."""
+        return self._rates[1]
+
+    @property
+    def psi_2(self) -> Number:
+        """ψ'' = d²ψ/dφ²."""
+        return self._second_rates[1]
+
+    @property
+    def rod_1(self) -> Number:
+        """First derivative of the rod's angle."""
+        return self._rates[0]
+
+    @property
+    def rod_2(self) -> Number:
+        """Second derivative of the rod's angle."""
+        return self._second_rates[0]
+
+    @functools.cached_property
+    def cos_crank_rod(self) -> Number:
+        """Cosine of the angle from rod to crank."""
+        return dyad.dot(self.crank, self.dyad.link1) / (self.lengths.l1 * self.lengths.l2)
+
+    @functools.cached_property
+    def sin_crank_rod(self) -> Number:
+        """Sine of the angle from rod to crank."""
+        rod, crank = self.dyad.link1, self.crank
+        return (rod.x * crank.y - rod.y * crank.x) / (self.lengths.l1 * self.lengths.l2)
+
+
+@dataclass(frozen=True)
+class DeadCentres:
+    """Both dead centres: β and β_r (the crank stands at β and at π + β_r), ψ there, ψ'' there; rad."""
+
+    beta: Number
+    beta_r: Number
+    theta: Number
+    psi_front: Number
+    psi_rear: Number
+    swing: Number
+    psi_2_front: Number
+    psi_2_rear: Number
+
+
+def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
+    """Return both dead centres in closed form [Yuan24, eq 12].
+
+    θ = β − β_r and the swing are each one angle of a sine that carries the factor 4 l1 l2, so nothing is lost for
+    tiny cranks; ψ''(FDC) = l1 (l1+l2)/(l2 l3 sin μ_FDC) and its mirror at the rear. Assumes a crank-rocker.
+    """
+    l1, l2, l3, l4, side = lengths.l1, lengths.l2, lengths.l3, lengths.l4, lengths.side
+    front, rear = l2 + l1, l2 - l1
+    area_front, area_rear = dyad.heron(maths, front, l3, l4), dyad.heron(maths, rear, l3, l4)
+    areas, spread = area_front + area_rear, 4 * l1 * l2
+    frame = (l4 - l3) * (l4 + l3)
+    at_front, at_rear = front * front + frame, rear * rear + frame
+    squares = l3 * l3 + l4 * l4
+    excess = squares - l1 * l1 - l2 * l2
+    sine_theta = spread * (excess * (at_front + at_rear) / areas - areas / 2)
+    sine_swing = spread * (2 * excess * excess / areas + areas / 2)
+    rock_front, rock_rear = squares - front * front, squares - rear * rear
+    return DeadCentres(
+        beta=side * maths.atan2(area_front, at_front),
+        beta_r=side * maths.atan2(area_rear, at_rear),
+        theta=side * maths.atan2(sine_theta, area_front * area_rear + at_front * at_rear),
+        psi_front=side * maths.atan2(area_front, -rock_front),
+        psi_rear=side * maths.atan2(area_rear, -rock_rear),
+        swing=maths.atan2(sine_swing, area_front * area_rear + rock_front * rock_rear),
+        psi_2_front=side * 2 * l1 * front * front / (l2 * area_front),
+        psi_2_rear=-side * 2 * l1 * rear * rear / (l2 * area_rear),
+    )
+
+
+def transmission_angles(maths: Maths, lengths: Lengths) -> tuple[Number, Number]:
+    """Return μ at φ = 0 and π − μ at φ = π, rad; the lesser is μ_min over the cycle [Yuan24, eq 17 corrected]."""
+    l1, l2, l3, l4 = lengths.l1, lengths.l2, lengths.l3, lengths.l4
+    near, far = l4 - l1, l4 + l1
+    folded = maths.atan2(maths.sqrt((near + l2 - l3) * (near - l2 + l3)), maths.sqrt((l2 + l3 - near) * (l2 + l3 + near)))
+    stretched = maths.atan2(maths.sqrt((l2 + l3 - far) * (l2 + l3 + far)), maths.sqrt((far + l2 - l3) * (far - l2 + l3)))
+    return 2 * folded, 2 * stretched
+
+
+def assembly_margins(lengths: Lengths) -> dict[str, Number]:
+    """Return by how much each inequality of a crank-rocker holds, in units of length; all positive ⇔ crank-rocker.
+
+    The first keeps the dyad closed at φ = π, the next two at φ = 0, the last makes AB the shortest link.
+    """
+    l1, l2, l3, l4 = lengths.l1, lengths.l2, lengths.l3, lengths.l4
+    return {
+        "l1 + l4 < l2 + l3": l2 + l3 - l1 - l4,
+        "l1 + l2 < l3 + l4": l3 + l4 - l1 - l2,
+        "l1 + l3 < l2 + l4": l2 + l4 - l1 - l3,
+        "l1 < l4": l4 - l1,
+    }
+
+
+def fault(l1: float, l2: float, l3: float, l4: float) -> str:
+    """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one."""
+    failed = [text for text, margin in assembly_margins(Lengths(l1, l2, l3, l4)).items() if not margin > 0]
+    if not failed:
+        return ""
+    sides = {"l1": l1, "l2": l2, "l3": l3, "l4": l4}
+
+    def total(side: str) -> float:
+        return math.fsum(sides[name.strip()] for name in side.split("+"))
+
+    left, right = failed[0].split("<")
+    reason = f"{failed[0]} fails ({total(left) * 1e3:.6g} mm against {total(right) * 1e3:.6g} mm)"
+    return f"{reason}; {_where_it_stops(l1, l2, l3, l4)}"
+
+
+def _where_it_stops(l1: float, l2: float, l3: float, l4: float) -> str:
+    """Say over which crank angles the dyad does not close, for lengths in m."""
+    reach, fold = l2 + l3, abs(l2 - l3)
+    if l1 + l4 < fold or abs(l4 - l1) > reach:
+        return "it assembles at no crank angle"
+    stops = []
+    if l1 + l4 >= reach:
+        stops.append(f"beyond crank angle {math.degrees(_angle_at(l1, l4, reach)):.6g} deg")
+    if abs(l4 - l1) <= fold:
+        stops.append(f"within {math.degrees(_angle_at(l1, l4, fold)):.6g} deg of crank angle 0")
+    if stops:
+        return f"it does not assemble {' and '.join(stops)}"
+    return "it assembles all round, but the rocker turns through: the crank is not the shortest link"
+
+
+def _angle_at(l1: float, l4: float, distance: float) -> float:
+    """Return the crank angle, rad, at which BD (m) has a given length."""
+    far, near = (l4 + l1 - distance) * (l4 + l1 + distance), (distance - l4 + l1) * (distance + l4 - l1)
+    return 2 * math.atan2(math.sqrt(max(near, 0.0)), math.sqrt(max(far, 0.0)))
+
+
+def synthesis(maths: Maths, theta: Number, beta: Number, swing: Number) -> tuple[Number, Number, Number]:
+    """Return l1/l4, l2/l4, l3/l4 of the crank-rocker with given θ, β and swing, rad [Yuan24, eq 13-15].
+
+    Eq 15 is printed with l1 + l4 for l1 + l2. Written so that nothing cancels as θ → 0 (time ratio 1).
+    """
+    half = maths.sin(swing / 2)
+    l1 = half * maths.sin(beta - theta / 2) / maths.cos((theta + swing) / 2)
+    l2 = half * maths.cos(beta - theta / 2) / maths.sin((theta + swing) / 2)
+    stretched = l1 + l2
+    l3 = maths.sqrt((stretched - 1) ** 2 + 4 * stretched * maths.sin(beta / 2) ** 2)
+    return l1, l2, l3
+
+
+def synthesise(theta: float, beta: float, swing: float, l4: float) -> Lengths:
+    """Return the crank-rocker of frame length l4 (m) with given θ, β and swing (rad).
+
+    Raises ValueError where those angles belong to no crank-rocker.
+    """
+    ratios = synthesis(FLOAT, theta, beta, swing)
+    lengths = Lengths(ratios[0] * l4, ratios[1] * l4, ratios[2] * l4, l4)
+    problem = "a length is not positive" if min(ratios) <= 0 else fault(lengths.l1, lengths.l2, lengths.l3, l4)
+    if problem:
+        raise ValueError(f"no crank-rocker has these angles: {problem}")
+    return lengths
