@@ -1,0 +1,83 @@
+"""The cycle as pieces between corners: one smooth formula on each, corners that move with the design.
+
+A node is (piece, u) with u ∈ [0, 1]; its crank angle is start + u (end − start). Both sides of a corner are u = 1 of
+one piece and u = 0 of the next. As a function of the design, a node's angle is offset + Σ coefficient · corner.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loomopt.maths import Number
+from loomopt.schema import Load
+
+TURN = 2 * math.pi
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The pieces of one turn at one design.
+
+    starts: (pieces + 1,) crank angles, rad, the last one turn after the first; switches: (pieces, loads);
+    order: for each start, its corner's place in the declared list and the turns added to it (empty without corners).
+    """
+
+    starts: Floats
+    switches: Floats
+    order: tuple[tuple[int, int], ...]
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces."""
+        return len(self.starts) - 1
+
+    def angles(self, pieces: NDArray[np.intp], u: Floats) -> Floats:
+        """Return crank angles, rad, of nodes (pieces, u)."""
+        return self.starts[pieces] * (1 - u) + self.starts[pieces + 1] * u
+
+    def coefficients(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
+        """Return offset, rad, and the coefficient of each declared corner in the node's angle."""
+        weights = np.zeros(corners)
+        if not self.order:
+            return TURN * u, weights
+        first, second = self.order[piece], self.order[(piece + 1) % self.pieces]
+        wrapped = second[1] + (piece + 1) // self.pieces
+        weights[first[0]] += 1 - u
+        weights[second[0]] += u
+        return TURN * (first[1] * (1 - u) + wrapped * u), weights
+
+    def piece_before(self, angle: float) -> int:
+        """Return the piece that ends at, or holds, a crank angle in rad."""
+        ahead = (self.starts[1:] - angle + 1e-9) % TURN
+        return int(np.argmin(ahead))
+
+
+def split(loads: Sequence[Load], corners: Sequence[Sequence[float]]) -> Cycle:
+    """Return the cycle's pieces from each load's corners, rad (an empty sequence for a load without corners)."""
+    flat = [angle for of_load in corners for angle in of_load]
+    if not flat:
+        starts = np.array([0.0, TURN])
+        return Cycle(starts, _switches(loads, corners, starts), ())
+    base = flat[0]
+    turns = [-math.floor((angle - base) / TURN) for angle in flat]
+    placed = sorted((angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(flat, turns, strict=True)))
+    starts = np.array([angle for angle, _, _ in placed] + [placed[0][0] + TURN])
+    return Cycle(starts, _switches(loads, corners, starts), tuple((index, turn) for _, index, turn in placed))
+
+
+def _switches(loads: Sequence[Load], corners: Sequence[Sequence[float]], starts: Floats) -> Floats:
+    """Return each load's switch on each piece, read at the piece's middle."""
+    middles = (starts[:-1] + starts[1:]) / 2
+    return np.array([[load.switch(m, tuple(c)) for load, c in zip(loads, corners, strict=True)] for m in middles])
+
+
+def node_angle(offset: Number, coefficients: Sequence[Number], corners: Sequence[Number]) -> Number:
+    """Return a node's crank angle, rad, in any number system."""
+    angle = offset
+    for coefficient, corner in zip(coefficients, corners, strict=True):
+        angle = angle + coefficient * corner
+    return angle

@@ -1,0 +1,135 @@
+"""The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24].
+
+q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md = −M3 ψ' + drive terms.
+"""
+
+import functools
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from loomopt import balance
+from loomopt.balance import Given, Pose
+from loomopt.jobs.program import Integral
+from loomopt.maths import Maths, Number
+from loomopt.mechanisms import crank_rocker
+from loomopt.schema import Check, Load, Values
+
+ASSEMBLY_MARGIN = 1.001
+"""The dyad's triangle must close with this factor to spare at both ends."""
+
+
+@dataclass(frozen=True)
+class Beatup:
+    """The crank-rocker with the effects a scene calls for.
+
+    options: (effect, key, word) for values that choose a formula.
+    """
+
+    loads: tuple[Load, ...]
+    checks: tuple[Check, ...]
+    options: tuple[tuple[str, str, str], ...]
+    known: frozenset[str] = field(compare=False)
+    """Names of scene numbers that are given: figures whose numbers are missing are left out."""
+
+    @functools.cached_property
+    def key(self) -> Hashable:
+        """What distinguishes this model's formulas from another's."""
+        return "beatup", tuple(load.name for load in self.loads + self.checks), self.options, self.known
+
+    @functools.cached_property
+    def integrals(self) -> tuple[Integral, ...]:
+        """The mean square of M3 over the pulse, where the cloth resists."""
+        names = [load.name for load in self.loads]
+        return (Integral("pulse_mean_square", "M3_square", names.index("resistance")),) if "resistance" in names else ()
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Whole-cycle quantities whose largest |value| is a figure."""
+        return ("peak_torque", *(name for check in self.checks for name in check.quantities))
+
+    def given(self, maths: Maths, values: Values) -> Given:
+        """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
+        lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
+        centres = crank_rocker.dead_centres(maths, lengths)
+        derived = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
+        if "s" not in values:
+            derived["s"] = values["m4e"] * values["r4e"] ** 2
+        own: dict[str, dict[str, Any]] = {effect.name: {} for effect in self.loads + self.checks}
+        for name, value in values.items():
+            effect, _, key = name.rpartition(".")
+            if effect in own:
+                own[effect][key] = value
+        for effect, key, word in self.options:
+            own[effect][key] = word
+        return Given(dict(values) | derived, own)
+
+    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
+        """Return each load's corner angles, rad."""
+        return tuple(
+            load.corners(maths, given.values, given.own[load.name]) if load.corners else () for load in self.loads
+        )
+
+    def pose(self, maths: Maths, given: Given, phi: Number) -> Pose:
+        """Return the pose at crank angles φ, rad."""
+        joints = crank_rocker.Pose(maths, given.values["lengths"], phi)
+        return Pose(phi, given.values.get("speed"), -joints.psi, -joints.psi_1, -joints.psi_2, joints)
+
+    def front_pose(self, given: Given) -> Pose:
+        """Return the pose at front dead centre, exact: ψ' = 0 and ψ'' in closed form."""
+        centres = given.values["centres"]
+        return Pose(centres.beta, given.values.get("speed"), -centres.psi_front, 0, -centres.psi_2_front)
+
+    def front_angle(self, given: Given) -> Number:
+        """Return β, rad."""
+        return given.values["beta"]
+
+    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
+        """Return a whole-cycle quantity, SI, at crank angle φ, rad."""
+        pose = self.pose(maths, given, phi)
+        if name == "peak_torque":
+            return balance.crank_torque(maths, self.loads, pose, given, switches)
+        if name == "M3_square":
+            return balance.output_force(maths, self.loads, pose, given, switches) ** 2
+        check = next(check for check in self.checks if name in check.quantities)
+        return check.quantities[name](maths, pose, given.values, given.own[check.name])
+
+    def static(self, maths: Maths, given: Given, front: Sequence[Number]) -> dict[str, Number]:
+        """Return figures and rows of front dead centre and of the linkage as a whole, SI."""
+        values, centres = given.values, given.values["centres"]
+        found = {"swing": centres.swing, "theta": centres.theta, "beta": centres.beta, "s": values["s"]}
+        found |= {name: values[name] for name in ("l1", "l2", "l3", "l4", "m4e", "r4e") if name in values}
+        found["mu_near"], found["mu_far"] = crank_rocker.transmission_angles(maths, values["lengths"])
+        found |= assembly_rows(values)
+        found["r4e_square"] = values["r4e"] ** 2
+        if any(load.acts == "output" for load in self.loads):
+            found["M3_fdc"] = balance.output_force(maths, self.loads, self.front_pose(given), given, front)
+        if "speed" in values:
+            found["alpha_fdc"] = centres.psi_2_front * values["speed"] ** 2
+        if "inertia" in given.own:
+            own = given.own.get("counterweight_inertia", {})
+            found["J4"] = balance.total([given.own["inertia"]["J4"], values["s"], *own.values()])
+        if {"m4", "r4", "m4e"} <= values.keys():
+            moment = values["m4"] * values["r4"] - values["m4e"] * values["r4e"]
+            found["r4"] = moment / (values["m4"] + values["m4e"])
+        if "width.l1" in values:
+            found["change"] = change(values)
+        return found
+
+
+def change(values: Values) -> Number:
+    """Return Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
+    names = [name.removeprefix("width.") for name in values if name.startswith("width.")]
+    return balance.total(
+        [values[f"weight.{x}"] * ((values[x] - values[f"today.{x}"]) / values[f"width.{x}"]) ** 2 for x in names]
+    )
+
+
+def assembly_rows(values: Values) -> dict[str, Number]:
+    """Return by how much the dyad closes beyond the margin at φ = π and (twice) at φ = 0, m; never negative."""
+    l1, l2, l3, l4 = values["l1"], values["l2"], values["l3"], values["l4"]
+    return {
+        "assembly: l1 + l4 < l2 + l3": (l2 + l3) - ASSEMBLY_MARGIN * (l1 + l4),
+        "assembly: l1 + l2 < l3 + l4": (l4 - l1) - ASSEMBLY_MARGIN * (l2 - l3),
+        "assembly: l1 + l3 < l2 + l4": (l4 - l1) - ASSEMBLY_MARGIN * (l3 - l2),
+    }

@@ -1,0 +1,239 @@
+"""From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from loomopt.errors import BadInput
+from loomopt.jobs.beatup import Beatup, assembly_rows
+from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
+from loomopt.jobs.program import Limit, Move, Objective, Program, Variable
+from loomopt.jobs.sampling import Sampler
+from loomopt.schema import Check, Load
+
+LENGTHS = ("l1", "l2", "l3", "l4")
+COUNTERWEIGHT = ("m4e", "r4e")
+ROWS = {"mu_min": ("mu_near", "mu_far")}
+"""Figures that are the least of several smooth rows."""
+CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
+
+
+def model(scene: Any) -> Beatup:
+    """Return the mechanism with the effects the scene calls for."""
+    effects = [scene.job.effects[name] for name in scene.effects]
+    options = tuple(
+        (name, key, value)
+        for name, own in scene.effects.items()
+        for key, value in own.model_dump().items()
+        if isinstance(value, str)
+    )
+    return Beatup(
+        tuple(effect for effect in effects if isinstance(effect, Load)),
+        tuple(effect for effect in effects if isinstance(effect, Check)),
+        options,
+        frozenset(numbers(scene)),
+    )
+
+
+def numbers(scene: Any) -> dict[str, float]:
+    """Return every number of the scene by name, SI; an effect's own as `effect.key`, today's lengths also as today.*."""
+    found: dict[str, float] = {**scene.mechanism, **scene.operation}
+    found |= {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
+    for effect, own in scene.effects.items():
+        for key, value in own.model_dump().items():
+            if isinstance(value, float | int):
+                found[f"{effect}.{key}"] = float(value)
+    return found
+
+
+def today(scene: Any) -> dict[str, float]:
+    """Return today's design, SI."""
+    return {name: scene.mechanism[name] for name in VARIABLES}
+
+
+def bounds(scene: Any) -> dict[str, tuple[float, float]]:
+    """Return lower and upper bound of every number that is bounded, by its full name, SI; held ones at today's value."""
+    known = numbers(scene)
+    found = {name: (known[name], known[name]) for name in VARIABLES}
+    for name, bound in scene.bounds.items():
+        full = name if name in known else next(key for key in known if key.endswith(f".{name}") and key[:6] != "today.")
+        found[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
+    return found
+
+
+def program(scene: Any, target: str) -> Program:
+    """Return the program of a target; raises BadInput where the scene lacks what the target needs."""
+    _demand(scene, target)
+    known, limited = numbers(scene), bounds(scene)
+    physics = model(scene)
+    sizes = _Sizes(physics, known, limited)
+    direct = _reads_counterweight(scene, target, limited)
+    names = [name for name in limited if direct or name not in COUNTERWEIGHT]
+    variables = [Variable(name, *limited[name], known[name], sizes.variable(name)) for name in names]
+    if not direct:
+        variables.append(Variable("s", -math.inf, math.inf, known["m4e"] * known["r4e"] ** 2, sizes.inertia))
+        variables.append(Variable("r4e", *limited["r4e"], known["r4e"], sizes.variable("r4e")))
+    limits = [limit for variable in variables for limit in _bound_limits(scene, variable)]
+    limits += [] if direct else _mass_limits(limited["m4e"], sizes)
+    limits += [limit for name, limit in scene.limits.items() for limit in _figure_limits(name, limit, sizes)]
+    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in assembly_rows(known)]
+    limits += _target_limits(scene, target, sizes)
+    taken = {variable.name for variable in variables} | (set() if direct else set(COUNTERWEIGHT))
+    parameters = {name: value for name, value in known.items() if name not in taken}
+    if target == "retrofit":
+        parameters |= _change_parameters(scene, known, limited)
+    return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes))
+
+
+class _Sizes:
+    """Natural sizes of this machine, SI, from today's design: what the NLP is scaled by."""
+
+    def __init__(self, physics: Beatup, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> None:
+        sampler = Sampler(physics, known)
+        front = abs(sampler.static.get("M3_fdc", 0.0))
+        resistance = known.get("M0", 0.0) if "resistance.pulse" in known else 0.0
+        self.known, self.limited, self.sampler = known, limited, sampler
+        self.length = known["l4"]
+        self.inertia = max(known.get("inertia.J4", 0.0), limited["m4e"][1] * limited["r4e"][1] ** 2) or 1.0
+        self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
+        self.torque = max(front, resistance) or self.peak
+
+    def variable(self, name: str) -> float:
+        """Return the size of a variable: its kind's, or its own largest value."""
+        if name in LENGTHS:
+            return self.length
+        return max(abs(self.known[name]), *map(abs, self.limited[name])) or self.length
+
+    def figure(self, name: str) -> float:
+        """Return the size of a figure."""
+        kind = FIGURES[name].kind
+        if name == "peak_torque":
+            return self.peak
+        if name in CYCLE_FIGURES:
+            return self.sampler.peak(name) or 1.0
+        fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
+        return fixed.get(kind) or abs(self.sampler.static[name]) or 1.0
+
+
+def _demand(scene: Any, target: str) -> None:
+    """Raise BadInput where a target speaks of what the scene does not have."""
+    effects = [scene.job.effects[name] for name in scene.effects]
+    if not any(isinstance(effect, Load) and effect.acts == "output" for effect in effects):
+        raise BadInput(
+            f"target {target} needs a reed torque, and no effect in the scene makes one",
+            file=scene.origin,
+            key="effects",
+            allowed=", ".join(scene.job.effects),
+            remedy="Add the table [effects.inertia] with J4, or another effect.",
+        )
+    for name in scene.job.targets[target].needs_effects:
+        if name not in scene.effects:
+            raise BadInput(
+                f"target {target} needs the effect {name}",
+                file=scene.origin,
+                key=f"effects.{name}",
+                remedy=f"Add the table [effects.{name}], or choose another target.",
+            )
+    if target == "torque" and scene.targets["torque"].M3_tolerance is None and "M0" not in scene.operation:
+        raise BadInput(
+            "target torque needs a tolerance for the reed torque",
+            file=scene.origin,
+            key="targets.torque.M3_tolerance",
+            remedy='Set it, as in M3_tolerance = "8 N*m", or give operation.M0: the default is 1 % of it.',
+        )
+    for name in scene.targets["retrofit"].weights if target == "retrofit" else ():
+        if name not in VARIABLES:
+            raise BadInput(
+                f"{name} is no design variable",
+                file=scene.origin,
+                key=f"targets.retrofit.weights.{name}",
+                allowed=", ".join(VARIABLES),
+                remedy="Name a design variable.",
+            )
+
+
+def _reads_counterweight(scene: Any, target: str, limited: Mapping[str, tuple[float, float]]) -> bool:
+    """Say whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
+    loads = [scene.job.effects[name] for name in scene.effects]
+    read = any(set(effect.reads) & set(COUNTERWEIGHT) for effect in loads if isinstance(effect, Load))
+    read = read or bool({"r4", "bearing_force", "shaking_force"} & set(scene.limits)) or target == "retrofit"
+    fixed = all(limited[name][0] == limited[name][1] for name in COUNTERWEIGHT)
+    return read or fixed or limited["r4e"][1] == 0.0
+
+
+def _bound_limits(scene: Any, variable: Variable) -> list[Limit]:
+    """Return the bounds of a variable the scene bounds, as limits; one that it leaves alone is held, not limited."""
+    label = variable.name.rpartition(".")[2]
+    if label not in scene.bounds or variable.name == "s":
+        return []
+    if variable.lower == variable.upper:
+        return [Limit(label, 0, variable.name, variable.lower, variable.scale, "variable")]
+    ends = ((-1, variable.lower), (1, variable.upper))
+    return [Limit(label, sign, variable.name, value, variable.scale, "variable") for sign, value in ends]
+
+
+def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
+    """Return the counterweight's mass bounds as limits on s against r4e²."""
+    if mass[0] == mass[1]:
+        return [Limit("m4e", 0, "s", mass[0], sizes.inertia, "static", "r4e_square")]
+    ends = ((-1, mass[0]), (1, mass[1]))
+    return [Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square") for sign, value in ends]
+
+
+def _figure_limits(name: str, limit: Any, sizes: _Sizes) -> list[Limit]:
+    """Return the limits on one figure, row by row."""
+    family = "cycle" if name in CYCLE_FIGURES else "static"
+    scale = sizes.figure(name)
+    if limit.min is not None and limit.min == limit.max:
+        return [Limit(name, 0, name, limit.min, scale, "static")]
+    ends = [(sign, value) for sign, value in ((-1, limit.min), (1, limit.max)) if value is not None]
+    rows = ROWS.get(name, (name,))
+    return [Limit(name, sign, row, value, scale, family) for sign, value in ends for row in rows]
+
+
+def _target_limits(scene: Any, target: str, sizes: _Sizes) -> list[Limit]:
+    """Return what the target itself demands of the reed torque at front dead centre."""
+    if target == "retrofit":
+        return [Limit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque, "static")]
+    if target != "torque":
+        return []
+    tolerance = scene.targets["torque"].M3_tolerance
+    tolerance = 0.01 * scene.operation["M0"] if tolerance is None else tolerance
+    if tolerance == 0.0:
+        return [Limit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque, "static")]
+    return [Limit("M3_fdc", sign, "M3_fdc", sign * tolerance, sizes.torque, "static") for sign in (-1, 1)]
+
+
+def _change_parameters(scene: Any, known: Mapping[str, float], limited: Mapping[str, Any]) -> dict[str, float]:
+    """Return today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing."""
+    weights, found = scene.targets["retrofit"].weights, {}
+    for name in VARIABLES:
+        width = limited[name][1] - limited[name][0]
+        found |= {f"today.{name}": known[name], f"width.{name}": width or 1.0}
+        found[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
+    return found
+
+
+def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
+    """Return the target's levels in order."""
+    peak = Objective("peak_torque", "peak_torque", "peak", sizes.peak)
+    return {
+        "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", sizes.torque), peak),
+        "torque": (peak,),
+        "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.torque**2, power=2),),
+        "retrofit": (Objective("change", "change", "value", 1.0),),
+    }[target]
+
+
+def moves(program: Program) -> tuple[Move, ...]:
+    """Return the directions that may leave every figure unchanged."""
+    names = {variable.name for variable in program.variables}
+    free = tuple(name for name in COUNTERWEIGHT if name in names)
+    return (Move("counterweight", free, "axis"), Move("scale", LENGTHS, "scale"))
+
+
+def design(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the design of NLP values: m4e is s/r4e² where the NLP was solved in s."""
+    found = {name: values[name] for name in (*LENGTHS, "r4e")}
+    mass = values["m4e"] if "m4e" in values else values["s"] / values["r4e"] ** 2 if values["r4e"] else 0.0
+    return {name: mass if name == "m4e" else found[name] for name in VARIABLES}

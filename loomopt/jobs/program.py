@@ -1,0 +1,147 @@
+"""A design task as data: variables, limits, ordered objectives, and the model whose formulas they speak of.
+
+A program knows no grid and no solver. Its structure (what is in it) is apart from its numbers, so that one built NLP
+serves every scene of the same structure.
+"""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from loomopt.balance import Given
+from loomopt.maths import Maths, Number
+from loomopt.schema import Load, Values
+
+Static = Mapping[str, Number]
+"""Values that do not depend on the crank angle, by name, SI."""
+
+
+@dataclass(frozen=True)
+class Integral:
+    """A mean over the pieces where a load's switch is 1: of `quantity`, over the crank angle."""
+
+    name: str
+    quantity: str
+    load: int
+
+
+class Model(Protocol):
+    """A mechanism with its effects, in every number system."""
+
+    @property
+    def key(self) -> Hashable:
+        """What distinguishes this model's formulas from another's."""
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads of the balance, in order."""
+
+    @property
+    def integrals(self) -> tuple[Integral, ...]:
+        """The means over part of the cycle this model knows."""
+
+    def given(self, maths: Maths, values: Values) -> Given:
+        """Return the scene's numbers and what follows from them at once, SI."""
+
+    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
+        """Return each load's corner angles, rad."""
+
+    def static(self, maths: Maths, given: Given, front: Sequence[Number]) -> dict[str, Number]:
+        """Return every figure and row that needs one position only; `front` = the loads' switches there."""
+
+    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
+        """Return a whole-cycle quantity at crank angle φ, rad."""
+
+    def front_angle(self, given: Given) -> Number:
+        """Return the crank angle of the position `static` speaks of, rad."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A design variable of the NLP: its place among the model's values, bounds, today's value and scale, SI."""
+
+    name: str
+    lower: float
+    upper: float
+    today: float
+    scale: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit as `sign · (row − value · weight) ≤ 0`: sign +1 for a maximum, −1 for a minimum, 0 for an equality.
+
+    name: as the scene calls it; row, weight: names of values, static figures or whole-cycle quantities (weight "" = 1);
+    family: where the row lives; scale: natural size of the row; relaxable: whether a designer could give way.
+    """
+
+    name: str
+    sign: int
+    row: str
+    value: float
+    scale: float
+    family: Literal["variable", "static", "cycle"]
+    weight: str = ""
+    relaxable: bool = True
+
+    @property
+    def structure(self) -> Hashable:
+        """What the built NLP depends on: everything but the numbers."""
+        return self.name, self.sign, self.row, self.family, self.weight, self.relaxable
+
+    def residual(self, values: Values, limit: Number) -> Number:
+        """Return how far the limit is exceeded, SI; for an equality the signed difference."""
+        bound = limit * values[self.weight] if self.weight else limit
+        return bound - values[self.row] if self.sign < 0 else values[self.row] - bound
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One level of a target: least |row| ("magnitude"), least peak over the cycle ("peak") or least row ("value").
+
+    figure: what the designer reads; scale: its natural size, SI; power: the figure's power that the row is.
+    """
+
+    figure: str
+    row: str
+    form: Literal["magnitude", "peak", "value"]
+    scale: float
+    power: int = 1
+
+
+@dataclass(frozen=True)
+class Move:
+    """A direction that may leave everything unchanged, along straight lines in the NLP's variables.
+
+    kind "scale": all of `along` grow in proportion; "axis": each of `along` changes by itself.
+    """
+
+    name: str
+    along: tuple[str, ...]
+    kind: Literal["scale", "axis"]
+
+
+@dataclass(frozen=True)
+class Program:
+    """The whole task: structure and numbers."""
+
+    model: Model
+    variables: tuple[Variable, ...]
+    parameters: Mapping[str, float]
+    limits: tuple[Limit, ...]
+    objectives: tuple[Objective, ...]
+
+    @property
+    def structure(self) -> Hashable:
+        """Equal for programs that differ in numbers only."""
+        return (
+            self.model.key,
+            tuple(variable.name for variable in self.variables),
+            tuple(self.parameters),
+            tuple(limit.structure for limit in self.limits),
+            tuple((objective.row, objective.form) for objective in self.objectives),
+        )
+
+    def values(self, design: Mapping[str, Number], maths: Maths) -> dict[str, Number]:
+        """Return all values of one number system, with `design` for the variables."""
+        return {name: maths.number(value) for name, value in self.parameters.items()} | dict(design)

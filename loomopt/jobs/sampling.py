@@ -1,0 +1,133 @@
+"""Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loomopt import cycle, maths
+from loomopt.balance import Given
+from loomopt.cycle import TURN, Cycle, Floats
+from loomopt.jobs.program import Integral, Model
+
+CHUNK = 8192
+"""Positions evaluated at once: small enough to stay in cache."""
+SAMPLES = 720
+"""Samples of one turn from which extremes are refined; no piece gets fewer than SAMPLES/8."""
+GAUSS_NODES = 32
+
+
+@functools.cache
+def gauss() -> tuple[Floats, Floats]:
+    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    return (nodes + 1) / 2, weights / 2
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """A local extreme of |quantity|: where, and the value with its sign, SI."""
+
+    piece: int
+    u: float
+    value: float
+
+
+class Sampler:
+    """One design, ready to be sampled over its cycle."""
+
+    def __init__(self, model: Model, values: Mapping[str, float]) -> None:
+        self.model = model
+        self.given: Given = model.given(maths.FLOAT, values)
+        self.corners = model.corners(maths.FLOAT, self.given)
+        self.cycle: Cycle = cycle.split(model.loads, self.corners)
+
+    @property
+    def corner_count(self) -> int:
+        """Number of declared corners."""
+        return sum(len(of_load) for of_load in self.corners)
+
+    @functools.cached_property
+    def front(self) -> Floats:
+        """Each load's switch just before the position `static` speaks of."""
+        return np.asarray(self.cycle.switches[self.cycle.piece_before(float(self.model.front_angle(self.given)))])
+
+    @functools.cached_property
+    def static(self) -> dict[str, float]:
+        """Figures that need one position only, and the model's means over parts of the cycle."""
+        found = self.model.static(maths.FLOAT, self.given, self.front)
+        for integral in self.model.integrals:
+            found[integral.name] = self.mean(integral)
+        return found
+
+    def at(self, name: str, pieces: NDArray[np.intp], u: Floats) -> Floats:
+        """Return a quantity at nodes (pieces, u), SI."""
+        result = np.empty(u.shape)
+        for begin in range(0, len(u), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            angles = self.cycle.angles(pieces[part], u[part])
+            switches = self.cycle.switches[pieces[part]].T
+            result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
+        return result
+
+    def grid(self, samples: int = SAMPLES) -> tuple[NDArray[np.intp], Floats]:
+        """Return nodes spread evenly over the turn, both ends of every piece included."""
+        widths = np.diff(self.cycle.starts)
+        counts = [max(samples // 8, int(np.ceil(samples * width / TURN))) + 1 for width in widths]
+        pieces = np.repeat(np.arange(len(counts)), counts)
+        return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
+
+    def extremes(self, name: str, samples: int = SAMPLES) -> list[Extreme]:
+        """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding."""
+        pieces, u = self.grid(samples)
+        values = self.at(name, pieces, u)
+        size = np.abs(values)
+        if not np.all(np.isfinite(size)):
+            return [Extreme(0, 0.0, float("inf"))]
+        first, last = u == 0.0, u == 1.0
+        left = np.where(first, -np.inf, np.roll(size, 1))
+        right = np.where(last, -np.inf, np.roll(size, -1))
+        peaks = np.flatnonzero((size >= left) & (size >= right) & ((size > left) | (size > right)))
+        found = self._refine(name, pieces, u, values, peaks)
+        return sorted(found, key=lambda extreme: -abs(extreme.value))
+
+    def _refine(
+        self, name: str, pieces: NDArray[np.intp], u: Floats, values: Floats, peaks: NDArray[np.intp]
+    ) -> list[Extreme]:
+        """Refine sampled peaks by parabolas over ever smaller steps; a peak at a piece's end may stay there."""
+        piece, sign = pieces[peaks], np.sign(values[peaks])
+        widths = np.diff(self.cycle.starts)
+        step = np.full(len(peaks), TURN / SAMPLES) / widths[piece]
+        step = np.minimum(step, 0.25)
+        best_u, best = u[peaks], np.abs(values[peaks])
+        for shrink in (1 / 16, 1 / 16, 1 / 4):
+            centre = np.clip(best_u, step, 1 - step)
+            stencil = np.concatenate([centre - step, centre, centre + step])
+            low, mid, high = np.split(np.tile(sign, 3) * self.at(name, np.tile(piece, 3), stencil), 3)
+            bend = low - 2 * mid + high
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shift = np.where(bend < 0, 0.5 * (low - high) / bend, 0.0)
+            vertex = np.clip(centre + step * np.clip(shift, -1, 1), 0, 1)
+            value = sign * self.at(name, piece, vertex)
+            better = value >= best
+            best_u, best = np.where(better, vertex, best_u), np.where(better, value, best)
+            step = step * shrink
+        return [Extreme(int(p), float(w), float(s * b)) for p, w, s, b in zip(piece, best_u, sign, best, strict=True)]
+
+    def peak(self, name: str) -> float:
+        """Return the largest |quantity| over the cycle, SI."""
+        return max(abs(extreme.value) for extreme in self.extremes(name))
+
+    def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
+        """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""
+        active = np.flatnonzero(self.cycle.switches[:, integral.load] == 1.0)
+        nodes, weights = gauss()
+        return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
+
+    def mean(self, integral: Integral) -> float:
+        """Return the mean of an integral's quantity over its pieces, SI."""
+        pieces, u, weights = self.quadrature(integral)
+        widths = np.diff(self.cycle.starts)[pieces] * weights
+        return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))
