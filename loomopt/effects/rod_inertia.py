@@ -7,8 +7,10 @@ exact: ½ Je' ω² + Je ω̇ with Je = (m2 v_S2² + JS2 ω2²)/ω². The ratio s
 from collections.abc import Callable
 from typing import Any, Literal
 
+from pydantic import ValidationInfo, field_validator
+
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Length, PositiveInertia, PositiveMass
+from loomopt.quantities import Length, PositiveInertia, PositiveMass, QuantityError
 from loomopt.schema import Load, Table, Values
 
 
@@ -19,6 +21,14 @@ class Own(Table):
     s2: Length
     JS2: PositiveInertia | None = None
     model: Literal["lumped", "exact"] = "lumped"
+
+    @field_validator("model")
+    @classmethod
+    def _exact_needs_its_inertia(cls, model: str, given: ValidationInfo) -> str:
+        if model == "exact" and given.data.get("JS2", 0.0) is None:
+            problem, allowed = "JS2 is missing: the exact model needs it", "the lumped model, or JS2 too"
+            raise QuantityError(problem, allowed, 'Add JS2, such as "0.0005 kg*m^2"')
+        return model
 
 
 def lumped(maths: Maths, pose: Any, given: Values, own: Values) -> Number:

@@ -1,4 +1,95 @@
 """The commented scenes that `loomopt new` writes."""
 
 BEATUP_TEMPLATE = """\
+# A beat-up scene: crank AB = l1, connecting rod BC = l2, rocker (sley) DC = l3, frame AD = l4.
+# A is the crank shaft, D the rocking shaft. Change the numbers to those of your loom, then:
+#     loomopt show FILE            the scene as it was read
+#     loomopt solve FILE           the best dimensions within the limits below
+#
+# Every number is text with its unit: "31 mm", "1.22 in", "23 deg", "600 rpm", "745 N*m", "0.62 kg*m^2".
+# Decimal point, no comma; units are joined by * and /, powers are written ^2.
+# Angles and speeds name their unit too: deg or rad, rpm or rad/s; Hz and 1/min are refused.
+
+[problem]
+name = "my-loom"                # letters, digits, - and _
+job = "beatup"
+title = "My loom"
+source = ""                     # where the numbers come from: drawing, catalogue, measurement
+
+[operation]
+speed = "600 rpm"               # main shaft
+M0 = "745 N*m"                  # peak resistance of the cloth, about the rocking shaft, at front dead centre
+
+[mechanism]                     # today's machine; it must assemble, but may lie outside bounds and limits
+l1 = "31 mm"
+l2 = "65 mm"
+l3 = "155 mm"
+l4 = "167 mm"
+m4e = "0 kg"                    # counterweight mass, 0 kg for none
+r4e = "0 mm"                    # its distance from the rocking shaft, opposite the reed
+m4 = "56.8 kg"                  # reed system; needed for gravity, centrifugal and the figure r4 only
+r4 = "45 mm"                    # its centre of mass from the rocking shaft; as m4
+
+# Effects: one table for each that counts. What has no table is not in the equations.
+
+[effects.inertia]
+J4 = "0.62 kg*m^2"              # reed system about the rocking shaft, without the counterweight
+
+[effects.resistance]
+pulse = "29.8 deg"              # crank angle through which the cloth resists, centred on front dead centre
+
+# More effects: take off the # to put one on; or call it [available.NAME] and put it on by --with NAME.
+#
+# [effects.rocker_inertia]
+# J3 = "0.05 kg*m^2"            # rocker about the rocking shaft
+#
+# [effects.counterweight_inertia]
+# JS = "0.01 kg*m^2"            # counterweight about its own centre of mass
+#
+# [effects.rod_inertia]
+# m2 = "1.5 kg"                 # connecting rod
+# s2 = "32.5 mm"                # its centre of mass from the crank pin
+# JS2 = "0.0005 kg*m^2"         # about its centre of mass; needed for the exact model only
+# model = "lumped"              # or "exact"
+#
+# [effects.gravity]
+# tilt = "-67 deg"              # angle of the line A to D from the horizontal; negative: D lies below A
+# offset = "0 deg"              # angle of the reed's centre of mass from the rocker's line
+#
+# [effects.bearing_friction]
+# coulomb = "2 N*m"             # constant friction torque of the rocking shaft
+# viscous = "0.05 N*m*s/rad"    # friction torque per angular speed
+#
+# [effects.centrifugal]         # bearing load and shaking force as figures; no values of its own
+
+# Bounds: what may change, and how far. Without a bound, or with one value, a dimension stays; with
+# `free = false` it stays until --free NAME. Any other number above can be bounded by its name as well:
+#     J4 = { min = "0.5 kg*m^2", max = "0.7 kg*m^2", free = false }
+
+[bounds]
+l1 = { min = "30 mm", max = "35 mm" }
+l2 = { min = "60 mm", max = "85 mm" }
+l3 = { min = "140 mm", max = "170 mm" }
+l4 = { min = "150 mm", max = "167 mm" }
+m4e = { min = "0 kg", max = "12.4 kg" }
+r4e = { min = "0 mm", max = "80 mm" }
+
+# Limits: figures to keep, at least (min), at most (max) or both.
+#     swing; theta, between the dead centres' crank lines; beta, crank angle of front dead centre;
+#     mu_min, least transmission angle; M3_fdc, reed torque at front dead centre; peak_torque, on the crank;
+#     alpha_fdc, rocker acceleration; J4 and r4, with the counterweight; pulse_rms; and with the effect
+#     centrifugal: bearing_force, shaking_force.
+
+[limits]
+swing = { min = "22.9 deg", max = "23.4 deg" }
+theta = { min = "-2.2 deg", max = "2.2 deg" }
+mu_min = { min = "56.5 deg" }
+
+# Targets: balance (the default), pulse, torque, retrofit. Only these two have values of their own.
+#
+# [targets.torque]
+# M3_tolerance = "7.45 N*m"     # reed torque allowed at front dead centre; 1 % of M0 if not given
+#
+# [targets.retrofit]
+# weights = { l1 = 1, l3 = 5 }  # a larger weight: that dimension changes less
 """

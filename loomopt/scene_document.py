@@ -1,0 +1,106 @@
+"""A scene's raw tables: read from a file, copied, looked into and changed without touching the original."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from loomopt.errors import BadInput
+from loomopt.scene_errors import refusal, shown
+
+_LARGEST_FILE = 1_000_000
+_DEEPEST = 8
+
+
+def read_document(path: Path | str) -> dict[str, Any]:
+    """Return the tables of a TOML file. Raises BadInput for a file that cannot be read as one."""
+    origin = str(path)
+    text = _read_text(Path(path), origin)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        problem, remedy = f"it is not TOML: {str(error)[:200]}", "Correct the line"
+    except RecursionError:
+        problem, remedy = "its tables or lists are nested too deep", "Write a scene as `loomopt new` does"
+    except ValueError:
+        problem, remedy = "it holds a whole number of thousands of digits", "Correct the number"
+    raise refusal(problem, origin, allowed="a scene in TOML", remedy=remedy) from None
+
+
+def _read_text(path: Path, origin: str) -> str:
+    """Return the text of a file that is regular, small and UTF-8."""
+    allowed = "a TOML file of a scene, in UTF-8, up to 1 MB"
+    try:
+        if path.is_dir():
+            raise refusal("it is a folder", origin, allowed=allowed, remedy="Name the file in it")
+        if not path.exists():
+            remedy = "Correct the path; a packaged scene is called by its name alone: see `loomopt list`"
+            raise refusal("there is no such file", origin, allowed=allowed, remedy=remedy)
+        if not path.is_file():
+            raise refusal("it is not an ordinary file", origin, allowed=allowed, remedy="Name a file")
+        with path.open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+        if len(raw) > _LARGEST_FILE:
+            remedy = "Check that this is the file you mean"
+            raise refusal("the file is too large", origin, allowed=allowed, remedy=remedy)
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        problem, remedy = f"it is not UTF-8 text (byte {error.start})", "Save the file as UTF-8"
+    except BadInput:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        problem, remedy = f"it cannot be read: {reason}", "Check the path and its permissions"
+    raise refusal(problem, origin, allowed=allowed, remedy=remedy)
+
+
+def copied(table: Mapping[str, Any], origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return a copy of nested tables. Raises BadInput for a name that is not text and for endless nesting."""
+    if len(path) > _DEEPEST:
+        remedy = "Write a scene as `loomopt new` does"
+        raise refusal("its tables are nested too deep", origin, ".".join(path[:3]) + "...", remedy=remedy)
+    for name in table:
+        if not isinstance(name, str):
+            remedy = "Write names as text"
+            raise refusal(f"a name is not text: {shown(name)}", origin, ".".join(path), remedy=remedy)
+    return {
+        name: copied(value, origin, (*path, name)) if isinstance(value, Mapping) else _copied_value(value)
+        for name, value in table.items()
+    }
+
+
+def _copied_value(value: Any) -> Any:
+    return list(value) if isinstance(value, list) else value
+
+
+def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> Any:
+    """Return the raw value of a path of names; None where there is none."""
+    value: Any = document
+    for part in parts:
+        if not isinstance(value, Mapping) or part not in value:
+            return None
+        value = value[part]
+    return value
+
+
+def replaced(
+    document: Mapping[str, Any], parts: Sequence[str], value: Any, origin: str, key: str
+) -> dict[str, Any]:
+    """Return tables in which one path has another value; tables on the way are made where they are missing.
+
+    key: the whole path, for the BadInput raised where it leads through a value.
+    """
+    first, *rest = parts
+    if rest:
+        inner = document.get(first, {})
+        if not isinstance(inner, Mapping):
+            raise refusal(
+                f"{first} is a value, not a table", origin, key, inner, remedy=f"Set {first} itself"
+            )
+        value = replaced(inner, rest, value, origin, key)
+    return {**document, first: value}
+
+
+def removed(document: Mapping[str, Any], table: str, name: str) -> dict[str, Any]:
+    """Return tables in which one table has lost one name."""
+    return {**document, table: {key: value for key, value in document[table].items() if key != name}}

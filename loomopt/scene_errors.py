@@ -1,0 +1,95 @@
+"""Messages about a scene: one line each, with file, key, value, what is allowed and what to do.
+
+Text from outside is shortened, and stripped of whatever a terminal would obey.
+"""
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from loomopt.errors import BadInput
+from loomopt.quantities import QuantityError, described, quantity_of
+
+_LONGEST_VALUE, _LONGEST_PART = 80, 1000
+_NOTHING = object()
+_PROBLEMS = {
+    "dict_type": "it is not a table",
+    "string_type": "it is not text",
+    "bool_type": "it is neither true nor false",
+}
+
+
+def clean(text: str, longest: int = _LONGEST_PART) -> str:
+    """Return text without control characters, shortened to about `longest` characters."""
+    ending = f"... ({len(text)} characters)" if len(text) > longest else ""
+    kept = text[:longest]
+    if not kept.isprintable():
+        kept = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in kept)
+    return kept + ending
+
+
+def shown(value: object) -> str:
+    """Return a scene's raw value as it would be written, shortened."""
+    if isinstance(value, str):
+        return f'"{clean(value, _LONGEST_VALUE)}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and value.bit_length() > 256:
+        return "a huge whole number"
+    if isinstance(value, dict | list | tuple):
+        return "a table" if isinstance(value, dict) else "a list"
+    return clean(str(value), _LONGEST_VALUE) if isinstance(value, int | float) else type(value).__name__
+
+
+def refusal(
+    problem: str, origin: str, key: str = "", value: object = _NOTHING, allowed: str = "", remedy: str = ""
+) -> BadInput:
+    """Return the error for one problem; value: as given, where one is given."""
+    return BadInput(
+        clean(problem),
+        file=clean(origin),
+        key=clean(key, 2 * _LONGEST_VALUE),
+        value="" if value is _NOTHING else shown(value),
+        allowed=clean(allowed),
+        remedy=clean(remedy),
+    )
+
+
+def unknown(what: str, name: str, known: Iterable[str], origin: str, key: str) -> BadInput:
+    """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …"""
+    names = list(known)
+    near = difflib.get_close_matches(name[:_LONGEST_VALUE], names, n=1, cutoff=0.5)
+    remedy = f'Did you mean "{near[0]}"?' if near else "Correct the name or take it out"
+    return refusal(
+        f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy
+    )
+
+
+def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:
+    """Return the error for a value that is not the quantity asked for."""
+    return refusal(error.problem, origin, key, value, error.allowed, error.remedy)
+
+
+def missing(model: type[BaseModel], origin: str, table: str, name: str, needed: str = "") -> BadInput:
+    """Return the error for a key that a table lacks; needed: what needs it."""
+    quantity = quantity_of(model, name)
+    sort = described(quantity.kind) if quantity else "text"
+    problem = f"{name} is missing{': ' if needed else ''}{needed}"
+    return refusal(problem, origin, f"{table}.{name}", allowed=sort, remedy=f"Add {name} to [{table}]")
+
+
+def invalid(error: ValidationError, model: type[BaseModel], origin: str, table: str) -> BadInput:
+    """Return the error for the first thing pydantic found wrong with a table."""
+    first: Any = error.errors(include_url=False)[0]
+    names = [str(name) for name in first["loc"]]
+    if first["type"] == "missing" and len(names) == 1:
+        return missing(model, origin, table, names[0])
+    key, value = ".".join((table, *names)), first["input"]
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, QuantityError):
+        return misread(cause, origin, key, value)
+    allowed = str(first.get("ctx", {}).get("expected", "")).replace("'", '"')
+    problem = "it is none of the known choices" if allowed else _PROBLEMS.get(first["type"], first["msg"])
+    return refusal(problem, origin, key, value, allowed, "Correct the value")

@@ -1,0 +1,238 @@
+"""The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import ValidationError
+
+from loomopt.quantities import Quantity, QuantityError, quantity_of, unit_of
+from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
+from loomopt.schema import Check, Job, Table
+
+_Model = TypeVar("_Model", bound=Table)
+
+
+class Problem(Table):
+    """What a scene says of itself; source: citation of where its numbers come from."""
+
+    name: str
+    job: str
+    title: str
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Range of a number that may vary, SI; equal ends fix it; not free: held at today's; unit: as written."""
+
+    min: float
+    max: float
+    free: bool
+    unit: str
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Range in which a figure is kept, SI; None: that side is open; unit: as written."""
+
+    min: float | None
+    max: float | None
+    unit: str
+
+
+class Place(NamedTuple):
+    """Where a number stands: table and key; what it may be; whether the scene has a value for it."""
+
+    table: str
+    key: str
+    quantity: Quantity
+    given: bool
+
+
+def table(raw: Any, origin: str, path: str) -> Mapping[str, Any]:
+    """Return raw if it is a table."""
+    if not isinstance(raw, Mapping):
+        raise refusal("it is not a table", origin, path, raw, remedy=f"Write a table [{path}]")
+    return raw
+
+
+def checked(model: type[_Model], raw: Any, origin: str, path: str) -> _Model:
+    """Return a raw table as its model."""
+    values = dict(table(raw, origin, path))
+    for name in values:
+        if name not in model.model_fields:
+            raise unknown("key", name, model.model_fields, origin, f"{path}.{name}")
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise invalid(error, model, origin, path) from None
+
+
+def problem(raw: Any, jobs: Mapping[str, Job], origin: str) -> Problem:
+    """Return [problem], its name fit for a file name and its job one of `jobs`."""
+    found = checked(Problem, raw, origin, "problem")
+    if not found.name.replace("-", "").replace("_", "").isalnum() or len(found.name) > 64:
+        remedy = "Name it as a file could be named, such as beatup-wide"
+        allowed = "up to 64 letters, digits, - and _"
+        raise refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy)
+    if found.job not in jobs:
+        raise unknown("job", found.job, jobs, origin, "problem.job")
+    return found
+
+
+def named(raw: Any, models: Mapping[str, type[Table]], what: str, origin: str, path: str) -> dict[str, Table]:
+    """Return the tables inside a table, in the order of `models`; what: what their names stand for."""
+    inner = table(raw, origin, path)
+    for name in inner:
+        if name not in models:
+            raise unknown(what, name, models, origin, f"{path}.{name}")
+    return {
+        name: checked(model, inner[name], origin, f"{path}.{name}")
+        for name, model in models.items()
+        if name in inner
+    }
+
+
+def demand(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table], origin: str) -> None:
+    """Raise BadInput where an active effect, or the job, needs a number that is not given."""
+    needs = [(key, f"job {job.name}") for key in job.needs]
+    needs += [(key, f"effect {name}") for name in effects for key in job.effects[name].needs]
+    for key, who in needs:
+        path, name = key.split(".")
+        if getattr(tables[path], name) is None:
+            raise missing(type(tables[path]), origin, path, name, f"{who} needs it")
+
+
+def places(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table]) -> Iterator[Place]:
+    """Yield every place of a number in the job's tables, those of effects that are off included."""
+    models: dict[str, tuple[type[Table], Table | None]] = {
+        "operation": (job.operation, tables["operation"]),
+        "mechanism": (job.mechanism, tables["mechanism"]),
+    }
+    models |= {f"effects.{name}": (effect.own, effects.get(name)) for name, effect in job.effects.items()}
+    for path, (model, own) in models.items():
+        for key in model.model_fields:
+            quantity = quantity_of(model, key)
+            if quantity:
+                yield Place(path, key, quantity, own is not None and getattr(own, key) is not None)
+
+
+def bounds(raw: Any, job: Job, known: list[Place], origin: str) -> dict[str, Bound]:
+    """Return [bounds]; known: places of the scene's numbers, any of which may be bounded."""
+    inner = table(raw, origin, "bounds")
+    return {
+        name: _bound(inner[name], _bounded(name, job, known, origin), origin, f"bounds.{name}")
+        for name in inner
+    }
+
+
+def _bounded(name: str, job: Job, known: list[Place], origin: str) -> Quantity:
+    """Return what a number to bound may be: a design variable, or the one number of that name."""
+    key = f"bounds.{name}"
+    found = [place for place in known if place.key == name]
+    given = [place for place in found if place.given]
+    if name in job.variables:
+        return next(
+            (place.quantity for place in found if place.table == "mechanism"), Quantity(job.variables[name])
+        )
+    if not found:
+        names = [*job.variables, *sorted({place.key for place in known if place.given} - set(job.variables))]
+        raise unknown("number to bound", name, names, origin, key)
+    if not given:
+        where = " or ".join(f"{place.table}.{name}" for place in found)
+        raise refusal(
+            f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take the bound out"
+        )
+    if len(given) > 1:
+        where = ", ".join(f"{place.table}.{name}" for place in given)
+        raise refusal(f"{name} may mean {where}", origin, key, remedy="Take the bound out")
+    return given[0].quantity
+
+
+def _bound(raw: Any, quantity: Quantity, origin: str, key: str) -> Bound:
+    if not isinstance(raw, Mapping):
+        value = _value(quantity, raw, origin, key)
+        return Bound(value, value, True, _unit(raw))
+    _known_keys(raw, ("min", "max", "free"), origin, key)
+    for end in ("min", "max"):
+        if end not in raw:
+            remedy = f"Give min and max of {key}, or one value to fix it"
+            raise refusal(f"{end} is missing: a bound has two ends", origin, f"{key}.{end}", remedy=remedy)
+    free = {"true": True, "false": False}.get(str(raw.get("free", True)).lower())
+    if free is None:
+        free_key = f"{key}.free"
+        raise refusal(
+            "it is neither true nor false", origin, free_key, raw["free"], "true, false", "Correct the value"
+        )
+    low, high = (_value(quantity, raw[end], origin, f"{key}.{end}") for end in ("min", "max"))
+    _ordered(raw, low, high, origin, key)
+    return Bound(low, high, free, _unit(raw["min"]))
+
+
+def limits(raw: Any, job: Job, effects: Mapping[str, Table], origin: str) -> dict[str, Limit]:
+    """Return [limits]: figures of the job, and of the effects that are on."""
+    inner = table(raw, origin, "limits")
+    limitable = [name for name, figure in job.figures.items() if figure.sides]
+    for name in inner:
+        if name not in limitable:
+            raise unknown("figure to limit", name, limitable, origin, f"limits.{name}")
+        for other, effect in job.effects.items():
+            if isinstance(effect, Check) and name in effect.quantities and other not in effects:
+                remedy = f"Put it on (--with {other}), or take the limit out"
+                raise refusal(
+                    f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy
+                )
+    return {name: _limit(inner[name], job, name, origin) for name in inner}
+
+
+def _limit(raw: Any, job: Job, name: str, origin: str) -> Limit:
+    figure, key = job.figures[name], f"limits.{name}"
+    sides = " and ".join(figure.sides)
+    if not isinstance(raw, Mapping):
+        remedy = f"Write a table with {sides}"
+        raise refusal("it is not a table", origin, key, raw, f"a table with {sides}", remedy)
+    _known_keys(raw, ("min", "max"), origin, key)
+    for side in raw:
+        if side not in figure.sides:
+            remedy = f"Limit its {sides}"
+            raise refusal(f"{name} has no limit {side}", origin, f"{key}.{side}", raw[side], sides, remedy)
+    if not raw:
+        raise refusal(
+            "the limit is empty", origin, key, allowed=sides, remedy="Give a side, or take the limit out"
+        )
+    quantity = Quantity(figure.kind)
+    found = {side: _value(quantity, value, origin, f"{key}.{side}") for side, value in raw.items()}
+    if len(found) == 2:
+        _ordered(raw, found["min"], found["max"], origin, key)
+    return Limit(found.get("min"), found.get("max"), _unit(next(iter(raw.values()))))
+
+
+def _known_keys(raw: Mapping[str, Any], known: tuple[str, ...], origin: str, key: str) -> None:
+    for name in raw:
+        if name not in known:
+            raise unknown("key", name, known, origin, f"{key}.{name}")
+
+
+def _ordered(raw: Mapping[str, Any], low: float, high: float, origin: str, key: str) -> None:
+    if low > high:
+        ends = f"min {shown(raw['min'])}, max {shown(raw['max'])}"
+        raise refusal(
+            f"min is more than max ({ends})",
+            origin,
+            key,
+            allowed="min <= max",
+            remedy="Exchange or correct them",
+        )
+
+
+def _value(quantity: Quantity, raw: Any, origin: str, key: str) -> float:
+    try:
+        return quantity.validate(raw)
+    except QuantityError as error:
+        raise misread(error, origin, key, raw) from None
+
+
+def _unit(raw: Any) -> str:
+    """Return the unit of a value that has been read."""
+    return unit_of(raw) if isinstance(raw, str) else "1"
