@@ -1,13 +1,13 @@
 """From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup import Beatup, assembly_rows
 from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
-from loomopt.jobs.program import Limit, Move, Objective, Program, Variable
+from loomopt.jobs.program import Limit, Objective, Program, Variable
 from loomopt.jobs.sampling import Sampler
 from loomopt.schema import Check, Load
 
@@ -15,6 +15,8 @@ LENGTHS = ("l1", "l2", "l3", "l4")
 COUNTERWEIGHT = ("m4e", "r4e")
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
+USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
+"""Share of the counterweight's room that a solve starts from."""
 CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
 
 
@@ -62,27 +64,27 @@ def bounds(scene: Any) -> dict[str, tuple[float, float]]:
 
 
 def program(scene: Any, target: str) -> Program:
-    """Return the program of a target; raises BadInput where the scene lacks what the target needs."""
-    _demand(scene, target)
+    """Return the program of a target: all that a solve needs to know of the scene."""
     known, limited = numbers(scene), bounds(scene)
     physics = model(scene)
     sizes = _Sizes(physics, known, limited)
     direct = _reads_counterweight(scene, target, limited)
-    names = [name for name in limited if direct or name not in COUNTERWEIGHT]
-    variables = [Variable(name, *limited[name], known[name], sizes.variable(name)) for name in names]
+    names = [name for name in limited if direct or name != "m4e"]
+    variables = [Variable(name, *limited[name], sizes.variable(name), limited[name]) for name in names]
     if not direct:
-        variables.append(Variable("s", -math.inf, math.inf, known["m4e"] * known["r4e"] ** 2, sizes.inertia))
-        variables.append(Variable("r4e", *limited["r4e"], known["r4e"], sizes.variable("r4e")))
+        most = limited["m4e"][1] * limited["r4e"][1] ** 2
+        variables.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, most)))
     limits = [limit for variable in variables for limit in _bound_limits(scene, variable)]
     limits += [] if direct else _mass_limits(limited["m4e"], sizes)
     limits += [limit for name, limit in scene.limits.items() for limit in _figure_limits(name, limit, sizes)]
     limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in assembly_rows(known)]
     limits += _target_limits(scene, target, sizes)
-    taken = {variable.name for variable in variables} | (set() if direct else set(COUNTERWEIGHT))
+    taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
-    return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes))
+    starts = _starts(tuple(variables), known, retrofit=target == "retrofit")
+    return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes), starts)
 
 
 class _Sizes:
@@ -115,7 +117,7 @@ class _Sizes:
         return fixed.get(kind) or abs(self.sampler.static[name]) or 1.0
 
 
-def _demand(scene: Any, target: str) -> None:
+def demand(scene: Any, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
     effects = [scene.job.effects[name] for name in scene.effects]
     if not any(isinstance(effect, Load) and effect.acts == "output" for effect in effects):
@@ -169,7 +171,24 @@ def _bound_limits(scene: Any, variable: Variable) -> list[Limit]:
     if variable.lower == variable.upper:
         return [Limit(label, 0, variable.name, variable.lower, variable.scale, "variable")]
     ends = ((-1, variable.lower), (1, variable.upper))
-    return [Limit(label, sign, variable.name, value, variable.scale, "variable") for sign, value in ends]
+    return [
+        Limit(label, sign, variable.name, value, variable.scale, "variable", relaxable=sign > 0 or value > 0.0)
+        for sign, value in ends
+    ]
+
+
+def _starts(variables: Sequence[Variable], known: Mapping[str, float], retrofit: bool) -> tuple[dict[str, float], ...]:
+    """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
+
+    Never today's own m4e = r4e = 0, where a gradient sees no way to use a counterweight; but a retrofit may well leave
+    it there, so it starts from there too.
+    """
+    first = {}
+    for v in variables:
+        room = 0.01 * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
+        first[v.name] = min(max(known.get(v.name, 0.0), v.lower + room), v.upper - room)
+    used = {v.name: v.range[0] + share * (v.range[1] - v.range[0]) for v in variables for share in (USED.get(v.name),) if share}
+    return ({**first, **used}, first) if retrofit else ({**first, **used},)
 
 
 def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
@@ -177,7 +196,10 @@ def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
     if mass[0] == mass[1]:
         return [Limit("m4e", 0, "s", mass[0], sizes.inertia, "static", "r4e_square")]
     ends = ((-1, mass[0]), (1, mass[1]))
-    return [Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square") for sign, value in ends]
+    return [
+        Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square", relaxable=sign > 0 or value > 0.0)
+        for sign, value in ends
+    ]
 
 
 def _figure_limits(name: str, limit: Any, sizes: _Sizes) -> list[Limit]:
@@ -223,17 +245,3 @@ def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
         "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.torque**2, power=2),),
         "retrofit": (Objective("change", "change", "value", 1.0),),
     }[target]
-
-
-def moves(program: Program) -> tuple[Move, ...]:
-    """Return the directions that may leave every figure unchanged."""
-    names = {variable.name for variable in program.variables}
-    free = tuple(name for name in COUNTERWEIGHT if name in names)
-    return (Move("counterweight", free, "axis"), Move("scale", LENGTHS, "scale"))
-
-
-def design(values: Mapping[str, float]) -> dict[str, float]:
-    """Return the design of NLP values: m4e is s/r4e² where the NLP was solved in s."""
-    found = {name: values[name] for name in (*LENGTHS, "r4e")}
-    mass = values["m4e"] if "m4e" in values else values["s"] / values["r4e"] ** 2 if values["r4e"] else 0.0
-    return {name: mass if name == "m4e" else found[name] for name in VARIABLES}

@@ -1,5 +1,6 @@
 """What a beat-up scene may hold: its tables, design variables, figures and targets."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from loomopt.effects import BEATUP
@@ -48,6 +49,9 @@ class RetrofitTarget(TargetTable):
     weights: dict[str, PureNumber] = {}  # noqa: RUF012 (pydantic copies it)
 
 
+BALANCED = 1e-8
+"""|M3| at front dead centre below this share of the peak torque is called zero."""
+
 VARIABLES = {"l1": "length", "l2": "length", "l3": "length", "l4": "length", "m4e": "mass", "r4e": "length"}
 
 FIGURES = {
@@ -65,6 +69,7 @@ FIGURES = {
         Figure("pulse_rms", "torque", "rms reed torque over the pulse", sides=("max",)),
         Figure("bearing_force", "force", "peak centrifugal force on the rocking shaft", sides=("max",)),
         Figure("shaking_force", "force", "peak inertia force of the reed on the frame", sides=("max",)),
+        Figure("change", "number", "change from today, in bound widths squared", sides=()),
     )
 }
 
@@ -96,6 +101,24 @@ def check(scene: Any) -> None:
         )
 
 
+def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
+    """Say in one sentence what an optimum of the target reached; figures in SI."""
+    front, peak, rms = figures["M3_fdc"] or 0.0, figures["peak_torque"] or 0.0, figures["pulse_rms"] or 0.0
+    peak_text = f"the least peak crank torque over the whole cycle is {peak:.6g} N*m"
+    if target == "balance" and abs(front) <= BALANCED * max(1.0, peak):
+        return f"Balanced: the reed torque at front dead centre is zero, and then {peak_text}."
+    if target == "balance":
+        return (
+            f"Balance is out of reach: the reed torque nearest to zero at front dead centre is {front:.6g} N*m, "
+            f"and then {peak_text}."
+        )
+    return {
+        "pulse": f"The least reed torque over the pulse is {rms:.6g} N*m rms ({front:.6g} N*m at front dead centre).",
+        "torque": f"With the reed torque at {front:.6g} N*m at front dead centre, {peak_text}.",
+        "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
+    }[target]
+
+
 SCHEMA = Job(
     name="beatup",
     title="four-bar crank-rocker beat-up: balance the reed torque within the space",
@@ -107,5 +130,6 @@ SCHEMA = Job(
     targets=TARGETS,
     default_target="balance",
     check=check,
+    headline=headline,
     template=BEATUP_TEMPLATE,
 )

@@ -58,13 +58,13 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Variable:
-    """A design variable of the NLP: its place among the model's values, bounds, today's value and scale, SI."""
+    """A design variable of the NLP, SI: its name among the model's values, bounds, scale, and range of random starts."""
 
     name: str
     lower: float
     upper: float
-    today: float
     scale: float
+    range: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,14 @@ class Move:
 
 
 @dataclass(frozen=True)
+class Wish:
+    """How far along a move the silent levels would go: each variable's new value, SI, and why."""
+
+    goal: Mapping[str, float]
+    reason: str
+
+
+@dataclass(frozen=True)
 class Program:
     """The whole task: structure and numbers."""
 
@@ -130,6 +138,8 @@ class Program:
     parameters: Mapping[str, float]
     limits: tuple[Limit, ...]
     objectives: tuple[Objective, ...]
+    starts: tuple[Mapping[str, float], ...]
+    """The job's own starts, by variable, SI."""
 
     @property
     def structure(self) -> Hashable:

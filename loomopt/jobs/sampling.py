@@ -50,9 +50,10 @@ class Sampler:
         return sum(len(of_load) for of_load in self.corners)
 
     @functools.cached_property
-    def front(self) -> Floats:
+    def front(self) -> list[float]:
         """Each load's switch just before the position `static` speaks of."""
-        return np.asarray(self.cycle.switches[self.cycle.piece_before(float(self.model.front_angle(self.given)))])
+        piece = self.cycle.piece_before(float(self.model.front_angle(self.given)))
+        return [float(switch) for switch in self.cycle.switches[piece]]
 
     @functools.cached_property
     def static(self) -> dict[str, float]:

@@ -1,0 +1,109 @@
+"""Between the NLP's variables and the design a person reads; the moves that change one and not the other."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from loomopt.jobs.beatup_program import COUNTERWEIGHT, LENGTHS, bounds, numbers, today
+from loomopt.jobs.beatup_program import model as model_of
+from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
+from loomopt.jobs.program import Move, Program, Wish
+from loomopt.jobs.sampling import Sampler
+
+NEGLIGIBLE = 1e-9
+"""Share of the largest counterweight below which there is none."""
+
+
+def moves(program: Program) -> tuple[Move, ...]:
+    """Return the directions that may leave every figure unchanged."""
+    names = {variable.name for variable in program.variables}
+    axes = tuple(Move("counterweight", (name,), "axis") for name in COUNTERWEIGHT if name in names)
+    return (*axes, Move("scale", LENGTHS, "scale"))
+
+
+def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
+    """Return what the silent levels want of a move at NLP variables x, SI: least added mass, then closest to today."""
+    limited = bounds(scene)
+    old = today(scene)
+    if move.kind == "scale":
+        widths = {name: limited[name][1] - limited[name][0] for name in move.along}
+        if min(widths.values()) <= 0.0:
+            return None
+        pull = math.fsum(x[n] * old[n] / widths[n] ** 2 for n in move.along)
+        factor = pull / math.fsum((x[n] / widths[n]) ** 2 for n in move.along)
+        low = max(limited[n][0] / x[n] for n in move.along)
+        high = min(limited[n][1] / x[n] for n in move.along)
+        factor = min(max(factor, low), high)
+        goal = {n: min(max(x[n] * factor, limited[n][0]), limited[n][1]) for n in move.along}
+        return Wish(goal, "least change from today")
+    name = move.along[0]
+    if limited[name][0] == limited[name][1]:
+        return None
+    low, high = limited[name]
+    if name == "m4e":
+        return Wish({name: low}, "least added mass")
+    most = limited["m4e"][1] * limited["r4e"][1] ** 2
+    used = x["s"] > NEGLIGIBLE * most if "s" in x else x.get("m4e", old["m4e"]) > 0.0
+    if used:
+        return Wish({name: high}, "least added mass, so the largest radius")
+    return Wish({name: min(max(old[name], low), high)}, "no mass, so the radius nearest today's")
+
+
+def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+    """Return the design, SI, of NLP variables: m4e is s/r4e² where the NLP was solved in s."""
+    values = {**program.parameters, **x}
+    if "s" in x:
+        masses = [limit.value for limit in program.limits if limit.name == "m4e"]
+        mass = x["s"] / x["r4e"] ** 2 if x["r4e"] else 0.0
+        nearest = min(masses, key=lambda limit: abs(limit - mass))
+        close = abs(nearest - mass) <= NEGLIGIBLE * max(masses)
+        values["m4e"] = nearest if close else min(max(mass, min(masses)), max(masses))
+    extra = [name for name in x if name not in (*VARIABLES, "s")]
+    return {name: values[name] for name in (*VARIABLES, *extra)}
+
+
+def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:
+    """Return the NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
+
+    Where m4e = 0 the radius says nothing, and r4e = 0 would hide how s = m4e r4e² can grow.
+    """
+    found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
+    for v in program.variables:
+        if v.name == "r4e" and found["s"] == 0.0 and "change" not in {o.row for o in program.objectives}:
+            found["r4e"] = v.upper
+    return {v.name: found[v.name] for v in program.variables}
+
+
+def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+    """Return NLP variables with a negligible counterweight taken for none, so that its radius is free to settle."""
+    masses = [limit.value for limit in program.limits if limit.name == "m4e"]
+    if "s" not in x or min(masses) > 0.0:
+        return dict(x)
+    most = max(masses) * next(v.upper for v in program.variables if v.name == "r4e") ** 2
+    return {**x, "s": 0.0 if x["s"] <= NEGLIGIBLE * most else x["s"]}
+
+
+def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
+    """Return a design (SI; a scene number it does not name stays the scene's) ready to be sampled."""
+    return Sampler(model_of(scene), {**numbers(scene), **design})
+
+
+def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
+    """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
+    sampled = sampler(scene, design)
+    static = sampled.static
+    found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
+    found["mu_min"] = min(static["mu_near"], static["mu_far"])
+    found["pulse_rms"] = math.sqrt(static["pulse_mean_square"]) if "pulse_mean_square" in static else None
+    for name in sampled.model.quantities if sampled.model.loads else ():
+        found[name] = sampled.peak(name)
+    limited = bounds(scene)
+    widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
+    weights = scene.targets["retrofit"].weights
+    changes = [
+        weights.get(name, 1.0) * ((design[name] - old) / widths[name]) ** 2
+        for name, old in today(scene).items()
+        if widths[name] > 0.0
+    ]
+    found["change"] = math.fsum(changes)
+    return found

@@ -1,0 +1,50 @@
+"""How the solver speaks to a job: one record of functions each, so that it knows no mechanism by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from loomopt.jobs import beatup_design, beatup_program
+from loomopt.jobs.program import Move, Program, Wish
+from loomopt.jobs.sampling import Sampler
+
+Numbers = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A job at work. All numbers SI.
+
+    demand(scene, target): raises BadInput where the scene lacks what the target needs; program(scene, target): the
+    task as data; today(scene): today's design; design(program, x) and values(program, design): NLP variables to
+    design and back; tidy(program, x): x without what is only rounding; moves(program), wish(scene, move, x): the silent levels; figures(scene, design): every figure;
+    sampler(scene, design): the design's cycle.
+    """
+
+    demand: Callable[[Any, str], None]
+    program: Callable[[Any, str], Program]
+    today: Callable[[Any], dict[str, float]]
+    design: Callable[[Program, Numbers], dict[str, float]]
+    values: Callable[[Program, Numbers], dict[str, float]]
+    tidy: Callable[[Program, Numbers], dict[str, float]]
+    moves: Callable[[Program], tuple[Move, ...]]
+    wish: Callable[[Any, Move, Numbers], Wish | None]
+    figures: Callable[[Any, Numbers], dict[str, float | None]]
+    sampler: Callable[[Any, Numbers], Sampler]
+
+
+TASKS = {
+    "beatup": Task(
+        demand=beatup_program.demand,
+        program=beatup_program.program,
+        today=beatup_program.today,
+        design=beatup_design.design,
+        values=beatup_design.values,
+        tidy=beatup_design.tidy,
+        moves=beatup_design.moves,
+        wish=beatup_design.wish,
+        figures=beatup_design.figures,
+        sampler=beatup_design.sampler,
+    ),
+}
+"""Job name → its functions."""

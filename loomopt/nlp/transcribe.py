@@ -1,0 +1,257 @@
+"""From a program's structure to one parametric NLP: built once, solved for any numbers.
+
+Variables are scaled; every scene number, limit, natural size, weight and cycle node is a parameter. The cycle enters
+through a few slots, each a node that the exchange fills; an unused slot weighs nothing.
+"""
+
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from loomopt import maths
+from loomopt.balance import Given, total
+from loomopt.cycle import Floats, node_angle
+from loomopt.jobs.program import Program
+from loomopt.jobs.sampling import Extreme, Sampler
+
+CACHE_SIZE = 32
+IPOPT = {
+    "tol": 1e-11,
+    "dual_inf_tol": 1e-9,
+    "constr_viol_tol": 1e-11,
+    "compl_inf_tol": 1e-11,
+    "bound_relax_factor": 0.0,
+    "acceptable_iter": 0,
+    "max_iter": 300,
+    "nlp_scaling_method": "none",
+    "mumps_permuting_scaling": 0,
+    "mumps_pivot_order": 2,
+    "print_level": 0,
+    "sb": "yes",
+}
+WARM = {
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-8,
+    "warm_start_bound_push": 1e-10,
+    "warm_start_bound_frac": 1e-10,
+    "warm_start_slack_bound_push": 1e-10,
+    "warm_start_slack_bound_frac": 1e-10,
+    "warm_start_mult_bound_push": 1e-10,
+}
+
+
+@dataclass(frozen=True)
+class Family:
+    """The whole-cycle rows of one quantity: below an objective's epigraph variable, or below a limit."""
+
+    row: str
+    objective: int = -1
+    limit: int = -1
+
+
+class Layout:
+    """Where each parameter stands in the NLP's parameter vector."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, tuple[int, tuple[int, ...]]] = {}
+        self.size = 0
+
+    def add(self, name: str, *shape: int) -> None:
+        """Reserve room for an array."""
+        self.places[name] = (self.size, shape)
+        self.size += int(np.prod(shape))
+
+    def write(self, vector: Floats, name: str, values: Any) -> None:
+        """Put an array in its place."""
+        begin, shape = self.places[name]
+        vector[begin : begin + int(np.prod(shape))] = np.asarray(values, dtype=float).ravel()
+
+    def read(self, vector: Any, name: str) -> list[Any]:
+        """Return the entries of an array as a flat list."""
+        begin, shape = self.places[name]
+        return [vector[begin + k] for k in range(int(np.prod(shape)))]
+
+    def rows(self, vector: Any, name: str) -> list[list[Any]]:
+        """Return the entries of a two-dimensional array, row by row."""
+        flat, width = self.read(vector, name), self.places[name][1][1]
+        return [flat[k : k + width] for k in range(0, len(flat), width)]
+
+
+class Transcription:
+    """One built NLP.
+
+    elastic: instead of the objectives, the least weighted excess of the relaxable limits is sought.
+    """
+
+    def __init__(self, program: Program, sampler: Sampler, slots: int, elastic: bool) -> None:
+        import casadi as ca
+
+        self.program, self.slots, self.elastic = program, slots, elastic
+        self.corners = sampler.corner_count
+        self.loads = len(program.model.loads)
+        self.families = families(program, elastic)
+        self.static = [limit for limit in program.limits if self._is_row(limit)]
+        self.soft = [k for k, limit in enumerate(program.limits) if elastic and limit.relaxable]
+        self.epigraphs = [] if elastic else [k for k, o in enumerate(program.objectives) if o.form != "value"]
+        self.integrals = _wanted_integrals(program)
+        self.quadrature = {i.name: len(sampler.quadrature(i)[0]) for i in self.integrals}
+        self.layout = self._layout()
+        scaled = ca.SX.sym("x", len(program.variables))
+        extra = ca.SX.sym("t", len(self.soft) * 2 if elastic else len(self.epigraphs))
+        self.parameters = ca.SX.sym("p", self.layout.size)
+        objective, rows = self._expressions(ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(self.parameters))
+        self.nlp = {"x": ca.vertcat(scaled, extra), "p": self.parameters, "f": objective, "g": ca.vertcat(*rows)}
+        self.extras = extra.numel()
+        self._solvers: dict[Hashable, Any] = {}
+
+    def solver(self, warm: bool, callback: Any = None) -> Any:
+        """Return IPOPT for this NLP, from scratch or from a solution nearby."""
+        import casadi as ca
+
+        name = (warm, callback)
+        if name not in self._solvers:
+            options: dict[str, Any] = {"ipopt": IPOPT | (WARM if warm else {}), "print_time": False, "calc_lam_p": False}
+            options["error_on_fail"] = False
+            if callback is not None:
+                sizes = (self.nlp["x"].numel(), self.nlp["g"].numel(), self.layout.size)
+                options["iteration_callback"] = callback.for_size(*sizes)
+            self._solvers[name] = ca.nlpsol("solver", "ipopt", self.nlp, options)
+        return self._solvers[name]
+
+    def _is_row(self, limit: Any) -> bool:
+        return limit.family == "static" or (self.elastic and limit.family == "variable")
+
+    def _layout(self) -> Layout:
+        program, layout = self.program, Layout()
+        layout.add("values", len(program.parameters))
+        layout.add("variable scale", len(program.variables))
+        layout.add("limit", len(program.limits))
+        layout.add("limit scale", len(program.limits))
+        layout.add("objective weight", len(program.objectives))
+        layout.add("objective scale", len(program.objectives))
+        layout.add("front", self.loads)
+        for integral in self.integrals:
+            layout.add(f"{integral.name} nodes", self.quadrature[integral.name], self._node_size)
+        for k in range(len(self.families)):
+            layout.add(f"family {k}", self.slots, 2 + self._node_size)
+        return layout
+
+    @property
+    def _node_size(self) -> int:
+        """weight of the corners' distance, offset, corner coefficients, switches."""
+        return 2 + 2 * self.corners + self.loads
+
+    def _expressions(self, scaled: list[Any], extra: list[Any], vector: list[Any]) -> tuple[Any, list[Any]]:
+        """Return the objective and all rows, each ≤ 0 (or = 0) and of natural size."""
+        program, read = self.program, self.layout.read
+        m, model = maths.casadi(), program.model
+        sizes = read(vector, "variable scale")
+        values = dict(zip(program.parameters, read(vector, "values"), strict=True))
+        values |= {v.name: x * size for v, x, size in zip(program.variables, scaled, sizes, strict=True)}
+        given = model.given(m, values)
+        corners = [angle for of_load in model.corners(m, given) for angle in of_load]
+        static = model.static(m, given, read(vector, "front"))
+        for integral in self.integrals:
+            static[integral.name] = self._mean(given, corners, integral, vector)
+        if "pulse_mean_square" in static:
+            static["pulse_rms"] = m.sqrt(static["pulse_mean_square"])
+        static = {**values, **static}
+        limit_values, limit_scales = read(vector, "limit"), read(vector, "limit scale")
+        excess = dict.fromkeys(range(len(program.limits)), 0)
+        for place, k in enumerate(self.soft):
+            excess[k] = extra[2 * place] - extra[2 * place + 1] if program.limits[k].sign == 0 else extra[2 * place]
+        rows = [
+            limit.residual(static, limit_values[k]) / limit_scales[k] - excess[k]
+            for k, limit in enumerate(program.limits)
+            if self._is_row(limit)
+        ]
+        epigraph = dict(zip(self.epigraphs, extra, strict=False)) if not self.elastic else {}
+        weights, scales = read(vector, "objective weight"), read(vector, "objective scale")
+        terms = [extra[k] for k in range(2 * len(self.soft))]
+        for k, objective in enumerate(program.objectives if not self.elastic else ()):
+            reached = epigraph[k] if k in epigraph else static[objective.row] / scales[k]
+            terms.append(weights[k] * reached)
+            if objective.form == "magnitude":
+                rows += [sign * static[objective.row] / scales[k] - epigraph[k] for sign in (1, -1)]
+        for k, family in enumerate(self.families):
+            own = family.objective
+            scale = scales[own] if own >= 0 else limit_scales[family.limit]
+            bound = epigraph[own] if own >= 0 else limit_values[family.limit] / scale + excess[family.limit]
+            for weight, sign, _, *node in self.layout.rows(vector, f"family {k}"):
+                value = self._at(given, corners, family.row, node)
+                rows.append(weight * (sign * value / scale - bound))
+        return total(terms), rows
+
+    def _at(self, given: Given, corners: list[Any], name: str, node: Sequence[Any]) -> Any:
+        """Return a whole-cycle quantity at a node of parameters."""
+        angle = node_angle(node[0], node[1 : 1 + self.corners], corners)
+        return self.program.model.quantity(maths.casadi(), given, name, angle, node[1 + 2 * self.corners :])
+
+    def _mean(self, given: Given, corners: list[Any], integral: Any, vector: list[Any]) -> Any:
+        """Return an integral's mean by its Gauss rule."""
+        weighted, widths = [], []
+        for offset_width, *node in self.layout.rows(vector, f"{integral.name} nodes"):
+            width = node_angle(offset_width, node[1 + self.corners : 1 + 2 * self.corners], corners)
+            weighted.append(width * self._at(given, corners, integral.quantity, node))
+            widths.append(width)
+        return total(weighted) / total(widths)
+
+    def node(self, sampler: Sampler, piece: int, u: float, weight: float = 0.0) -> list[float]:
+        """Return a node's parameters: offset of its width, angle offset, corner coefficients, switches."""
+        offset, coefficients = sampler.cycle.coefficients(piece, u, self.corners)
+        start, at_start = sampler.cycle.coefficients(piece, 0.0, self.corners)
+        end, at_end = sampler.cycle.coefficients(piece, 1.0, self.corners)
+        switches = sampler.cycle.switches[piece]
+        return [weight * (end - start), offset, *coefficients, *(weight * (at_end - at_start)), *switches]
+
+    def vector(self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[list[Extreme]]) -> Floats:
+        """Return the parameter vector for a program's numbers and the nodes of each family."""
+        p, write = np.zeros(self.layout.size), self.layout.write
+        write(p, "values", list(program.parameters.values()))
+        write(p, "variable scale", [variable.scale for variable in program.variables])
+        write(p, "limit", [limit.value for limit in program.limits])
+        write(p, "limit scale", [limit.scale for limit in program.limits])
+        write(p, "objective weight", weights)
+        write(p, "objective scale", [objective.scale for objective in program.objectives])
+        write(p, "front", sampler.front)
+        for integral in self.integrals:
+            rule = zip(*sampler.quadrature(integral), strict=True)
+            write(p, f"{integral.name} nodes", [self.node(sampler, int(i), u, w) for i, u, w in rule])
+        for k, chosen in enumerate(nodes):
+            used = [[1.0, np.sign(e.value) or 1.0, *self.node(sampler, e.piece, e.u)] for e in chosen]
+            idle = [[0.0, 1.0, *self.node(sampler, 0, 0.5)]] * (self.slots - len(used))
+            write(p, f"family {k}", used + idle)
+        return p
+
+
+def families(program: Program, elastic: bool = False) -> list[Family]:
+    """Return the whole-cycle rows a program needs; an elastic one has no objectives."""
+    peaks = [Family(o.row, objective=k) for k, o in enumerate(program.objectives) if o.form == "peak"]
+    limits = [Family(limit.row, limit=k) for k, limit in enumerate(program.limits) if limit.family == "cycle"]
+    return limits if elastic else peaks + limits
+
+
+def _wanted_integrals(program: Program) -> list[Any]:
+    """Return the model's integrals that a limit or an objective reads."""
+    read = {o.row for o in program.objectives} | {limit.row for limit in program.limits}
+    read |= {"pulse_mean_square"} if "pulse_rms" in read else set()
+    return [integral for integral in program.model.integrals if integral.name in read]
+
+
+_cache: OrderedDict[Hashable, Transcription] = OrderedDict()
+
+
+def transcribe(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> tuple[Transcription, bool]:
+    """Return the NLP of a program's structure, and whether it had to be built."""
+    nodes = tuple(len(sampler.quadrature(integral)[0]) for integral in _wanted_integrals(program))
+    key = (program.structure, slots, elastic, nodes)
+    if key in _cache:
+        _cache.move_to_end(key)
+        return _cache[key], False
+    _cache[key] = Transcription(program, sampler, slots, elastic)
+    if len(_cache) > CACHE_SIZE:
+        _cache.popitem(last=False)
+    return _cache[key], True

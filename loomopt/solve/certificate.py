@@ -1,0 +1,239 @@
+"""The certificate: is this design a proven local optimum of its target? Computed apart from the solver.
+
+One KKT system per level, on gradients of the true extremes in 40 digits, with multipliers of its own (non-negative
+least squares). A limit with a positive multiplier at one level is an equality of free sign at the next.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from loomopt.cycle import Floats
+from loomopt.jobs.program import Limit, Objective, Program
+from loomopt.jobs.sampling import Sampler
+from loomopt.solve.exact import Exact, Row
+from loomopt.solve.nnls import nnls
+
+FEASIBILITY, STATIONARITY, COMPLEMENTARITY = 1e-9, 1e-6, 1e-8
+ACTIVE = 1e-7
+"""Rows this close to their bound, in their natural size, take part in the KKT system."""
+POSITIVE = 1e-8
+"""Multipliers above this, in natural sizes, bind."""
+FLAT = 1e-7
+DENSE = 16384
+
+
+@dataclass(frozen=True)
+class Level:
+    """The KKT residuals of one objective; held: the multiplier of the objectives before it."""
+
+    objective: str
+    stationarity: float
+    complementarity: float
+    held: float
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A limit that binds, and the fall of the first objective it moves per unit it is loosened (SI)."""
+
+    limit: Limit
+    side: int
+    objective: Objective
+    worth: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was verified of a design; reasons say why it did not pass."""
+
+    passed: bool
+    reasons: tuple[str, ...]
+    levels: tuple[Level, ...]
+    feasibility: float
+    violation: float
+    minimum: bool
+    unique: bool
+    binding: tuple[Binding, ...] = ()
+    by: str = "refined"
+    settled: tuple[str, ...] = field(default=())
+
+
+def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
+    """Return how far each limit is exceeded, in its natural size (an equality: how far it is missed)."""
+    static = {**sampler.given.values, **figures(sampler)}
+    found = {}
+    for k, limit in enumerate(program.limits):
+        if limit.family == "cycle":
+            found[k] = (sampler.peak(limit.row) - limit.value) / limit.scale
+        else:
+            residual = limit.residual(static, limit.value) / limit.scale
+            found[k] = abs(residual) if limit.sign == 0 else residual
+    return found
+
+
+def figures(sampler: Sampler) -> dict[str, float]:
+    """Return the sampler's static figures with the root of its mean square."""
+    found = dict(sampler.static)
+    if "pulse_mean_square" in found:
+        found["pulse_rms"] = float(np.sqrt(found["pulse_mean_square"]))
+    return found
+
+
+def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
+    """Return the certificate of variables x (SI) as an optimum of the program's target."""
+    sampler = Sampler(program.model, {**program.parameters, **x})
+    return _Trial(program, dict(x), sampler, accuracy).verdict()
+
+
+class _Trial:
+    """One design before the court: rows, gradients, and what the levels have settled so far."""
+
+    def __init__(self, program: Program, x: dict[str, float], sampler: Sampler, accuracy: float) -> None:
+        self.program, self.x, self.sampler, self.accuracy = program, x, sampler, accuracy
+        self.excess = excesses(program, sampler)
+        self.limits = [row for k, limit in enumerate(program.limits) for row in self._limit_rows(k, limit)]
+        self.pieces = [self._pieces(objective) for objective in program.objectives]
+        self.rows = self.limits + [row for pieces in self.pieces for row in pieces]
+        self.exact = Exact(program, x, sampler, self.rows)
+        self.gradients = self.exact.gradients()
+        self.multipliers: list[Floats] = []
+        self.minimum, self.unique = True, True
+
+    def _limit_rows(self, k: int, limit: Limit) -> list[Row]:
+        """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
+        if limit.sign != 0 and self.excess[k] < -ACTIVE:
+            return []
+        if limit.family != "cycle":
+            return [Row(limit.name, limit.scale, 1.0, limit=limit)]
+        touching = [e for e in self.sampler.extremes(limit.row) if abs(e.value) >= limit.value - ACTIVE * limit.scale]
+        return [Row(limit.name, limit.scale, float(np.sign(e.value)), limit=limit, node=e) for e in touching]
+
+    def _pieces(self, objective: Objective) -> list[Row]:
+        """Return the smooth pieces whose largest is the objective's value."""
+        if objective.form == "value":
+            return [Row(objective.figure, objective.scale, 1.0, objective=objective)]
+        if objective.form == "magnitude":
+            value = self.sampler.static[objective.row]
+            signs = (1.0, -1.0) if abs(value) <= FEASIBILITY * objective.scale else (float(np.sign(value)),)
+            return [Row(objective.figure, objective.scale, sign, objective=objective) for sign in signs]
+        found = self.sampler.extremes(objective.row)
+        top = abs(found[0].value)
+        touching = [e for e in found if abs(e.value) >= top - ACTIVE * objective.scale]
+        return [
+            Row(objective.figure, objective.scale, float(np.sign(e.value)), objective=objective, node=e) for e in touching
+        ]
+
+    def verdict(self) -> Certificate:
+        """Judge the levels in order."""
+        reasons = []
+        feasibility = float(max(0.0, *self.excess.values()))
+        if not feasibility <= FEASIBILITY:
+            worst = max(self.excess, key=lambda k: self.excess[k])
+            reasons.append(f"limit {self.program.limits[worst].name} is exceeded by {feasibility:.2g} of its size")
+        violation = self._between_points()
+        if not violation <= self.accuracy:
+            reasons.append(f"a whole-cycle value is exceeded by {violation:.2g} between refined points")
+        levels = []
+        for place, objective in enumerate(self.program.objectives):
+            level = self._level(place, objective)
+            levels.append(level)
+            if not level.stationarity <= STATIONARITY:
+                reasons.append(f"{objective.figure} can still fall: stationarity {level.stationarity:.2g}")
+            if not level.complementarity <= COMPLEMENTARITY:
+                reasons.append(f"a limit that does not touch carries a price: {level.complementarity:.2g}")
+        if not self.minimum:
+            reasons.append("second order fails: along some direction the objective falls (a saddle or a maximum)")
+        return Certificate(
+            not reasons, tuple(reasons), tuple(levels), feasibility, violation, self.minimum, self.unique, self._binding()
+        )
+
+    def _between_points(self) -> float:
+        """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
+        rows = [(o.row, o.scale) for o in self.program.objectives if o.form == "peak"]
+        rows += [(limit.row, limit.scale) for limit in self.program.limits if limit.family == "cycle"]
+        pieces, u = self.sampler.grid(DENSE)
+        worst = 0.0
+        for name, scale in dict.fromkeys(rows):
+            highest = float(np.abs(self.sampler.at(name, pieces, u)).max())
+            worst = max(worst, (highest - self.sampler.peak(name)) / scale)
+        return worst
+
+    def _columns(self, place: int) -> tuple[list[int], list[int], list[int]]:
+        """Return the rows of this level: its pieces, the inequalities, and those held as equalities."""
+        begin = len(self.limits) + sum(map(len, self.pieces[:place]))
+        pieces = list(range(begin, begin + len(self.pieces[place])))
+        bound = np.max([np.zeros(len(self.rows)), *map(np.abs, self.multipliers)], axis=0) > POSITIVE
+        equal = [k for k, row in enumerate(self.limits) if row.limit and (row.limit.sign == 0 or bound[k])]
+        held = [k for k in range(len(self.limits), begin) if bound[k]]
+        return pieces, [k for k in range(len(self.limits)) if k not in equal], equal + held
+
+    def _level(self, place: int, objective: Objective) -> Level:
+        """Solve one level's KKT system and judge its curvature."""
+        pieces, inequalities, equal = self._columns(place)
+        signed = [(k, 1.0) for k in pieces + inequalities + equal] + [(k, -1.0) for k in equal]
+        size = len(self.program.variables)
+        matrix = np.zeros((size + 1, len(signed)))
+        for column, (k, sign) in enumerate(signed):
+            matrix[:size, column] = sign * self.gradients[k]
+            matrix[size, column] = 1.0 if k in pieces else 0.0
+        target = np.zeros(size + 1)
+        target[size] = 1.0
+        solution = nnls(matrix, target)
+        found = np.zeros(len(self.rows))
+        for (k, sign), value in zip(signed, solution, strict=True):
+            found[k] += sign * value
+        self.multipliers.append(found)
+        residual = np.abs(matrix @ solution - target).max()
+        slack = [abs(found[k]) * max(0.0, -self._slack(k)) for k in inequalities]
+        held = sum(abs(found[k]) for k in equal if k >= len(self.limits))
+        if not (objective.form == "magnitude" and len(pieces) == 2):
+            self._curve(pieces, [k for k in range(len(self.rows)) if abs(found[k]) > POSITIVE], equal, found)
+        return Level(objective.figure, float(residual), float(max(slack, default=0.0)), float(held))
+
+    def _slack(self, k: int) -> float:
+        """Return a limit row's residual in its natural size."""
+        row = self.rows[k]
+        assert row.limit is not None
+        if row.node:
+            return (abs(row.node.value) - row.limit.value) / row.limit.scale
+        return self.excess[self.program.limits.index(row.limit)]
+
+    def _curve(self, pieces: list[int], binding: list[int], equal: list[int], multipliers: Floats) -> None:
+        """Judge the Lagrangian's curvature along the directions that no binding row forbids."""
+        rows = sorted({*binding, *equal, *(k for k in pieces if len(pieces) == 1)})
+        _, sizes, basis = np.linalg.svd(self.gradients[rows])
+        free = basis[int(np.sum(sizes > FLAT * max(1.0, sizes.max(initial=0.0)))) :].T
+        if free.shape[1] == 0:
+            return
+        curved = self.exact.curvatures(free)
+        weights = np.where(np.isin(np.arange(len(self.rows)), rows), multipliers, 0.0)
+        values, vectors = np.linalg.eigh(np.tensordot(weights, curved, axes=1))
+        weak = [k for k in range(len(self.limits)) if k not in rows]
+        for value, vector in zip(values, vectors.T, strict=True):
+            slopes = self.gradients[weak] @ (free @ vector) if weak else np.zeros(0)
+            blocked = bool(np.any(slopes > FLAT) and np.any(slopes < -FLAT))
+            if value <= FLAT and not blocked:
+                self.unique = False
+            if value < -FLAT and not blocked:
+                self.minimum = False
+
+    def _binding(self) -> tuple[Binding, ...]:
+        """Return the limits that bind, each with its worth for the first objective it moves."""
+        found = []
+        for k, row in enumerate(self.limits):
+            for objective, multipliers in zip(self.program.objectives, self.multipliers, strict=True):
+                if abs(multipliers[k]) > POSITIVE and row.limit:
+                    found.append(self._priced(row.limit, objective, float(multipliers[k])))
+                    break
+        return tuple(found)
+
+    def _priced(self, limit: Limit, objective: Objective, multiplier: float) -> Binding:
+        """Return a binding limit with its multiplier in SI units of objective per limit."""
+        weight = {**self.sampler.given.values, **figures(self.sampler)}[limit.weight] if limit.weight else 1.0
+        worth = abs(multiplier) * objective.scale / limit.scale * weight
+        if objective.power == 2:
+            worth /= 2 * figures(self.sampler)[objective.figure]
+        side = limit.sign or (1 if multiplier > 0 else -1)
+        return Binding(limit, side, objective, worth)

@@ -1,0 +1,87 @@
+"""When nothing is admissible: which limits clash, and the least relaxations that help."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from loomopt.jobs.program import Limit, Program
+from loomopt.nlp import exchange
+from loomopt.nlp.exchange import Point, Settings
+from loomopt.solve.solution import Relaxation
+from loomopt.solve.words import Words
+
+PRICED = 1e-6
+"""Multipliers above this belong to the clash."""
+NEEDED = 1e-7
+"""Excess, in natural sizes, below which a set of limits is admissible after all."""
+
+
+@dataclass(frozen=True)
+class Clash:
+    """Why nothing is admissible: the limits that clash, the relaxations that help, and where they lead (SI)."""
+
+    limits: tuple[str, ...] = ()
+    relaxations: tuple[Relaxation, ...] = ()
+    x: Mapping[str, float] = field(default_factory=dict)
+
+
+def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Settings, words: Words) -> Clash:
+    """Return the limits that clash and the least relaxations that make a design possible.
+
+    First the least sum over all limits, in natural sizes; then each limit by itself, where that suffices. Empty when
+    a design needs none (the limits do not clash after all) or when no relaxation was found.
+    """
+    together = _least(program, starts, settings)
+    if together is None:
+        return Clash()
+    point, needs = together
+    found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
+    names = dict.fromkeys(limit.name for limit in program.limits if limit.relaxable)
+    for name in names if len(needs) > 1 else ():
+        single = _least(_only(program, name), starts[:2], settings)
+        if single and single[1] and len({program.limits[k].name for k in single[1]}) == 1:
+            found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single[1].items()]
+    return Clash(_priced(program, point, words) if found else (), tuple(found), point.x)
+
+
+def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
+    """Return the limits with a price in the least relaxation: without any of them it would be less."""
+    prices = point.raw["lam_g"][: len(program.limits)]
+    rows = [limit for limit in program.limits if limit.family != "cycle"]
+    named = [words.limit(limit) for limit, price in zip(rows, prices, strict=False) if abs(price) > PRICED]
+    return tuple(dict.fromkeys(named))
+
+
+def _least(
+    program: Program, starts: Sequence[Mapping[str, float]], settings: Settings
+) -> tuple[Point, dict[int, float]] | None:
+    """Return the point that needs least, and each limit's need in SI, both rows of one limit counted once."""
+    points = [exchange.solve(program, start, settings, elastic=True) for start in starts]
+    solved = [point for point in points if point.succeeded]
+    if not solved:
+        return None
+    best = min(solved, key=lambda point: _total(program, point))
+    return best, _by_limit(program, best.relaxed)
+
+
+def _total(program: Program, point: Point) -> float:
+    """Return the sum of excesses in natural sizes."""
+    return sum(abs(need) / program.limits[k].scale for k, need in point.relaxed.items())
+
+
+def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:
+    """Return one entry per limit and side: a limit of several rows needs what its worst row needs."""
+    worst: dict[tuple[str, int], int] = {}
+    for k, need in relaxed.items():
+        key = program.limits[k].name, program.limits[k].sign
+        if abs(need) / program.limits[k].scale > NEEDED and (key not in worst or abs(need) > abs(relaxed[worst[key]])):
+            worst[key] = k
+    return {k: relaxed[k] for k in worst.values()}
+
+
+def _only(program: Program, name: str) -> Program:
+    """Return the program with one limit relaxable and all others firm."""
+
+    def firm(limit: Limit) -> Limit:
+        return replace(limit, relaxable=limit.relaxable and limit.name == name)
+
+    return replace(program, limits=tuple(map(firm, program.limits)))

@@ -1,0 +1,240 @@
+"""Solve a scene's target: starts → exchange → silent levels → certificate → an answer that explains itself."""
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from loomopt.errors import BadInput
+from loomopt.jobs.program import Program
+from loomopt.jobs.tasks import TASKS, Task
+from loomopt.nlp import exchange
+from loomopt.nlp.exchange import Point, Settings
+from loomopt.solve import report
+from loomopt.solve.certificate import Certificate, certify
+from loomopt.solve.elastic import clash
+from loomopt.solve.settle import settle
+from loomopt.solve.solution import Evaluation, Solution
+from loomopt.solve.words import Words
+
+ACCURACY = 1e-8
+TIGHTEST = 1e-11
+MORE_STARTS = 8
+"""Starts tried before a target is called infeasible or uncertified."""
+SAME = 1e-7
+"""Objectives that agree to this, relative to their natural size, are one optimum."""
+STRONGEST_PENALTY = 1e6
+
+
+def evaluate(scene: Any, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
+    """Return figures and limits of a design (SI; today's without one), nothing optimised.
+
+    Raises BadInput for a design that does not assemble.
+    """
+    task = TASKS[scene.job.name]
+    full = {**task.today(scene), **(design or {})}
+    program = task.program(scene, target or scene.job.default_target)
+    return report.evaluation(scene, task, program, full)
+
+
+def solve(
+    scene: Any,
+    target: str | None = None,
+    *,
+    accuracy: float = ACCURACY,
+    starts: int = 1,
+    seed: int = 0,
+    near: Solution | None = None,
+    on_iteration: Callable[[int], None] | None = None,
+) -> Solution:
+    """Return the certified optimum of a scene's target, or what stands in its way.
+
+    accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
+    near: an answer of the same structure to start warm from; on_iteration: called with each iteration's number.
+    Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
+    """
+    began = time.perf_counter()
+    task, target = TASKS[scene.job.name], _target(scene, target)
+    task.demand(scene, target)
+    _check_numbers(accuracy, starts)
+    imported = _import_solver()
+    program = task.program(scene, target)
+    search = _Search(scene, task, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
+    search.run(starts, near.point if near else None)
+    answer = search.answer(target)
+    total = time.perf_counter() - began
+    times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
+    return replace(answer, time={**times, "certify_s": search.certified, "total_s": total})
+
+
+def _target(scene: Any, target: str | None) -> str:
+    """Return the target's name, the job's default without one."""
+    name = target or scene.job.default_target
+    if name not in scene.job.targets:
+        raise BadInput(
+            f"job {scene.job.name} has no target {name}",
+            file=scene.origin,
+            key="--target",
+            value=name,
+            allowed=", ".join(scene.job.targets),
+            remedy="Choose one of them.",
+        )
+    return name
+
+
+def _check_numbers(accuracy: float, starts: int) -> None:
+    """Raise BadInput for settings outside what can be kept."""
+    if not TIGHTEST <= accuracy <= 0.1:
+        raise BadInput(
+            "the accuracy is out of range", key="--accuracy", value=f"{accuracy:g}", allowed=f"{TIGHTEST:g} to 0.1"
+        )
+    if not 1 <= starts <= 10_000:
+        raise BadInput("the number of starts is out of range", key="--starts", value=str(starts), allowed="1 to 10000")
+
+
+@functools.cache
+def _import_solver() -> float:
+    """Import CasADi; returns the seconds it took, so that building is not charged with it."""
+    began = time.perf_counter()
+    import casadi  # noqa: F401
+
+    return time.perf_counter() - began
+
+
+def _callback(on_iteration: Callable[[int], None] | None) -> Any:
+    """Return the CasADi callback that reports iterations, or None."""
+    if on_iteration is None:
+        return None
+    from loomopt.nlp.callback import IterationCallback
+
+    return IterationCallback(on_iteration)
+
+
+class _Search:
+    """The hunt for the best certified design, from one start or many."""
+
+    def __init__(self, scene: Any, task: Task, program: Program, settings: Settings, seed: int) -> None:
+        self.scene, self.task, self.program, self.settings, self.seed = scene, task, program, settings, seed
+        self.points: list[Point] = []
+        self.built, self.spent, self.certified = 0.0, 0.0, 0.0
+        self.best: Point | None = None
+        self.x: dict[str, float] = {}
+        self.certificate: Certificate | None = None
+
+    def run(self, count: int, near: Point | None) -> None:
+        """Try `count` starts; more where none is certified."""
+        if near is not None and self._try(near.x, near) and self._judge():
+            return
+        tried = 0
+        for wanted in dict.fromkeys((count, max(count, MORE_STARTS))):
+            for start in exchange.starts(self.program, wanted, self.seed)[tried:]:
+                self._try(start, None)
+                tried += 1
+            if self._judge():
+                return
+
+    def _try(self, start: Mapping[str, float], warm: Point | None) -> bool:
+        """Solve from one start, again with a stronger weight between levels where the first was too weak."""
+        began = time.perf_counter()
+        point = exchange.solve(self.program, start, self.settings, warm)
+        self.spent += time.perf_counter() - began
+        self.built += point.built
+        self.points.append(point)
+        return point.succeeded
+
+    def _judge(self) -> bool:
+        """Settle and certify the best point so far; says whether it passed."""
+        solved = [point for point in self.points if point.succeeded]
+        if not solved:
+            return False
+        best = min(solved, key=functools.cmp_to_key(self._compare))
+        if best is not self.best or self.certificate is None:
+            self.best = best
+            self._certify(best)
+        assert self.certificate is not None
+        held = max((level.held for level in self.certificate.levels[1:]), default=0.0)
+        if self.settings.penalty <= 2 * held and self.settings.penalty < STRONGEST_PENALTY:
+            self.settings = replace(self.settings, penalty=10 * held)
+            start = self.best.x
+            self.points.remove(self.best)
+            self.certificate = None
+            return self._try(start, None) and self._judge()
+        return self.certificate.passed
+
+    def _certify(self, point: Point) -> None:
+        """Run the silent levels and the certificate."""
+        began = time.perf_counter()
+        task, program = self.task, self.program
+        x, settled, flat = settle(
+            program, task.tidy(program, point.x), task.moves(program), lambda move, at: task.wish(self.scene, move, at)
+        )
+        self.x = x
+        exact = task.values(program, task.design(program, x))
+        found = certify(program, exact, self.settings.accuracy)
+        self.certificate = replace(found, settled=settled)
+        self.certified += time.perf_counter() - began
+
+    def objectives(self, point: Point) -> tuple[float, ...]:
+        """Return a point's objectives in their natural sizes, true over the whole cycle."""
+        return _objectives(self.program, tuple(point.x.items()))
+
+    def _compare(self, one: Point, other: Point) -> int:
+        """Order points by their objectives, level by level."""
+        for a, b in zip(self.objectives(one), self.objectives(other), strict=True):
+            if abs(a - b) > SAME:
+                return -1 if a < b else 1
+        return 0
+
+    def answer(self, target: str) -> Solution:
+        """Return the solution, or the reason there is none."""
+        scene, task, program = self.scene, self.task, self.program
+        solver = {"status": "Not_Assembled", "iterations": 0, "starts": len(self.points), "starts_at_best": 0}
+        before = report.evaluation(scene, task, program, task.today(scene))
+        if self.best is None:
+            tried = exchange.starts(program, MORE_STARTS, self.seed)
+            found = clash(program, tried, self.settings, Words(scene, program))
+            if self.points:
+                solver["status"] = self.points[0].status
+                solver["iterations"] = sum(point.iterations for point in self.points)
+            design = task.design(program, found.x) if found.x else task.today(scene)
+            here = report.evaluation(scene, task, program, design)
+            return report.without_optimum(scene, target, here, found, solver, before)
+        same = [p for p in self.points if p.succeeded and self._compare(p, self.best) == 0]
+        solver |= {"status": self.best.status, "iterations": self.best.iterations, "starts_at_best": len(same)}
+        here = report.evaluation(scene, task, program, task.design(program, self.x))
+        assert self.certificate is not None
+        answer = report.with_optimum(scene, program, target, here, self.certificate, solver, before)
+        return replace(answer, point=self.best, optima=self._optima())
+
+    def _optima(self) -> tuple[tuple[Mapping[str, float | None], int], ...]:
+        """Return the distinct optima the starts ended in, best first, with how many starts did."""
+        groups: list[tuple[Point, int]] = []
+        for point in sorted((p for p in self.points if p.succeeded), key=functools.cmp_to_key(self._compare)):
+            if groups and self._compare(groups[-1][0], point) == 0:
+                groups[-1] = (groups[-1][0], groups[-1][1] + 1)
+            else:
+                groups.append((point, 1))
+        named = [objective.figure for objective in self.program.objectives]
+        sizes = [objective.scale for objective in self.program.objectives]
+        powers = [objective.power for objective in self.program.objectives]
+        return tuple(
+            (
+                {
+                    name: (value * size) ** (1 / power)
+                    for name, value, size, power in zip(named, self.objectives(point), sizes, powers, strict=True)
+                },
+                count,
+            )
+            for point, count in groups
+        )
+
+
+def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
+    """Return the objectives of variables x (SI) in their natural sizes; infinite where they have no value."""
+    sampler = exchange.sampler_at(program, dict(x))
+    if sampler is None:
+        return (math.inf,) * len(program.objectives)
+    values = (sampler.peak(o.row) if o.form == "peak" else abs(sampler.static[o.row]) for o in program.objectives)
+    return tuple(value / o.scale for value, o in zip(values, program.objectives, strict=True))

@@ -1,0 +1,128 @@
+"""From a judged design to what a person and a script read."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from loomopt.jobs.program import Program
+from loomopt.jobs.tasks import Task
+from loomopt.solve.certificate import FEASIBILITY, Certificate
+from loomopt.solve.elastic import Clash
+from loomopt.solve.solution import ADVICE, Evaluation, Finding, Price, Solution
+from loomopt.solve.words import Words
+
+
+def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, float]) -> Evaluation:
+    """Return a design's figures and limits, each limit judged from the figures alone."""
+    figures = task.figures(scene, design)
+    words = Words(scene, program)
+    units = {name: words.si(name.rpartition(".")[2]) for name in (*design, *figures)}
+    named = {name.rpartition(".")[2]: value for name, value in design.items()}
+    units = {name.rpartition(".")[2]: unit for name, unit in units.items()}
+    return Evaluation(
+        problem=scene.name,
+        effects=tuple(scene.effects),
+        design=named,
+        figures=figures,
+        units=units,
+        limits=_findings(program, {**named, **figures, **task.sampler(scene, design).static}, named),
+    )
+
+
+def _findings(
+    program: Program, values: Mapping[str, float | None], design: Mapping[str, float]
+) -> tuple[Finding, ...]:
+    """Return every limit beside its value; held to 1e-9 of its natural size."""
+    sides: dict[str, dict[int, float]] = {}
+    sizes: dict[str, float] = {}
+    for limit in program.limits:
+        for sign in (limit.sign,) if limit.sign else (-1, 1):
+            sides.setdefault(limit.name, {})[sign] = limit.value
+        own = abs(limit.value) if limit.name in design else limit.scale
+        sizes[limit.name] = max(sizes.get(limit.name, 0.0), own)
+    found = []
+    for name, ends in sides.items():
+        value, slack = values[name], FEASIBILITY * sizes[name]
+        low, high = ends.get(-1), ends.get(1)
+        ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
+        found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
+    return tuple(found)
+
+
+def with_optimum(
+    scene: Any,
+    program: Program,
+    target: str,
+    here: Evaluation,
+    certificate: Certificate,
+    solver: Mapping[str, Any],
+    before: Evaluation,
+) -> Solution:
+    """Return the answer of a design that was reached: optimal if certified, else uncertified."""
+    prices = _prices(Words(scene, program), certificate)
+    passed = certificate.passed and here.admissible
+    headline = scene.job.headline(scene, target, here.figures)
+    if passed:
+        message = " ".join([headline, _stops(prices)]).strip()
+    else:
+        reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
+        message = f"A design was reached but not certified: {reasons}. Try more starts (--starts 20)."
+    return Solution(
+        **vars(here),
+        target=target,
+        status="optimal" if passed else "uncertified",
+        message=message,
+        binding=prices,
+        certificate=certificate,
+        solver=solver,
+        before=before,
+    )
+
+
+def _prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
+    """Return one price per limit and side."""
+    groups: dict[tuple[str, int], list[Any]] = {}
+    for binding in certificate.binding:
+        groups.setdefault((binding.limit.name, binding.side), []).append(binding)
+    return tuple(words.price(group) for group in groups.values())
+
+
+def _stops(prices: tuple[Price, ...]) -> str:
+    """Return the sentence that names the limits which stop the first objective they move."""
+    if not prices:
+        return "No limit binds."
+    figure = next(iter(prices[0].worth))
+    first = [price for price in prices if figure in price.worth]
+    listed = ", ".join(f"{price.text} (worth {price.reading})" for price in first)
+    return f"Limits that stop {figure}: {listed}."
+
+
+def without_optimum(
+    scene: Any,
+    target: str,
+    here: Evaluation,
+    found: Clash,
+    solver: Mapping[str, Any],
+    before: Evaluation,
+) -> Solution:
+    """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
+    if found.relaxations:
+        together = ", ".join(r.text for r in found.relaxations if not r.alone) or found.relaxations[0].text
+        alone = [r.text for r in found.relaxations if r.alone] if len(found.relaxations) > 1 else []
+        single = f" By itself, any one of these would do: {'; '.join(alone)}." if alone else ""
+        message = (
+            f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
+            f"The least relaxation that helps: {together}.{single}"
+        )
+    else:
+        status = str(solver["status"])
+        message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts (--starts 20).')}"
+    return Solution(
+        **vars(here),
+        target=target,
+        status="infeasible" if found.relaxations else "failed",
+        message=message,
+        relaxation=found.relaxations,
+        clash=found.limits,
+        solver=solver,
+        before=before,
+    )

@@ -1,0 +1,81 @@
+"""The two silent levels that end every target: least added mass, then least change from today's machine.
+
+They run only along moves verified flat at this design: objectives unchanged to 1e-10, every limit still held.
+"""
+
+from collections.abc import Callable, Mapping
+
+from loomopt.jobs.program import Move, Program, Wish
+from loomopt.jobs.sampling import Sampler
+from loomopt.solve.certificate import excesses, figures
+
+UNCHANGED = 1e-10
+SLACK = 1e-12
+BISECTIONS = 60
+
+
+def settle(
+    program: Program, x: Mapping[str, float], moves: tuple[Move, ...], wish: Callable[[Move, Mapping[str, float]], Wish | None]
+) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
+    """Return x (SI) after the silent levels, what they settled, and the names of all flat moves found."""
+    settled, flat = [], []
+    for move in moves:
+        wanted = wish(move, x)
+        if wanted is None or not _flat(program, x, wanted.goal):
+            continue
+        flat.append(move.name)
+        share = _reach(program, x, wanted.goal)
+        if share > 0.0 and any(abs(wanted.goal[name] - x[name]) > SLACK for name in wanted.goal):
+            x = _part_way(x, wanted.goal, share)
+            settled.append(f"{move.name}: {wanted.reason}")
+    return dict(x), tuple(settled), tuple(flat)
+
+
+def _part_way(x: Mapping[str, float], goal: Mapping[str, float], share: float) -> dict[str, float]:
+    """Return x moved a share of the way to the goal."""
+    if share == 1.0:
+        return {**x, **goal}
+    return {**x, **{name: x[name] + share * (end - x[name]) for name, end in goal.items()}}
+
+
+def _flat(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> bool:
+    """Say whether the objectives stay the same along the way to the goal, and a little beyond today's x."""
+    before = _objectives(program, x)
+    nearby = {name: x[name] * (1 + 1e-3) for name in goal}
+    shares = [_part_way(x, goal, share) for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
+    return all(
+        abs(after - value) <= UNCHANGED
+        for trial in shares
+        for value, after in zip(before, _objectives(program, trial), strict=True)
+    )
+
+
+def _objectives(program: Program, x: Mapping[str, float]) -> list[float]:
+    """Return the objectives' values in their natural sizes."""
+    sampler = Sampler(program.model, {**program.parameters, **x})
+    static = figures(sampler)
+    return [
+        (sampler.peak(o.row) if o.form == "peak" else abs(static[o.row])) / o.scale for o in program.objectives
+    ]
+
+
+def _reach(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> float:
+    """Return the largest share of the way along which no limit gets worse than it is allowed."""
+    allowed = {k: max(0.0, excess) + SLACK for k, excess in _excesses(program, x).items()}
+
+    def holds(share: float) -> bool:
+        now = _excesses(program, _part_way(x, goal, share))
+        return all(now[k] <= limit for k, limit in allowed.items())
+
+    if holds(1.0):
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _excesses(program: Program, x: Mapping[str, float]) -> dict[int, float]:
+    """Return every limit's excess in its natural size."""
+    return excesses(program, Sampler(program.model, {**program.parameters, **x}))

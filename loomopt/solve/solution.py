@@ -1,0 +1,158 @@
+"""What a solve or an evaluation says: plain data, ready for JSON."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from loomopt.solve.certificate import Certificate
+
+STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
+
+ADVICE = {
+    "Solve_Succeeded": "IPOPT converged.",
+    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts (--starts 20).",
+    "Infeasible_Problem_Detected": "IPOPT found no point that keeps all limits; loosen one of them.",
+    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts (--starts 20).",
+    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts (--starts 20).",
+    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts (--starts 20).",
+    "Diverging_Iterates": "The objective falls without end; bound every variable.",
+    "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of l1 to l4.",
+    "Not_Assembled": "The start does not assemble; narrow the bounds of l1 to l4.",
+}
+"""What each of IPOPT's statuses means to a designer."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One limit beside its figure, SI; min or max is None where the limit has no such side."""
+
+    name: str
+    value: float
+    min: float | None
+    max: float | None
+    ok: bool
+
+
+@dataclass(frozen=True)
+class Price:
+    """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI."""
+
+    limit: str
+    side: str
+    value: float
+    text: str
+    worth: Mapping[str, float]
+    unit: Mapping[str, str]
+    reading: str
+    """The worth in the designer's own units, as a phrase."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """How far a limit must be loosened to make a design possible, SI; alone: this one limit suffices."""
+
+    limit: str
+    side: str
+    value: float
+    needed: float
+    alone: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A given design: its figures and limits, SI and rad."""
+
+    problem: str
+    effects: tuple[str, ...]
+    design: Mapping[str, float]
+    figures: Mapping[str, float | None]
+    units: Mapping[str, str]
+    limits: tuple[Finding, ...]
+
+    @property
+    def admissible(self) -> bool:
+        """Whether every limit holds."""
+        return all(limit.ok for limit in self.limits)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `evaluate --json` prints."""
+        return {
+            "problem": self.problem,
+            "effects": list(self.effects),
+            "design": dict(self.design),
+            "figures": {name: _finite(value) for name, value in self.figures.items()},
+            "units": dict(self.units),
+            "limits": [vars(limit) for limit in self.limits],
+        }
+
+
+@dataclass(frozen=True)
+class Solution(Evaluation):
+    """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
+
+    target: str = ""
+    status: str = "failed"
+    message: str = ""
+    binding: tuple[Price, ...] = ()
+    certificate: Certificate | None = None
+    relaxation: tuple[Relaxation, ...] = ()
+    clash: tuple[str, ...] = ()
+    """Limits that cannot all be kept, as phrases."""
+    solver: Mapping[str, Any] = field(default_factory=dict)
+    time: Mapping[str, float] = field(default_factory=dict)
+    optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
+    """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    before: Evaluation | None = None
+    """Today's machine."""
+    point: Any = None
+    """Where the solver stood: what a neighbour's solve can start from."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `solve --json` prints."""
+        base = super().as_dict()
+        head = {"problem": self.problem, "target": self.target, "status": self.status, "message": self.message}
+        tail: dict[str, Any] = {
+            "binding": [
+                {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}
+                for price in self.binding
+            ],
+            "certificate": certificate_dict(self.certificate) if self.certificate else None,
+            "solver": dict(self.solver),
+            "time": dict(self.time),
+        }
+        if self.relaxation:
+            tail["clash"] = list(self.clash)
+            tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]
+        if len(self.optima) > 1:
+            tail["optima"] = [
+                {"figures": {k: _finite(v) for k, v in figures.items()}, "starts": n} for figures, n in self.optima
+            ]
+        return head | base | tail
+
+
+def certificate_dict(certificate: Certificate) -> dict[str, Any]:
+    """Return the certificate as JSON data."""
+    return {
+        "passed": certificate.passed,
+        "reasons": list(certificate.reasons),
+        "levels": [
+            {
+                "objective": level.objective,
+                "stationarity": float(level.stationarity),
+                "complementarity": float(level.complementarity),
+            }
+            for level in certificate.levels
+        ],
+        "feasibility": float(certificate.feasibility),
+        "whole_cycle": {"violation": float(certificate.violation), "by": certificate.by},
+        "minimum": certificate.minimum,
+        "unique": certificate.unique,
+        "settled": list(certificate.settled),
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    """Return None for what JSON cannot say."""
+    return value if value is not None and math.isfinite(value) else None

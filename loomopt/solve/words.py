@@ -1,0 +1,72 @@
+"""Limits, prices and relaxations in the designer's own words and units."""
+
+from typing import Any
+
+from loomopt.jobs.program import Limit, Program
+from loomopt.quantities import SI_UNIT, factor, show
+from loomopt.solve.certificate import Binding
+from loomopt.solve.solution import Price, Relaxation
+
+SIGNS = {-1: ">=", 0: "=", 1: "<="}
+SIDES = {-1: "min", 0: "equal", 1: "max"}
+
+
+class Words:
+    """The vocabulary of one scene: kinds and units of its variables and figures."""
+
+    def __init__(self, scene: Any, program: Program) -> None:
+        self.scene, self.program = scene, program
+
+    def kind(self, name: str) -> str:
+        """Return what kind of quantity a variable, figure or limit is."""
+        job = self.scene.job
+        if name in job.variables:
+            return str(job.variables[name])
+        if name in job.figures:
+            return str(job.figures[name].kind)
+        return "length" if name.startswith("assembly") else str(self.scene.kind(name))
+
+    def unit(self, name: str) -> str:
+        """Return the unit a designer reads it in."""
+        return str(self.scene.unit(name, self.kind(name)))
+
+    def si(self, name: str) -> str:
+        """Return its SI unit."""
+        return SI_UNIT[self.kind(name)]
+
+    def shown(self, name: str, value: float, digits: int = 6) -> str:
+        """Return an SI value with its unit, as the designer writes it."""
+        return show(value, self.unit(name), digits)
+
+    def limit(self, limit: Limit) -> str:
+        """Return a limit as a phrase: "l1 >= 30 mm"."""
+        if limit.name.startswith("assembly"):
+            return limit.name
+        return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
+
+    def price(self, bindings: list[Binding]) -> Price:
+        """Return a limit's price: what all its rows together are worth."""
+        first = bindings[0]
+        limit, figure = first.limit, first.objective.figure
+        worth = sum(binding.worth for binding in bindings if binding.objective is first.objective)
+        figure_unit, limit_unit = self.unit(figure), self.unit(limit.name)
+        amount = worth * factor(limit_unit) / factor(figure_unit)
+        per = limit_unit if limit_unit != "1" else "unit"
+        figure_text = f" {figure_unit}" if figure_unit != "1" else ""
+        return Price(
+            limit=limit.name,
+            side=SIDES[first.side],
+            value=limit.value,
+            text=self.limit(limit),
+            worth={figure: worth},
+            unit={figure: f"{self.si(figure)}/{self.si(limit.name)}"},
+            reading=f"{amount:.3g}{figure_text} per {per}",
+        )
+
+    def relaxation(self, limit: Limit, need: float, alone: bool) -> Relaxation:
+        """Return how far a limit must give way, SI and as a phrase."""
+        side = limit.sign or (1 if need > 0 else -1)
+        needed = limit.value + side * abs(need)
+        change = self.shown(limit.name, abs(need), 3)
+        text = f"{self.limit(limit)} -> {self.shown(limit.name, needed)} (by {change})"
+        return Relaxation(limit.name, SIDES[side], limit.value, needed, alone, text)
