@@ -75,12 +75,13 @@ DISPLAY_UNIT = SI_UNIT | {"length": "mm", "angle": "deg", "angular speed": "rpm"
 
 _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque": "745", "inertia": "0.62"}
 _LONGEST_TEXT, _LARGEST_EXPONENT = 100, 4
+_SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
 _FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*)")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9])")
-_ARITHMETIC = re.compile(r"[0-9.)] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
+_ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
@@ -255,16 +256,19 @@ def _pure_number(text: str) -> float:
 
 def _exact(number: str, kind: str) -> Fraction:
     """Return the number as written, its size checked before any digits are expanded."""
-    if math.isinf(float(number)) or (float(number) == 0 and re.search("[1-9]", re.split("[eE]", number)[0])):
+    mantissa = re.split("[eE]", number)[0]
+    if not re.search("[1-9]", mantissa):
+        return Fraction(0)
+    if float(number) == 0 or math.isinf(float(number)):
         raise _refusal(kind, "the number is too large or too small to compute with")
     return Fraction(number)
 
 
 def _rounded(value: Fraction, kind: str) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        raise _refusal(kind, "the number is too large to compute with") from None
+    """Return an SI value as float64, within a range whose fourth powers float64 can still hold."""
+    if value and not _SMALLEST < abs(value) < _LARGEST:
+        raise _refusal(kind, "the number is too large or too small to compute with")
+    return float(value)
 
 
 def _check_dimension(unit: Unit, unit_text: str, number: str, kind: str) -> None:
@@ -346,10 +350,10 @@ class Quantity:
             raise _refusal(self.kind, "it is not a quantity")
         elif self.kind != "number":
             raise _refusal(self.kind, "the unit is missing", 'Write number and unit as text, in "quotes"')
-        elif not abs(raw) < 1e300:
+        elif isinstance(raw, float) and not math.isfinite(raw):
             raise _refusal(self.kind, "it is not a finite number")
         else:
-            value = float(raw)
+            value = _rounded(Fraction(raw), self.kind)
         if not (value >= self.least and value > self.above and value < self.below):
             raise QuantityError("it is out of range", self.range, "Correct the value")
         return value
