@@ -96,6 +96,7 @@ class Job:
     operation, mechanism: models of those tables; keys that are required only by what reads them are optional there.
     variables: design variables → kind of quantity, in the order they are shown.
     check(scene): raises BadInput when today's machine is not one this job can work on.
+    fault(design): why a design, SI, cannot work as this mechanism; "" when it can.
     headline(scene, target, figures): one sentence that says what an optimum of the target is worth.
     """
 
@@ -109,6 +110,7 @@ class Job:
     targets: Mapping[str, Target]
     default_target: str
     check: Callable[[Any], None]
+    fault: Callable[[Mapping[str, float]], str]
     headline: Callable[[Any, str, Mapping[str, float | None]], str]
     template: str
     needs: tuple[str, ...] = field(default=())

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from loomopt.jobs.beatup_program import COUNTERWEIGHT, LENGTHS, bounds, numbers, today
+from loomopt.jobs.beatup_program import COUNTERWEIGHT, LENGTHS, bounds, full_name, numbers, today
 from loomopt.jobs.beatup_program import model as model_of
 from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
 from loomopt.jobs.program import Move, Program, Wish
@@ -85,7 +85,8 @@ def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
 
 def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
     """Return a design (SI; a scene number it does not name stays the scene's) ready to be sampled."""
-    return Sampler(model_of(scene), {**numbers(scene), **design})
+    known = numbers(scene)
+    return Sampler(model_of(scene), known | {full_name(known, name): value for name, value in design.items()})
 
 
 def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:

@@ -48,6 +48,11 @@ def numbers(scene: Any) -> dict[str, float]:
     return found
 
 
+def full_name(known: Mapping[str, float], name: str) -> str:
+    """Return a number's name among all numbers: an effect's own is `effect.key`."""
+    return name if name in known else next(key for key in known if key.endswith(f".{name}") and key[:6] != "today.")
+
+
 def today(scene: Any) -> dict[str, float]:
     """Return today's design, SI."""
     return {name: scene.mechanism[name] for name in VARIABLES}
@@ -58,7 +63,7 @@ def bounds(scene: Any) -> dict[str, tuple[float, float]]:
     known = numbers(scene)
     found = {name: (known[name], known[name]) for name in VARIABLES}
     for name, bound in scene.bounds.items():
-        full = name if name in known else next(key for key in known if key.endswith(f".{name}") and key[:6] != "today.")
+        full = full_name(known, name)
         found[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
     return found
 

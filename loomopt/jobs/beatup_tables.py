@@ -86,6 +86,12 @@ TARGETS = {
 }
 
 
+def fault(design: Mapping[str, float]) -> str:
+    """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
+    named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
+    return crank_rocker.fault(*(design[name] for name in named)) if len(named) == 4 else ""
+
+
 def check(scene: Any) -> None:
     """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
     lengths = [scene.mechanism[name] for name in ("l1", "l2", "l3", "l4")]
@@ -130,6 +136,7 @@ SCHEMA = Job(
     targets=TARGETS,
     default_target="balance",
     check=check,
+    fault=fault,
     headline=headline,
     template=BEATUP_TEMPLATE,
 )

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt.jobs import beatup_design, beatup_program
+from loomopt.jobs import beatup_curves, beatup_design, beatup_program
+from loomopt.cycle import Floats
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
 
@@ -18,7 +19,8 @@ class Task:
     demand(scene, target): raises BadInput where the scene lacks what the target needs; program(scene, target): the
     task as data; today(scene): today's design; design(program, x) and values(program, design): NLP variables to
     design and back; tidy(program, x): x without what is only rounding; moves(program), wish(scene, move, x): the silent levels; figures(scene, design): every figure;
-    sampler(scene, design): the design's cycle.
+    sampler(scene, design): the design's cycle; curves(scene, design): its curves by column; marks(scene, design): the
+    crank angles a reader looks for, rad.
     """
 
     demand: Callable[[Any, str], None]
@@ -31,6 +33,8 @@ class Task:
     wish: Callable[[Any, Move, Numbers], Wish | None]
     figures: Callable[[Any, Numbers], dict[str, float | None]]
     sampler: Callable[[Any, Numbers], Sampler]
+    curves: Callable[[Any, Numbers], dict[str, Floats]]
+    marks: Callable[[Any, Numbers], dict[str, float]]
 
 
 TASKS = {
@@ -45,6 +49,8 @@ TASKS = {
         wish=beatup_design.wish,
         figures=beatup_design.figures,
         sampler=beatup_design.sampler,
+        curves=beatup_curves.curves,
+        marks=beatup_curves.marks,
     ),
 }
 """Job name → its functions."""

@@ -48,11 +48,13 @@ def solve(
     seed: int = 0,
     near: Solution | None = None,
     on_iteration: Callable[[int], None] | None = None,
+    on_start: Callable[[int, int], None] | None = None,
 ) -> Solution:
     """Return the certified optimum of a scene's target, or what stands in its way.
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
-    near: an answer of the same structure to start warm from; on_iteration: called with each iteration's number.
+    near: an answer of the same structure to start warm from; on_iteration: called with each iteration's number;
+    on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     began = time.perf_counter()
@@ -62,7 +64,7 @@ def solve(
     imported = _import_solver()
     program = task.program(scene, target)
     search = _Search(scene, task, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
-    search.run(starts, near.point if near else None)
+    search.run(starts, near.point if near else None, on_start)
     answer = search.answer(target)
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
@@ -123,13 +125,15 @@ class _Search:
         self.x: dict[str, float] = {}
         self.certificate: Certificate | None = None
 
-    def run(self, count: int, near: Point | None) -> None:
+    def run(self, count: int, near: Point | None, on_start: Callable[[int, int], None] | None) -> None:
         """Try `count` starts; more where none is certified."""
         if near is not None and self._try(near.x, near) and self._judge():
             return
         tried = 0
         for wanted in dict.fromkeys((count, max(count, MORE_STARTS))):
             for start in exchange.starts(self.program, wanted, self.seed)[tried:]:
+                if on_start:
+                    on_start(tried + 1, wanted)
                 self._try(start, None)
                 tried += 1
             if self._judge():
@@ -194,7 +198,7 @@ class _Search:
         before = report.evaluation(scene, task, program, task.today(scene))
         if self.best is None:
             tried = exchange.starts(program, MORE_STARTS, self.seed)
-            found = clash(program, tried, self.settings, Words(scene, program))
+            found = clash(program, tried, self.settings, Words(scene))
             if self.points:
                 solver["status"] = self.points[0].status
                 solver["iterations"] = sum(point.iterations for point in self.points)

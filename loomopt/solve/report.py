@@ -14,7 +14,7 @@ from loomopt.solve.words import Words
 def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, float]) -> Evaluation:
     """Return a design's figures and limits, each limit judged from the figures alone."""
     figures = task.figures(scene, design)
-    words = Words(scene, program)
+    words = Words(scene)
     units = {name: words.si(name.rpartition(".")[2]) for name in (*design, *figures)}
     named = {name.rpartition(".")[2]: value for name, value in design.items()}
     units = {name.rpartition(".")[2]: unit for name, unit in units.items()}
@@ -58,7 +58,7 @@ def with_optimum(
     before: Evaluation,
 ) -> Solution:
     """Return the answer of a design that was reached: optimal if certified, else uncertified."""
-    prices = _prices(Words(scene, program), certificate)
+    prices = _prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
     headline = scene.job.headline(scene, target, here.figures)
     if passed:

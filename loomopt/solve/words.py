@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from loomopt.jobs.program import Limit, Program
-from loomopt.quantities import SI_UNIT, factor, show
+from loomopt.jobs.program import Limit
+from loomopt.quantities import SI_UNIT, factor, kind_of, show
 from loomopt.solve.certificate import Binding
 from loomopt.solve.solution import Price, Relaxation
 
@@ -14,8 +14,8 @@ SIDES = {-1: "min", 0: "equal", 1: "max"}
 class Words:
     """The vocabulary of one scene: kinds and units of its variables and figures."""
 
-    def __init__(self, scene: Any, program: Program) -> None:
-        self.scene, self.program = scene, program
+    def __init__(self, scene: Any) -> None:
+        self.scene = scene
 
     def kind(self, name: str) -> str:
         """Return what kind of quantity a variable, figure or limit is."""
@@ -24,7 +24,10 @@ class Words:
             return str(job.variables[name])
         if name in job.figures:
             return str(job.figures[name].kind)
-        return "length" if name.startswith("assembly") else str(self.scene.kind(name))
+        if name.startswith("assembly"):
+            return "length"
+        models = [job.operation, job.mechanism, *(type(own) for own in self.scene.effects.values())]
+        return next(kind_of(model, name) for model in models if name in model.model_fields)
 
     def unit(self, name: str) -> str:
         """Return the unit a designer reads it in."""

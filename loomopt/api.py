@@ -1,0 +1,85 @@
+"""The public functions: load a scene, solve it, evaluate and simulate a design."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from loomopt import designs
+from loomopt.jobs import load, scene
+from loomopt.scene import Scene
+from loomopt.solve import engine
+from loomopt.solve.solution import Evaluation, Solution
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Answer", "Scene", "evaluate", "load", "scene", "simulate", "solve"]
+
+
+@dataclass(frozen=True)
+class Answer(Solution):
+    """A solved target that shows itself: as tables, as curves, and in Jupyter."""
+
+    scene: Any = field(default=None, repr=False)
+
+    def table(self) -> "pd.DataFrame":
+        """Return the design and its figures beside today's machine and the limits, in the scene's own units."""
+        from loomopt import tables
+
+        return tables.answer(self, self.scene)
+
+    def curves(self) -> "pd.DataFrame":
+        """Return the curves of the design over the cycle, SI, units in the column names."""
+        return simulate(self.scene, self.design)
+
+    def _repr_html_(self) -> str:
+        from loomopt.views import notebook
+
+        return notebook.answer(self, self.scene)
+
+
+def solve(
+    scene: Scene,
+    target: str | None = None,
+    *,
+    accuracy: float = engine.ACCURACY,
+    starts: int = 1,
+    seed: int = 0,
+    near: Solution | None = None,
+    on_iteration: Callable[[int], None] | None = None,
+    on_start: Callable[[int, int], None] | None = None,
+) -> Answer:
+    """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
+
+    accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts: the job's own first, then random ones drawn
+    with `seed`. near: an answer to the same structure, from which the solve starts warm. on_iteration(number),
+    on_start(number, of): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    found = engine.solve(
+        scene,
+        target,
+        accuracy=accuracy,
+        starts=starts,
+        seed=seed,
+        near=near,
+        on_iteration=on_iteration,
+        on_start=on_start,
+    )
+    fields = {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(Solution)}
+    return Answer(**fields, scene=scene)
+
+
+def evaluate(scene: Scene, design: Mapping[str, float] | None = None) -> Evaluation:
+    """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput."""
+    return engine.evaluate(scene, designs.checked(design, scene) if design else None)
+
+
+def simulate(scene: Scene, design: Mapping[str, float] | None = None) -> "pd.DataFrame":
+    """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
+
+    Raises BadInput for a design that does not assemble.
+    """
+    from loomopt import tables
+
+    return tables.curves(scene, designs.checked(design, scene) if design else {})

@@ -1,0 +1,113 @@
+"""Solve the packaged scenes again and compare with the reference tables, by verified optimum."""
+
+import functools
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from loomopt import tables
+from loomopt.errors import BadInput
+from loomopt.jobs import load
+from loomopt.packaged import problem_names, results_path
+from loomopt.solve import engine
+from loomopt.solve.solution import Solution
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OBJECTIVE, DESIGN = 1e-8, 1e-6
+"""Allowed differences, relative to the value (to the peak torque where a torque is zero)."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One scene and target beside its reference; differences are named, none means it reproduces."""
+
+    problem: str
+    target: str
+    status: str
+    differences: tuple[str, ...]
+
+
+def check(problems: Iterable[str] = (), folder: Path | None = None) -> Iterable[Outcome]:
+    """Yield an outcome for every target of the named scenes (all packaged ones without a name).
+
+    Raises BadInput for a name that is not packaged.
+    """
+    known = problem_names()
+    names = list(problems) or known
+    for name in names:
+        if name not in known:
+            raise BadInput(f"{name} is not a packaged scene", value=name, allowed=", ".join(known), remedy="Name one.")
+    for name in names:
+        scene = load(name)
+        for target in scene.job.targets:
+            found = engine.solve(scene, target)
+            path = (folder or results_path()) / f"{name}.{target}.csv"
+            yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
+
+
+def reference(found: Solution, scene: Any) -> "pd.DataFrame":
+    """Return the table that stands for an answer: status, figures, design, what binds; SI, one row."""
+    import pandas as pd
+
+    columns: dict[str, Any] = {"status": found.status}
+    figures = {**found.figures, **found.design}
+    if found.status == "infeasible":
+        figures = {}
+        columns["clash"] = " | ".join(found.clash)
+        columns |= {f"needed {r.limit} {r.side}{' alone' if r.alone else ''} [SI]": r.needed for r in found.relaxation}
+    columns |= {f"{k} [{found.units[k]}]": value for k, value in figures.items() if value is not None}
+    if found.certificate:
+        columns["binding"] = " | ".join(sorted(f"{price.limit} {price.side}" for price in found.binding))
+        columns["objectives"] = " | ".join(level.objective for level in found.certificate.levels)
+        columns["unique"] = found.certificate.unique
+    frame = pd.DataFrame([columns])
+    frame.attrs = tables.provenance(scene, target=found.target, accuracy=engine.ACCURACY)
+    return frame
+
+
+def write(folder: Path) -> list[Path]:
+    """Write the reference table of every packaged scene and target; returns the files."""
+    from loomopt.store import atomically
+
+    written = []
+    for name in problem_names():
+        scene = load(name)
+        for target in scene.job.targets:
+            text = tables.csv(reference(engine.solve(scene, target), scene))
+            path = folder / f"{name}.{target}.csv"
+            atomically(path, functools.partial(_put, text))
+            written.append(path)
+    return written
+
+
+def _put(text: str, path: Path) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
+    """Name every difference between an answer and its reference table."""
+    import pandas as pd
+
+    if not path.is_file():
+        return [f"no reference table {path.name}"]
+    text = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if not line.startswith("#"))
+    then = pd.read_csv(io.StringIO(text), keep_default_na=False, float_precision="round_trip")
+    found = [f"column {name} is new" for name in now.columns.difference(then.columns)]
+    found += [f"column {name} is gone" for name in then.columns.difference(now.columns)]
+    objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []
+    peak = float(then["peak_torque [N*m]"].iloc[0]) if "peak_torque [N*m]" in then else 1.0
+    for name in now.columns.intersection(then.columns):
+        new, old = now[name].iloc[0], then[name].iloc[0]
+        if isinstance(new, str) or name == "unique":
+            if str(new) != str(old):
+                found.append(f"{name}: {new}, reference {old}")
+            continue
+        allowed = OBJECTIVE if name.split(" [")[0] in objectives else DESIGN
+        size = max(abs(float(old)), peak if "N*m" in name else 0.0 if abs(float(old)) else 1.0)
+        if not abs(float(new) - float(old)) <= allowed * size:
+            found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")
+    return found

@@ -1,0 +1,69 @@
+"""Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
+
+import datetime
+import importlib.metadata
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from loomopt.jobs.tasks import TASKS
+from loomopt.quantities import factor
+from loomopt.solve.solution import Evaluation, Solution
+from loomopt.solve.words import Words
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+VERSIONED = ("loomopt", "casadi", "numpy")
+
+
+def provenance(scene: Any, **more: object) -> dict[str, str]:
+    """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
+    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    told = {name: str(value) for name, value in more.items()}
+    return {"scene": scene.name, "scene_hash": scene.hash, **told, **versions, "date": today}
+
+
+def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
+    """Return one row per design variable and figure: today, design, limits and unit, in the scene's own units."""
+    import pandas as pd
+
+    frame = pd.DataFrame(rows(solution, scene))
+    frame.attrs = provenance(scene)
+    return frame.set_index("name")
+
+
+def rows(solution: Evaluation, scene: Any) -> list[dict[str, Any]]:
+    """Return the rows of `answer` as plain data; a figure the scene cannot have is left out."""
+    words = Words(scene)
+    before = solution.before if isinstance(solution, Solution) else None
+    limits = {limit.name: limit for limit in solution.limits}
+    found = []
+    for name, value in {**solution.design, **solution.figures}.items():
+        if value is None or name == "change":
+            continue
+        unit = words.unit(name)
+        size, limit = factor(unit), limits.get(name)
+        old = {**before.design, **before.figures}.get(name) if before else None
+        low, high = (limit.min, limit.max) if limit else (None, None)
+        numbers = {"today": old, "design": value, "min": low, "max": high}
+        shown = {column: None if number is None else number / size for column, number in numbers.items()}
+        found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True})
+    return found
+
+
+def curves(scene: Any, design: Mapping[str, float]) -> "pd.DataFrame":
+    """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI."""
+    import pandas as pd
+
+    task = TASKS[scene.job.name]
+    full = {**task.today(scene), **design}
+    frame = pd.DataFrame(task.curves(scene, full))
+    frame.attrs = provenance(scene)
+    return frame
+
+
+def csv(frame: "pd.DataFrame") -> str:
+    """Return a table as CSV text, its provenance in comment lines before the header; digits round-trip."""
+    head = "".join(f"# {name}: {value}\n" for name, value in frame.attrs.items())
+    return head + str(frame.to_csv(index=frame.index.name is not None, lineterminator="\n"))
