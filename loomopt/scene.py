@@ -77,7 +77,7 @@ class Scene:
                 raise refusal(
                     "a name in the key is empty", self.origin, key, allowed=allowed, remedy="Correct the key"
                 )
-            if parts[0] == "effects" and len(parts) > 2 and parts[1] not in self.effects:
+            if parts[0] == "effects" and len(parts) > 2 and looked_up(document, parts[:2]) is None:
                 document = _put_on(document, parts[1])
             if (
                 parts[0] == "bounds"
