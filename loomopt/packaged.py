@@ -24,13 +24,13 @@ def problem_path(name: str) -> Path:
     if name in known:
         return _folder("problems") / f"{name}.toml"
     near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
-    hint = f'Did you mean "{near[0]}"? ' if near else ""
+    hint = f'perhaps "{near[0]}" is meant' if near else "see `loomopt list`"
     raise BadInput(
         "there is no packaged scene of this name",
         file=clean(name, 80),
         value=shown(name),
         allowed=", ".join(known),
-        remedy=f"{hint}Give a scene of your own as a path that ends in .toml",
+        remedy=f"Correct the name ({hint}), or give a path that ends in .toml",
     )
 
 

@@ -217,8 +217,8 @@ def _from_pint(name: str) -> Unit:
     """Look one name up in pint, which never sees a number."""
     near = [_MISTAKEN[name]] if name in _MISTAKEN else difflib.get_close_matches(name, UNITS, n=1, cutoff=0.5)
     near = difflib.get_close_matches(name.lower(), UNITS, n=1, cutoff=0.9) or near
-    known = f'Did you mean "{near[0]}"? ' if near else ""
-    unknown = _unit_error(name, f"{known}Units are case-sensitive and joined by * or /")
+    meant = f'Perhaps "{near[0]}" is meant; units' if near else "Units"
+    unknown = _unit_error(name, f"{meant} are case-sensitive and joined by * or /")
     if name in _MISTAKEN:
         raise unknown
     pint, registry = _pint_registry()
@@ -325,9 +325,13 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
         decimal = f': "{whole + over / under:.10g} {fraction[4]}"' if under else ""
         return _refusal(kind, "a fraction stands for the number", f"Write a decimal number{decimal}")
     if _ARITHMETIC.search(text):
-        return _refusal(kind, "arithmetic is not worked out here", "Write one number and its unit")
+        return _refusal(kind, "arithmetic is not worked out here", "Write the result as one number")
     if not re.match(r"[+\- .]*[0-9]", text):
-        return _refusal(kind, "the number is missing", "Write a number and its unit")
+        return _refusal(
+            kind,
+            "the number is missing",
+            "Write a number" if kind == "number" else "Write a number and its unit",
+        )
     if kind == "number" and _QUANTITY.fullmatch(text):
         return _refusal(kind, "a unit stands after a number that has none", "Take the unit off")
     return _refusal(kind, problem or "it is not one number with one unit", remedy)

@@ -71,19 +71,11 @@ class Scene:
         """
         document = self.document
         for key, value in values.items():
-            parts = key.split(".")
-            if not all(parts):
-                allowed = "a dotted key such as operation.M0"
-                raise refusal(
-                    "a name in the key is empty", self.origin, key, allowed=allowed, remedy="Correct the key"
-                )
-            if parts[0] == "effects" and len(parts) > 2 and looked_up(document, parts[:2]) is None:
+            parts = self._path(key)
+            table, inside = parts[0], looked_up(document, parts[:2])
+            if table == "effects" and len(parts) > 2 and inside is None:
                 document = _put_on(document, parts[1])
-            if (
-                parts[0] == "bounds"
-                and len(parts) > 2
-                and not isinstance(looked_up(document, parts[:2]), Mapping)
-            ):
+            if table == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
                 document = replaced(document, parts[:2], {}, self.origin, key)
             document = replaced(document, parts, value, self.origin, key)
         return self._rebuilt(document)
@@ -96,7 +88,7 @@ class Scene:
         fields = self.job.effects[name].own.model_fields
         keys = [f"effects.{name}.{key}" for key, info in fields.items() if info.is_required()]
         if keys and looked_up(self.document, ("available", name)) is None:
-            remedy = f"Set {', '.join(keys)}, or add the table [available.{name}]"
+            remedy = f"Set {', '.join(keys)} instead, which puts it on, or add the table [available.{name}]"
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
         return self._rebuilt(_put_on(self.document, name))
 
@@ -115,8 +107,12 @@ class Scene:
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
         for name in asked:
             if name not in ranges:
-                held = [bound for bound in ranges if not self.bounds[bound].free]
-                raise unknown("name to free", name, held, self.origin, "bounds")
+                held = ", ".join(bound for bound in ranges if not self.bounds[bound].free)
+                allowed = held or "nothing: no bound has free = false"
+                remedy = "Give it min and max in [bounds]"
+                raise refusal(
+                    f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy
+                )
         return self.update({f"bounds.{name}.free": True for name in asked})
 
     @property
@@ -132,6 +128,15 @@ class Scene:
             "targets": {name: own.model_dump(exclude={"expected"}) for name, own in self.targets.items()},
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
+
+    def _path(self, key: str) -> list[str]:
+        """Return the names of a dotted key."""
+        parts = key.split(".")
+        if all(parts) and (len(parts) > 1 or key in TABLES):
+            return parts
+        problem = f"unknown table {shown(key)}" if len(parts) == 1 else "a name in the key is empty"
+        remedy = "Name the table and the key, such as operation.M0"
+        raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
 
     def _rebuilt(self, document: Mapping[str, Any]) -> "Scene":
         return build(document, {self.job.name: self.job}, self.origin)

@@ -34,7 +34,7 @@ def shown(value: object) -> str:
     """Return a scene's raw value as it would be written, shortened."""
     if isinstance(value, str):
         return f'"{clean(value, _LONGEST_VALUE)}"'
-    if isinstance(value, bool):
+    if isinstance(value, bool) or value is None:
         return str(value).lower()
     if isinstance(value, int) and value.bit_length() > 256:
         return "a huge whole number"
@@ -61,7 +61,7 @@ def unknown(what: str, name: str, known: Iterable[str], origin: str, key: str) -
     """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …"""
     names = list(known)
     near = difflib.get_close_matches(name[:_LONGEST_VALUE], names, n=1, cutoff=0.5)
-    remedy = f'Did you mean "{near[0]}"?' if near else "Correct the name or take it out"
+    remedy = f'Perhaps "{near[0]}" is meant' if near else "Correct the name or take it out"
     return refusal(
         f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy
     )

@@ -1,0 +1,413 @@
+"""Bad input: one plain line for each mistake, with file, key, value and remedy; nothing else comes out."""
+
+import copy
+import datetime
+import math
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from loomopt import packaged
+from loomopt.errors import BadInput
+from loomopt.jobs import load, scene
+from loomopt.scene import Scene
+
+BEATUP = load("beatup")
+TEXT = packaged.problem_path("beatup").read_text(encoding="utf-8")
+REMOVED = object()
+
+
+def changed(*path_and_value):
+    """Return a copy of the packaged tables with one value at a path replaced, made or REMOVED."""
+    *path, last, value = path_and_value
+    document = copy.deepcopy(dict(BEATUP.document))
+    table = document
+    for name in path:
+        if not isinstance(table.get(name), dict):
+            table[name] = {}
+        table = table[name]
+    if value is REMOVED:
+        del table[last]
+    else:
+        table[last] = value
+    return document
+
+
+def nested(depth):
+    """Return tables in tables."""
+    table = {}
+    for _ in range(depth):
+        table = {"a": table}
+    return table
+
+
+# path and value in the tables -> key named, part of the problem, part of what is allowed or of the remedy
+VALUES = [
+    (("mechanism", "l1", 31), "mechanism.l1", "unit is missing", "quotes"),
+    (("mechanism", "l1", 31.5), "mechanism.l1", "unit is missing", "quotes"),
+    (("mechanism", "l1", True), "mechanism.l1", "not a quantity", "a length"),
+    (("mechanism", "l1", ["31 mm"]), "mechanism.l1", "not a quantity", "a length"),
+    (("mechanism", "l1", {"min": "31 mm"}), "mechanism.l1", "not a quantity", "a length"),
+    (("mechanism", "l1", datetime.date(2024, 1, 1)), "mechanism.l1", "not a quantity", "a length"),
+    (("mechanism", "l1", None), "mechanism.l1", "not a quantity", "a length"),
+    (("mechanism", "l1", "31"), "mechanism.l1", "unit is missing", '"31 mm"'),
+    (("mechanism", "l1", "31,5 mm"), "mechanism.l1", "comma", "decimal point"),
+    (("mechanism", "l1", "1 3/16 in"), "mechanism.l1", "fraction", '"1.1875 in"'),
+    (("mechanism", "l1", "31 mm + 3 in"), "mechanism.l1", "arithmetic", "one number"),
+    (("mechanism", "l1", "31 kg"), "mechanism.l1", "unit of mass, not of length", "mm"),
+    (("mechanism", "l1", "31 mmm"), "mechanism.l1", '"mmm" is not a unit', '"mm"'),
+    (("mechanism", "l1", "nan mm"), "mechanism.l1", "finite", "a length"),
+    (("mechanism", "l1", "1e999 mm"), "mechanism.l1", "too large", "a length"),
+    (("mechanism", "l1", ""), "mechanism.l1", "empty", "a length"),
+    (("mechanism", "l1", "mm"), "mechanism.l1", "number is missing", "a number"),
+    (("mechanism", "l1", "1_000 mm"), "mechanism.l1", "grouped", "separators"),
+    (("mechanism", "l1", "0 mm"), "mechanism.l1", "out of range", "more than 0 mm"),
+    (("mechanism", "l1", "-31 mm"), "mechanism.l1", "out of range", "more than 0 mm"),
+    (("mechanism", "l1", "9" * 5000 + " mm"), "mechanism.l1", "5003 characters long", "a length"),
+    (("mechanism", "l1", "31 \x1b[31mmm"), "mechanism.l1", "is not a unit", "a length"),
+    (("mechanism", "m4e", "-1 kg"), "mechanism.m4e", "out of range", "at least 0 kg"),
+    (("mechanism", "l1", "170 mm"), "mechanism.l1, l2, l3, l4", "not a crank-rocker", "shortest"),
+    (("operation", "speed", "10 Hz"), "operation.speed", "turns or radians", '"600 rpm"'),
+    (("operation", "speed", "600 1/min"), "operation.speed", "turns or radians", '"600 rpm"'),
+    (("operation", "speed", "0 rpm"), "operation.speed", "out of range", "more than 0 rpm"),
+    (("operation", "speed", "62.8"), "operation.speed", "unit is missing", "rpm"),
+    (("operation", "M0", "745 Nm"), "operation.M0", '"Nm" is not a unit', '"N*m"'),
+    (("operation", "M0", "745 N m"), "operation.M0", '"N m" is not a unit', '"N*m"'),
+    (("effects", "resistance", "pulse", "29.8"), "effects.resistance.pulse", "unit is missing", "deg"),
+    (("effects", "resistance", "pulse", "360 deg"), "effects.resistance.pulse",
+     "out of range", "less than 360 deg"),
+    (("effects", "inertia", "J4", "0.62 kg*m"), "effects.inertia.J4", "not a unit of inertia", "kg*m^2"),
+    (("effects", "inertia", "heavy"), "effects.inertia", "not a table", "[effects.inertia]"),
+    (("available", "gravity", "tilt", "steep"), "available.gravity.tilt", "number is missing", "an angle"),
+    (("effects", "rod_inertia", {"m2": "1 kg", "s2": "3 cm", "model": "rigid"}), "effects.rod_inertia.model",
+     "none of the known choices", '"lumped" or "exact"'),
+    (("effects", "rod_inertia", {"m2": "1 kg", "s2": "3 cm", "model": "exact"}), "effects.rod_inertia.model",
+     "JS2 is missing", "Add JS2"),
+    (("bounds", "l1", "min", "36 mm"), "bounds.l1",
+     'min is more than max (min "36 mm", max "35 mm")', "min <= max"),
+    (("bounds", "l1", "min", "0 mm"), "bounds.l1.min", "out of range", "more than 0 mm"),
+    (("bounds", "l1", "min", "30 deg"), "bounds.l1.min", "unit of angle", "mm"),
+    (("bounds", "l1", 31), "bounds.l1", "unit is missing", "quotes"),
+    (("bounds", "l1", "free", "maybe"), "bounds.l1.free", "neither true nor false", "true, false"),
+    (("limits", "swing", "23 deg"), "limits.swing", "not a table", "min and max"),
+    (("limits", "swing", "min", "24 deg"), "limits.swing", "min is more than max", "min <= max"),
+    (("limits", "swing", "min", "22.9"), "limits.swing.min", "unit is missing", '"22.9 deg"'),
+    (("limits", "mu_min", "max", "60 deg"), "limits.mu_min.max", "mu_min has no limit max", "min"),
+    (("limits", "peak_torque", {"min": "5 N*m"}), "limits.peak_torque.min", "no limit min", "max"),
+    (("targets", "torque", "M3_tolerance", "-1 N*m"), "targets.torque.M3_tolerance",
+     "out of range", "at least 0 N*m"),
+    (("targets", "retrofit", "weights", "l1", "heavy"), "targets.retrofit.weights.l1",
+     "number is missing", "number"),
+    (("targets", "retrofit", "weights", "l1", math.inf), "targets.retrofit.weights.l1", "finite", "number"),
+    (("targets", "retrofit", "weights", "l1", "300/0"), "targets.retrofit.weights.l1",
+     "divides by zero", "number"),
+    (("targets", "retrofit", "weights", "l1", "5 mm"), "targets.retrofit.weights.l1", "a unit stands", "off"),
+    (("targets", "retrofit", "weights", "all"), "targets.retrofit.weights", "not a table", "Correct"),
+    (("problem", "title", 5), "problem.title", "not text", "Correct"),
+    (("problem", "name", "../etc/passwd"), "problem.name", "not a name", "letters"),
+    (("problem", "name", ""), "problem.name", "not a name", "letters"),
+    (("mechanism", "five"), "mechanism", "not a table", "[mechanism]"),
+    (("bounds", ["l1"]), "bounds", "not a table", "[bounds]"),
+]  # fmt: skip
+
+# path and value in the tables -> key named, part of the problem, part of what is allowed or of the remedy
+NAMES = [
+    (("mechanisms", {}), "mechanisms", 'unknown table "mechanisms"', '"mechanism"'),
+    (("mechanism", "l5", "31 mm"), "mechanism.l5", 'unknown key "l5"', "l1, l2, l3, l4"),
+    (("operation", "sped", "600 rpm"), "operation.sped", 'unknown key "sped"', '"speed"'),
+    (("mechanism", "l1", REMOVED), "mechanism.l1", "l1 is missing", "Add l1 to [mechanism]"),
+    (("mechanism", REMOVED), "mechanism.l1", "l1 is missing", "Add l1 to [mechanism]"),
+    (("operation", "M0", REMOVED), "operation.M0", "effect resistance needs it", "Add M0 to [operation]"),
+    (("operation", "speed", REMOVED), "operation.speed", "effect inertia needs it", '"600 rpm"'),
+    (("effects", "grvity", {}), "effects.grvity", 'unknown effect "grvity"', '"gravity"'),
+    (("effects", "warp_tension", {}), "effects.warp_tension",
+     'unknown effect "warp_tension"', "inertia, resistance"),
+    (("available", "grvity", {}), "available.grvity", 'unknown effect "grvity"', '"gravity"'),
+    (("effects", "gravity", {"tilt": "0 deg"}), "effects.gravity.offset", "offset is missing", "Add offset"),
+    (("effects", "inertia", "J5", "1 kg*m^2"), "effects.inertia.J5", 'unknown key "J5"', '"J4"'),
+    (("bounds", "l1", {}), "bounds.l1.min", "min is missing", "min and max"),
+    (("bounds", "l1", "max", REMOVED), "bounds.l1.max", "max is missing", "min and max"),
+    (("bounds", "l1", "low", "30 mm"), "bounds.l1.low", 'unknown key "low"', "min, max, free"),
+    (("bounds", "l9", {}), "bounds.l9", 'unknown number to bound "l9"', "l1, l2, l3, l4"),
+    (("bounds", "J3", {}), "bounds.J3", "J3 has no value", "effects.rocker_inertia.J3"),
+    (("limits", "swing", {}), "limits.swing", "empty", "min and max"),
+    (("limits", "swing", "low", "20 deg"), "limits.swing.low", 'unknown key "low"', "min, max"),
+    (("limits", "swng", {}), "limits.swng", 'unknown figure to limit "swng"', '"swing"'),
+    (("limits", "bearing_force", {"max": "1 kN"}), "limits.bearing_force",
+     "centrifugal is off", "--with centrifugal"),
+    (("targets", "balanced", {}), "targets.balanced", 'unknown target "balanced"', '"balance"'),
+    (("targets", "balance", "tolerance", "1"), "targets.balance.tolerance",
+     'unknown key "tolerance"', "expected"),
+    (("problem", "job", "beetup"), "problem.job", 'unknown job "beetup"', '"beatup"'),
+    (("problem", "job", REMOVED), "problem.job", "job is missing", "Add job"),
+    (("problem", "name", REMOVED), "problem.name", "name is missing", "Add name"),
+    (("problem", "titel", "x"), "problem.titel", 'unknown key "titel"', '"title"'),
+    (("mechanism", "x\x1b[2J\n", "1 mm"), "mechanism.x", "unknown key", "l1, l2"),
+    (("mechanism", "x" * 5000, "1 mm"), "mechanism.xxx", "(5000 characters)", "l1, l2"),
+    (("targets", "balance", "expected", nested(20)), "targets.balance.expected...",
+     "nested too deep", "loomopt new"),
+    (("mechanism", 5, "31 mm"), "mechanism", "a name is not text: 5", "as text"),
+]  # fmt: skip
+
+# method and its arguments on the packaged scene -> key named, part of the problem, part of the remedy
+CHANGES = [
+    ("set", ("operation.M0", "800"), "operation.M0", "unit is missing", "N*m"),
+    ("set", ("operation.M1", "800 N*m"), "operation.M1", 'unknown key "M1"', '"M0"'),
+    ("set", ("operations.M0", "800 N*m"), "operations", "unknown table", '"operation"'),
+    ("set", ("M0", "800 N*m"), "M0", "unknown table", "operation.M0"),
+    ("set", ("mechanism.l1.length", "31 mm"), "mechanism.l1.length",
+     "l1 is a value, not a table", "Set l1 itself"),
+    ("set", ("mechanism", "31 mm"), "mechanism", "not a table", "[mechanism]"),
+    ("set", ("operation..M0", "31 mm"), "operation..M0", "name in the key is empty", "operation.M0"),
+    ("set", ("", "31 mm"), "", "unknown table", "operation.M0"),
+    ("set", ("bounds.m4.max", "60 kg"), "bounds.m4.min", "min is missing", "min and max"),
+    ("set", ("bounds.l2.max", "90 kg"), "bounds.l2.max", "unit of mass", "mm"),
+    ("set", ("bounds.l2.max", "50 mm"), "bounds.l2", "min is more than max", "min <= max"),
+    ("set", ("effects.gravity.angle", "5 deg"), "effects.gravity.angle", 'unknown key "angle"', "tilt"),
+    ("set", ("effects.wind.speed", "5 m/s"), "effects.wind", 'unknown effect "wind"', "inertia"),
+    ("set", ("targets.torque", "5"), "targets.torque", "not a table", "[targets.torque]"),
+    ("set", ("problem.job", "rapier"), "problem.job", 'unknown job "rapier"', "beatup"),
+    ("set", ("mechanism.l4", "600 mm"), "mechanism.l1, l2, l3, l4", "not a crank-rocker", "shortest"),
+    ("with_effect", ("gravty",), "effects", 'unknown effect "gravty"', '"gravity"'),
+    ("without_effect", ("resist",), "effects", 'unknown effect "resist"', '"resistance"'),
+    ("free", ("l9",), "bounds.l9", "l9 cannot be freed", "nothing"),
+    ("free", (["J4"],), "bounds.J4", "J4 cannot be freed", "min and max"),
+]  # fmt: skip
+
+# bytes of a file -> part of the problem, part of the remedy
+FILES = [
+    (b"", "name is missing", "Add name"),
+    (b"l1 = ", "not TOML", "Correct the line"),
+    (b"[mechanism\nl1 = '31 mm'", "not TOML", "Correct the line"),
+    (b"a = 1\na = 2\n", "not TOML", "Correct the line"),
+    (b"a = \x00", "not TOML", "Correct the line"),
+    (b"\xff\xfe[\x00p\x00", "not UTF-8", "Save the file as UTF-8"),
+    ("title = 'Webmaschine für Gewebe'".encode("cp1252"), "not UTF-8", "Save the file as UTF-8"),
+    (b"a = " + b"9" * 5000, "thousands of digits", "Correct the number"),
+    (b"a = " + b"[" * 2000 + b"]" * 2000, "nested too deep", "loomopt new"),
+    (b"# " + b"x" * 1_000_000, "too large", "the file you mean"),
+    (b"%PDF-1.7 \x93\x8c", "not UTF-8", "Save the file as UTF-8"),
+    (b'{"l1": "31 mm"}', "not TOML", "Correct the line"),
+    (TEXT.replace('"31 mm"', "31").encode(), "unit is missing", "quotes"),
+    (TEXT.replace('"31 mm"', "nan").encode(), "unit is missing", "quotes"),
+    (TEXT.replace('"31 mm"', "1e999").encode(), "unit is missing", "quotes"),
+]
+
+
+def told(error, file, key, problem, remedy, given=None):
+    """Check one message: one printable line with all its parts."""
+    message = str(error)
+    assert message.isprintable(), message
+    assert len(message) < 1500
+    assert message.startswith(file)
+    assert key in error.key
+    assert error.key in message
+    assert problem in error.problem
+    assert error.problem in message
+    assert remedy in f"{error.allowed} {error.remedy}"
+    assert error.remedy
+    if given is not None:
+        assert f"(given: {given})" in message
+    return error.problem
+
+
+def shown(value):
+    """Return how a short plain value is repeated in a message; None for one that is not."""
+    if isinstance(value, str) and value.isprintable() and len(value) < 80:
+        return f'"{value}"'
+    return {True: "true"}.get(value, str(value)) if type(value) in (bool, int, float) else None
+
+
+def caught(call, *arguments):
+    with pytest.raises(BadInput) as found:
+        call(*arguments)
+    return found.value
+
+
+def named(rows):
+    """Give each row a short test name."""
+    return [pytest.param(*row, id=f"{number}-{row[1] or row[2]}"[:60]) for number, row in enumerate(rows)]
+
+
+@pytest.mark.parametrize(("change", "key", "problem", "remedy"), named(VALUES))
+def test_a_bad_value(change, key, problem, remedy):
+    whole = "not a crank" in problem or "more than max" in problem
+    told(
+        caught(scene, changed(*change)),
+        "<dict>: ",
+        key,
+        problem,
+        remedy,
+        None if whole else shown(change[-1]),
+    )
+
+
+@pytest.mark.parametrize(("change", "key", "problem", "remedy"), named(NAMES))
+def test_a_bad_name_or_gap(change, key, problem, remedy):
+    told(caught(scene, changed(*change)), "<dict>: ", key, problem, remedy)
+
+
+@pytest.mark.parametrize(("method", "arguments", "key", "problem", "remedy"), CHANGES)
+def test_a_bad_change(method, arguments, key, problem, remedy):
+    told(caught(getattr(BEATUP, method), *arguments), "beatup.toml: ", key, problem, remedy)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem", "remedy"), FILES, ids=[row[1] + str(n) for n, row in enumerate(FILES)]
+)
+def test_a_bad_file(tmp_path, content, problem, remedy):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    told(caught(load, path), f"{path}: ", "", problem, remedy)
+
+
+def test_files_that_are_none(tmp_path):
+    told(caught(load, tmp_path), str(tmp_path), "", "folder", "file in it")
+    told(caught(load, tmp_path / "none.toml"), str(tmp_path), "", "no such file", "loomopt list")
+    told(caught(load, "a\x00b.toml"), "a\\x00b.toml", "", "", "path")
+    told(caught(load, "x" * 5000 + ".toml"), "xxx", "", "cannot be read", "path")
+    told(caught(load, "/dev/zero"), "/dev/zero", "", "not an ordinary file", "Name a file")
+    os.mkfifo(tmp_path / "pipe.toml")
+    told(caught(load, tmp_path / "pipe.toml"), str(tmp_path), "", "not an ordinary file", "Name a file")
+    big = tmp_path / "big.toml"
+    with big.open("wb") as file:
+        file.truncate(100_000_000)
+    told(caught(load, big), str(big), "", "too large", "the file you mean")
+
+
+def test_an_unknown_packaged_name_tells_the_nearest():
+    told(
+        caught(load, "beatup-lite"), "beatup-lite", "", "no packaged scene", '"beatup-light"', '"beatup-lite"'
+    )
+    told(caught(load, ""), "", "", "no packaged scene", "beatup, beatup-heavy")
+    told(caught(load, "x\x1b[2J"), "x\\x1b[2J", "", "no packaged scene", ".toml")
+    told(caught(scene, nested(50)), "<dict>", "a.a.a...", "nested too deep", "loomopt new")
+    itself = {}
+    itself["again"] = itself
+    told(caught(scene, itself), "<dict>", "again", "nested too deep", "loomopt new")
+
+
+def test_there_are_enough_distinct_mistakes():
+    problems = {caught(scene, changed(*row[0])).problem for row in (*VALUES, *NAMES)}
+    problems |= {caught(getattr(BEATUP, row[0]), *row[1]).problem for row in CHANGES}
+    assert len(VALUES) + len(NAMES) + len(CHANGES) + len(FILES) >= 110
+    assert len(problems) >= 60
+
+
+def test_a_long_message_is_shortened():
+    error = caught(scene, changed("mechanism", "l1", "x" * 100_000))
+    assert len(str(error)) < 500
+    assert "(100000 characters)" in str(error)
+
+
+SCALARS = st.one_of(
+    st.text(max_size=12),
+    st.sampled_from(
+        ["1e60 m", "1e-59 m", "1 mm", "5 deg", "0 kg", "inf m", "1e999 kg", "60 mm", "exact", "true"]
+    ),
+    st.builds(
+        "{} {}".format, st.floats(width=32), st.sampled_from(["mm", "deg", "kg", "N*m", "rpm", "kg*m^2"])
+    ),
+    st.integers(),
+    st.floats(),
+    st.booleans(),
+    st.none(),
+    st.dates(),
+)
+JUNK = st.recursive(
+    SCALARS,
+    lambda inner: (
+        st.lists(inner, max_size=2)
+        | st.dictionaries(
+            st.sampled_from(["min", "max", "free", "J4"]) | st.text(max_size=4), inner, max_size=3
+        )
+    ),
+    max_leaves=4,
+)
+KEYS = st.sampled_from(["l1", "l2", "J4", "pulse", "swing", "balance", "gravity", "effects", "M0", "min"])
+
+
+def paths(table, start=()):
+    """Return the path of everything in nested tables."""
+    inner = [
+        path
+        for name, value in table.items()
+        if isinstance(value, dict)
+        for path in paths(value, (*start, name))
+    ]
+    return [(*start, name) for name in table] + inner
+
+
+@st.composite
+def mutated(draw):
+    """Return the packaged tables with a few values removed, replaced or added at random."""
+    document = copy.deepcopy(dict(BEATUP.document))
+    if draw(st.booleans()):
+        document["effects"] |= document["available"]
+    for _ in range(draw(st.integers(1, 3))):
+        *path, last = draw(st.sampled_from([path for path in paths(document) if path[0] != "problem"]))
+        table = document
+        for name in path:
+            table = table[name]
+        what = draw(st.sampled_from(["remove", "replace", "add", "rescale", "rescale"]))
+        if what == "remove":
+            table.pop(last, None)
+        elif what == "rescale":
+            _, _, unit = str(table.get(last, "")).partition(" ")
+            table[last] = f"{draw(st.floats(1e-70, 1e70) | st.floats(0, 1000))} {unit}"
+        else:
+            table[last if what == "replace" else draw(KEYS)] = draw(JUNK)
+    return document
+
+
+def read_or_refused(call, *arguments):
+    """Check that a call gives a scene that works, or one plain line."""
+    try:
+        found = call(*arguments)
+    except BadInput as error:
+        assert str(error).isprintable()  # noqa: PT017 (both outcomes are right)
+        return
+    assert isinstance(found, Scene)
+    assert len(found.hash) == 12
+    for name, kind in found.job.variables.items():
+        assert found.unit(name, kind)
+    assert all(math.isfinite(value) for value in found.mechanism.values())
+
+
+@given(mutated())
+@settings(deadline=None, derandomize=True, max_examples=400)
+def test_mutated_tables_are_read_or_refused(document):
+    read_or_refused(scene, document)
+
+
+@given(
+    st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK
+)
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_any_key_set_is_read_or_refused(keys, value):
+    read_or_refused(BEATUP.update, dict.fromkeys(keys, value))
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(TEXT) - 1), st.integers(0, 9), st.binary(max_size=6)),
+        min_size=1,
+        max_size=3,
+    )
+)
+@settings(
+    deadline=None,
+    derandomize=True,
+    max_examples=300,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+def test_mutated_bytes_are_read_or_refused(tmp_path, cuts):
+    content = TEXT.encode()
+    for at, length, inserted in cuts:
+        content = content[:at] + inserted + content[at + length :]
+    path = Path(tmp_path / "scene.toml")
+    path.write_bytes(content)
+    read_or_refused(load, path)
