@@ -1,0 +1,73 @@
+"""Files written whole or not at all."""
+
+import contextlib
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from loomopt.errors import BadInput
+
+
+def atomically(path: Path, write: Callable[[Path], None]) -> None:
+    """Have `write` fill a new file beside `path`, of the same suffix, and rename it once it is complete.
+
+    After any exception or Ctrl-C nothing is left behind and an existing file is as it was; links stay links.
+    Raises BadInput where the file cannot be written: no such folder, no permission, not a file, no space.
+    """
+    place = Path(os.path.realpath(path))
+    new = place.with_name(f".{secrets.token_hex(8)}{place.suffix}")
+    try:
+        _check(place, path)
+        write(new)
+        if place.exists():
+            shutil.copymode(place, new)
+        new.replace(place)
+    except OSError as error:
+        raise _unwritable(path, error.strerror or str(error)) from error
+    finally:
+        with contextlib.suppress(OSError):
+            new.unlink()
+
+
+def suffix(path: Path, allowed: Sequence[str]) -> str:
+    """Return the suffix of `path` in small letters: ".dxf". Raises BadInput when it is not allowed."""
+    found = path.suffix.lower()
+    if found not in allowed:
+        raise BadInput(
+            "the file name's ending does not name a format that can be written here",
+            file=str(path),
+            value=path.suffix or "none",
+            allowed=", ".join(allowed),
+            remedy=f"End the name in one of these, such as {path.stem or 'file'}{allowed[0]}",
+        )
+    return found
+
+
+def _check(place: Path, path: Path) -> None:
+    if not place.parent.is_dir():
+        raise BadInput(
+            "the file cannot be written: its folder does not exist",
+            file=str(path),
+            value=str(place.parent),
+            remedy="Make the folder first, or name a file in another one",
+        )
+    if place.exists() and not place.is_file():
+        raise BadInput(
+            "a file cannot be written here: this is not an ordinary file",
+            file=str(path),
+            remedy="Name a file",
+        )
+    if not os.access(place.parent, os.W_OK | os.X_OK):
+        raise _unwritable(path, "the folder may not be written to")
+    if place.exists() and not os.access(place, os.W_OK):
+        raise _unwritable(path, "it is write-protected")
+
+
+def _unwritable(path: Path, reason: str) -> BadInput:
+    return BadInput(
+        f"the file cannot be written: {reason}",
+        file=str(path),
+        remedy="Name a file in a folder you may write to, on a disk with space left",
+    )

@@ -1,0 +1,224 @@
+"""Figures by matplotlib: a drawing, or curves over the crank angle. No window, no global state."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from loomopt import store
+from loomopt.views import svg
+from loomopt.views.shapes import (
+    CAPITAL,
+    DASH,
+    GAP,
+    LAYERS,
+    NOMINAL_HEIGHT,
+    Arc,
+    Circle,
+    Drawing,
+    Line,
+    Primitive,
+    Text,
+    extent,
+    plain,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SUFFIXES = (".png", ".pdf", ".svg")
+"""Formats a figure can be written in."""
+
+_PAGE = 240.0
+"""Longer side of a drawing's page, mm."""
+_STYLE = {"svg.hashsalt": "loomopt", "pdf.fonttype": 42, "font.size": 9.0, "axes.titlesize": 9.0}
+_COLOURS = ("#1d4ed8", "#c2410c", "#047857", "#7c3aed", "#b91c1c", "#0e7490", "#a16207")
+_NAME_SIZE = 8.0
+_COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
+
+
+def draw(drawing: Drawing, path: Path) -> None:
+    """Write the drawing as PNG or PDF fitted to a page, or as SVG at full scale.
+
+    Raises BadInput for any other suffix.
+    """
+    if store.suffix(path, SUFFIXES) == ".svg":
+        path.write_text(svg.render(drawing), encoding="utf-8")
+        return
+    box = extent(drawing)
+    scale = _PAGE / max(box.right - box.left, box.top - box.bottom)
+    inches = scale / 25.4
+    with _own_style():
+        figure = _figure((box.right - box.left) * inches, (box.top - box.bottom) * inches)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
+        axes.set(xlim=(box.left, box.right), ylim=(box.bottom, box.top), xticks=[], yticks=[])
+        for order, name in enumerate(LAYERS):
+            for primitive in drawing.primitives:
+                if primitive.layer == name:
+                    _append(axes, primitive, drawing.height, 72 * inches, order)
+        _save(figure, path)
+
+
+def curves(frame: "pd.DataFrame", path: Path, title: str, marks: Mapping[str, float] | None = None) -> None:
+    """Write one small diagram per column over `phi [rad]`, as PNG, PDF or SVG; angles are shown in degrees.
+
+    marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
+    is shaded. Columns without a unit in their name are left out.
+    Raises BadInput as `draw` does, and ValueError where there is no column.
+    """
+    store.suffix(path, SUFFIXES)
+    columns = [name for name in frame.columns if _COLUMN.fullmatch(name) and name != "phi [rad]"]
+    if not columns or "phi [rad]" not in frame:
+        raise ValueError(
+            "a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`"
+        )
+    wide = 1 if len(columns) <= 4 else 2
+    rows = math.ceil(len(columns) / wide)
+    angle = np.degrees(frame["phi [rad]"].to_numpy(dtype=float))
+    with _own_style():
+        figure = _figure(7.0 if wide == 1 else 11.0, 1.75 * rows + 0.9)
+        figure.set_layout_engine("constrained")
+        figure.suptitle(plain(title), fontsize=11, parse_math=False)
+        panels = figure.subplots(rows, wide, sharex=True, squeeze=False).T.ravel()
+        for index, (axes, column) in enumerate(zip(panels, columns, strict=False)):
+            _curve(axes, angle, frame[column].to_numpy(dtype=float), column, _COLOURS[index % len(_COLOURS)])
+            _mark(axes, marks or {}, named=index % rows == 0)
+            axes.tick_params(labelbottom=index % rows == rows - 1 or index == len(columns) - 1)
+        for axes in panels[len(columns) :]:
+            axes.set_visible(False)
+        figure.supxlabel("crank angle phi [deg]", fontsize=9)
+        _save(figure, path)
+
+
+def _curve(axes: Any, angle: Any, values: Any, column: str, colour: str) -> None:
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    match = _COLUMN.fullmatch(column)
+    name, unit = (match["name"], match["unit"]) if match else (column, "1")
+    if unit == "rad":
+        values, unit = np.degrees(values), "deg"
+    axes.axhline(0.0, color="#9ca3af", linewidth=0.6) if values.min() < 0 < values.max() else None
+    axes.plot(angle, values, color=colour, linewidth=1.4)
+    axes.set_ylabel(name if unit == "1" else f"{name} [{unit}]", parse_math=False)
+    axes.set_xlim(angle.min(), angle.max())
+    axes.xaxis.set_major_locator(MultipleLocator(45))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
+    axes.grid(color="#e5e7eb", linewidth=0.5)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _mark(axes: Any, marks: Mapping[str, float], named: bool) -> None:
+    """Shade stretches and mark angles wherever they fall on the axis; `named`: write their names above it."""
+    low, high = axes.get_xlim()
+    names: list[tuple[float, str]] = []
+    stretches = [name.removesuffix(" begins") for name in marks if name.endswith(" begins")]
+    stretches = [name for name in stretches if f"{name} ends" in marks]
+    for name in stretches:
+        begin, end = math.degrees(marks[f"{name} begins"]), math.degrees(marks[f"{name} ends"])
+        end = begin + (end - begin) % 360
+        parts = [(max(begin + turn, low), min(end + turn, high)) for turn in _turns(begin, low - 360, high)]
+        parts = [(left, right) for left, right in parts if left < right]
+        for left, right in parts:
+            axes.axvspan(left, right, color="#fde68a", alpha=0.6, linewidth=0, zorder=0)
+        widest = max(parts, key=lambda part: part[1] - part[0], default=(low, low))
+        names.append((sum(widest) / 2, name))
+    marks = {name: angle for name, angle in marks.items() if name.rpartition(" ")[0] not in stretches}
+    for name, angle in marks.items():
+        for turn in _turns(math.degrees(angle), low, high):
+            place = math.degrees(angle) + turn
+            if low <= place <= high:
+                axes.axvline(place, color="#374151", linewidth=0.8, linestyle=(0, (4, 3)))
+                names.append((place, name))
+    if named:
+        _name(axes, sorted(names))
+
+
+def _turns(angle: float, low: float, high: float) -> list[float]:
+    """Return the whole turns, deg, that may bring an angle between low and high."""
+    first, last = math.floor((low - angle) / 360), math.ceil((high - angle) / 360)
+    return [360.0 * turn for turn in range(first, last + 1)]
+
+
+def _name(axes: Any, names: Sequence[tuple[float, str]]) -> None:
+    """Write names above an axis, each in the lowest row where it does not run into the one before."""
+    low, high = axes.get_xlim()
+    panel = 72 * 0.85 * axes.figure.get_figwidth() / axes.get_subplotspec().get_geometry()[1]
+    character = 0.55 * _NAME_SIZE / panel * (high - low)
+    ends: list[float] = []
+    for place, name in names:
+        half = character * len(name) / 2
+        centre = min(max(place, low + half), high - half)
+        row = next((row for row, end in enumerate(ends) if centre - half > end), len(ends))
+        ends[row : row + 1] = [centre + half + character]
+        axes.annotate(
+            plain(name),
+            (centre, 1.0),
+            (0, 3 + 1.3 * _NAME_SIZE * row),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="center",
+            fontsize=_NAME_SIZE,
+            color="#374151",
+            parse_math=False,
+        )
+
+
+def _append(axes: Any, primitive: Primitive, text_height: float, points: float, order: int) -> None:
+    """Add a primitive to axes in mm; points: printer's points per mm of the drawing."""
+    from matplotlib import lines, patches
+
+    layer = LAYERS[primitive.layer]
+    unit = text_height / NOMINAL_HEIGHT * points
+    dash = (0.0, (DASH / layer.width, GAP / layer.width)) if layer.dashed else "solid"
+    stroke: dict[str, Any] = {"linewidth": layer.width * unit, "linestyle": dash, "zorder": order}
+    match primitive:
+        case Line(_, ends, closed):
+            x, y = zip(*(ends + ends[:1] if closed else ends), strict=True)
+            axes.add_line(lines.Line2D(x, y, color=layer.colour, **stroke))
+        case Circle(_, centre, radius):
+            axes.add_patch(patches.Circle(centre, radius, fill=False, edgecolor=layer.colour, **stroke))
+        case Arc(_, centre, radius, begin, end):
+            angles = {"theta1": math.degrees(begin), "theta2": math.degrees(end)}
+            arc = patches.Arc(centre, 2 * radius, 2 * radius, edgecolor=layer.colour, **angles, **stroke)
+            axes.add_patch(arc)
+        case Text(_, at, text, size, anchor):
+            axes.text(
+                *at,
+                plain(text),
+                color=layer.colour,
+                fontsize=size * text_height / CAPITAL * points,
+                ha="center" if anchor == "centre" else "left",
+                va="center_baseline",
+                zorder=order,
+                parse_math=False,
+            )
+
+
+@contextmanager
+def _own_style() -> Iterator[None]:
+    """Draw in matplotlib's own defaults, whatever the user's settings."""
+    from matplotlib import style
+
+    with style.context(["default", _STYLE]):
+        yield
+
+
+def _figure(width: float, height: float) -> Any:
+    """Return an empty figure, inches, that belongs to no window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Any, path: Path) -> None:
+    """Write the figure without dates, so that the same figure gives the same bytes."""
+    kind = path.suffix.lower().removeprefix(".")
+    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[kind]
+    figure.savefig(path, format=kind, dpi=150, metadata=metadata)

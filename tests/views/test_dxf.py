@@ -1,0 +1,93 @@
+import math
+import subprocess
+import sys
+
+import ezdxf
+import pytest
+
+from loomopt.views import drawing, dxf
+from loomopt.views.shapes import LAYERS, Drawing, Line, Point
+
+PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
+WRITE = """
+import sys
+from pathlib import Path
+from loomopt.views import drawing, dxf
+dxf.write(drawing.linkage(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167), "t"), Path(sys.argv[1]))
+"""
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory):
+    path = tmp_path_factory.mktemp("dxf") / "linkage.dxf"
+    dxf.write(drawing.linkage(PAPER, "Reed\n β\x00"), path)
+    return ezdxf.readfile(path)
+
+
+def test_it_is_r2010_in_mm_and_sound(document):
+    assert document.dxfversion == "AC1024"
+    assert document.units == ezdxf.units.MM
+    assert document.header["$MEASUREMENT"] == 1
+    auditor = document.audit()
+    assert not auditor.errors
+    assert not auditor.fixes
+
+
+def test_each_layer_has_its_colour(document):
+    for name, style in LAYERS.items():
+        assert document.layers.get(name).color == style.aci
+    assert {entity.dxf.layer for entity in document.modelspace()} <= LAYERS.keys()
+
+
+@pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])
+def test_links_have_their_lengths_and_meet(document, layer):
+    lines = document.modelspace().query(f'LINE[layer=="{layer}"]')
+    crank, rod, rocker = [(line.dxf.start, line.dxf.end) for line in lines]
+    lengths = [start.distance(end) for start, end in (crank, rod, rocker)]
+    assert lengths == pytest.approx([31, 65, 155], rel=0, abs=1e-9)
+    assert crank[1].magnitude < 1e-9
+    assert rod[0].distance(crank[0]) < 1e-9
+    assert rod[1].distance(rocker[1]) < 1e-9
+    assert rocker[0].distance((167, 0)) < 1e-9
+
+
+def test_circle_and_arc_are_the_paths_of_the_joints(document):
+    space = document.modelspace()
+    (circle,) = space.query('CIRCLE[layer=="paths"]')
+    (arc,) = space.query('ARC[layer=="paths"]')
+    assert circle.dxf.radius == pytest.approx(31, abs=1e-9)
+    assert arc.dxf.radius == pytest.approx(155, abs=1e-9)
+    _, rod, _ = space.query('LINE[layer=="front dead centre"]')
+    assert arc.start_point.distance(rod.dxf.end) < 1e-9
+    _, rod, _ = space.query('LINE[layer=="rear dead centre"]')
+    assert arc.end_point.distance(rod.dxf.end) < 1e-9
+
+
+def test_labels_are_read_back(document):
+    shown = [text.dxf.text for text in document.modelspace().query("TEXT")]
+    assert {"l1 = 31", "l4 = 167", "swing = 23.09°", "Reed β"} <= set(shown)
+
+
+def test_a_stroke_through_many_points_is_one_polyline(tmp_path):
+    points = tuple(Point(math.cos(k), math.sin(k)) for k in range(6))
+    dxf.write(Drawing("", 1.0, (Line("notes", points, closed=True),)), tmp_path / "a.dxf")
+    (polyline,) = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
+    assert polyline.closed
+    assert [point[:2] for point in polyline.get_points()] == [pytest.approx(point) for point in points]
+
+
+def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):
+    for seed in ("1", "2"):
+        path = tmp_path / f"{seed}.dxf"
+        subprocess.run(
+            [sys.executable, "-c", WRITE, path],
+            check=True,
+            env={"PYTHONHASHSEED": seed, "HOME": str(tmp_path)},
+        )
+    assert (tmp_path / "1.dxf").read_bytes() == (tmp_path / "2.dxf").read_bytes()
+
+
+def test_ezdxf_is_left_as_it_was(tmp_path):
+    before = ezdxf.options.write_fixed_meta_data_for_testing
+    dxf.write(drawing.linkage(PAPER, "t"), tmp_path / "a.dxf")
+    assert ezdxf.options.write_fixed_meta_data_for_testing is before
