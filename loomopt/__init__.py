@@ -4,11 +4,22 @@
 >>> answer = lo.solve(lo.load("beatup"), target="balance")
 """
 
-from loomopt.api import Answer, evaluate, load, scene, simulate, solve
-from loomopt.errors import BadInput
-from loomopt.scene import Scene
-from loomopt.solve.solution import Evaluation
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from loomopt.api import Answer, evaluate, load, scene, simulate, solve
+    from loomopt.errors import BadInput
+    from loomopt.scenes import Scene
+    from loomopt.solving.solution import Evaluation
 
 __version__ = "0.1.0"
 
-__all__ = ["Answer", "BadInput", "Evaluation", "Scene", "__version__", "evaluate", "load", "scene", "simulate", "solve"]
+__all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "scene", "simulate", "solve"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when they are first asked for: the command line starts without what it does not use."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module("loomopt.api"), name)

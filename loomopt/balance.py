@@ -14,21 +14,14 @@ from loomopt.maths import Maths, Number
 from loomopt.schema import Load, Values
 
 
-@dataclass(frozen=True)
-class Pose:
-    """One instant of the cycle, any shape.
+class Motion:
+    """What every pose knows: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
 
-    phi: crank angle, rad; omega: crank speed, rad/s (None where no load needs it); q, q1, q2: output and its
-    derivatives with respect to φ; joints: the mechanism's own pose; omega_dot: rad/s², None at constant speed.
-    """
-
-    phi: Number
-    omega: Number
     q: Number
     q1: Number
     q2: Number
-    joints: Any = None
-    omega_dot: Number = None
+    omega: Number
+    omega_dot: Number
 
     @property
     def velocity(self) -> Number:
@@ -43,6 +36,23 @@ class Pose:
 
 
 @dataclass(frozen=True)
+class Pose(Motion):
+    """One instant of the cycle, any shape.
+
+    phi: crank angle, rad; omega: crank speed, rad/s (None where no load needs it); q, q1, q2: output and its
+    derivatives with respect to φ; joints: the mechanism's own pose; omega_dot: rad/s², None at constant speed.
+    """
+
+    phi: Number
+    omega: Number
+    q: Number
+    q1: Number
+    q2: Number
+    joints: Any = None
+    omega_dot: Number = None
+
+
+@dataclass(frozen=True)
 class Given:
     """All numbers of a scene in one number system: `values` by name, `own` values of each effect."""
 
@@ -51,7 +61,7 @@ class Given:
 
 
 def terms(
-    maths: Maths, loads: Sequence[Load], pose: Pose, given: Given, switches: Sequence[Number]
+    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
 ) -> Iterator[tuple[Load, Number]]:
     """Yield each load with its term; switches[i] says which of its formulas holds (see `Load.switch`)."""
     for load, switch in zip(loads, switches, strict=True):
@@ -69,14 +79,14 @@ def total(numbers: Sequence[Number]) -> Number:
 
 
 def output_force(
-    maths: Maths, loads: Sequence[Load], pose: Pose, given: Given, switches: Sequence[Number]
+    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
 ) -> Number:
     """Return Q, N or N·m: what the mechanism must supply at its output."""
     return total([term for load, term in terms(maths, loads, pose, given, switches) if load.acts == "output"])
 
 
 def crank_torque(
-    maths: Maths, loads: Sequence[Load], pose: Pose, given: Given, switches: Sequence[Number]
+    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
 ) -> Number:
     """Return the torque on the crank, N·m: Q q' and the drive's own terms."""
     found = list(terms(maths, loads, pose, given, switches))

@@ -1,21 +1,27 @@
 """The `loomopt` command: words only, every one of them thin over the library."""
 
+import gc
 import json
+import os
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+# One short-lived process: collecting garbage, and searching all installed packages for pydantic plugins, would cost
+# a third of the time from the shell to the answer.
+gc.disable()
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
-from loomopt import api, designs
-from loomopt.errors import BadInput
-from loomopt.jobs import JOBS, load
-from loomopt.packaged import problem_names
-from loomopt.scene import Scene
-from loomopt.solve.solution import Solution
-from loomopt.store import atomically
+import typer  # noqa: E402
+
+from loomopt import api, designs  # noqa: E402
+from loomopt.errors import BadInput  # noqa: E402
+from loomopt.jobs import JOBS, load  # noqa: E402
+from loomopt.packaged import problem_names  # noqa: E402
+from loomopt.scenes import Scene  # noqa: E402
+from loomopt.store import atomically  # noqa: E402
 
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
 BAD_INPUT, DIFFERS, INTERRUPTED = 2, 1, 130
@@ -47,10 +53,10 @@ def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: 
         if not equals:
             raise BadInput("it is not KEY=VALUE", key="--set", value=item, remedy='Write --set operation.M0="800 N*m".')
         changes[key.strip()] = value.strip()
-    for name in on or ():
-        scene = scene.with_effect(name)
     if changes:
         scene = scene.update(changes)
+    for name in on or ():
+        scene = scene.with_effect(name)
     for name in off or ():
         scene = scene.without_effect(name)
     return scene
@@ -267,4 +273,3 @@ def main() -> None:
     sys.exit(run())
 
 
-__all__ = ["Solution", "app", "main", "run"]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from loomopt import packaged
 from loomopt.errors import BadInput
 from loomopt.jobs import load, scene
-from loomopt.scene import Scene
+from loomopt.scenes import Scene
 
 BEATUP = load("beatup")
 TEXT = packaged.problem_path("beatup").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from loomopt import packaged
 from loomopt.errors import BadInput
 from loomopt.jobs import JOBS, load, scene
 from loomopt.jobs.template import BEATUP_TEMPLATE
-from loomopt.scene import Bound, Limit, Scene
+from loomopt.scenes import Bound, Limit, Scene
 
 BEATUP = load("beatup")
 
@@ -239,7 +239,7 @@ def test_reading_imports_little():
         "import sys, time, types, pydantic\n"
         "class Warm(pydantic.BaseModel): x: float = 0.0\n"
         "alone = sys.modules['loomopt'] = types.ModuleType('loomopt'); alone.__path__ = [sys.argv[1]]\n"
-        "start = time.process_time(); import loomopt.scene; print(time.process_time() - start)\n"
+        "start = time.process_time(); import loomopt.scenes; print(time.process_time() - start)\n"
         "print([name for name in sys.argv[2:] if name in sys.modules])"
     )
     heavy = ["numpy", "pint", "scipy", "pandas", "sympy", "matplotlib", "casadi"]

@@ -6,7 +6,7 @@ from typing import Any
 
 from loomopt import packaged
 from loomopt.jobs import beatup_tables
-from loomopt.scene import Scene, build
+from loomopt.scenes import Scene, build
 from loomopt.scene_document import read_document
 from loomopt.schema import Job
 

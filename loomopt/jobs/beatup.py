@@ -4,12 +4,13 @@ q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md 
 """
 
 import functools
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt import balance
-from loomopt.balance import Given, Pose
+from loomopt.balance import Given
+from loomopt.jobs.beatup_poses import FrontPose, ReedPose
 from loomopt.jobs.program import Integral
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
@@ -41,7 +42,7 @@ class Beatup:
     def integrals(self) -> tuple[Integral, ...]:
         """The mean square of M3 over the pulse, where the cloth resists."""
         names = [load.name for load in self.loads]
-        return (Integral("pulse_mean_square", "M3_square", names.index("resistance")),) if "resistance" in names else ()
+        return (Integral("pulse_mean_square", "pulse_rms", "M3_square", names.index("resistance")),) if "resistance" in names else ()
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -51,7 +52,7 @@ class Beatup:
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
-        centres = crank_rocker.dead_centres(maths, lengths)
+        centres = crank_rocker.DeadCentres(maths, lengths)
         derived = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
         if "s" not in values:
             derived["s"] = values["m4e"] * values["r4e"] ** 2
@@ -70,15 +71,9 @@ class Beatup:
             load.corners(maths, given.values, given.own[load.name]) if load.corners else () for load in self.loads
         )
 
-    def pose(self, maths: Maths, given: Given, phi: Number) -> Pose:
+    def pose(self, maths: Maths, given: Given, phi: Number) -> ReedPose:
         """Return the pose at crank angles φ, rad."""
-        joints = crank_rocker.Pose(maths, given.values["lengths"], phi)
-        return Pose(phi, given.values.get("speed"), -joints.psi, -joints.psi_1, -joints.psi_2, joints)
-
-    def front_pose(self, given: Given) -> Pose:
-        """Return the pose at front dead centre, exact: ψ' = 0 and ψ'' in closed form."""
-        centres = given.values["centres"]
-        return Pose(centres.beta, given.values.get("speed"), -centres.psi_front, 0, -centres.psi_2_front)
+        return ReedPose(phi, given.values.get("speed"), crank_rocker.Pose(maths, given.values["lengths"], phi))
 
     def front_angle(self, given: Given) -> Number:
         """Return β, rad."""
@@ -94,27 +89,44 @@ class Beatup:
         check = next(check for check in self.checks if name in check.quantities)
         return check.quantities[name](maths, pose, given.values, given.own[check.name])
 
-    def static(self, maths: Maths, given: Given, front: Sequence[Number]) -> dict[str, Number]:
-        """Return figures and rows of front dead centre and of the linkage as a whole, SI."""
-        values, centres = given.values, given.values["centres"]
-        found = {"swing": centres.swing, "theta": centres.theta, "beta": centres.beta, "s": values["s"]}
-        found |= {name: values[name] for name in ("l1", "l2", "l3", "l4", "m4e", "r4e") if name in values}
-        found["mu_near"], found["mu_far"] = crank_rocker.transmission_angles(maths, values["lengths"])
-        found |= assembly_rows(values)
-        found["r4e_square"] = values["r4e"] ** 2
-        if any(load.acts == "output" for load in self.loads):
-            found["M3_fdc"] = balance.output_force(maths, self.loads, self.front_pose(given), given, front)
-        if "speed" in values:
-            found["alpha_fdc"] = centres.psi_2_front * values["speed"] ** 2
-        if "inertia" in given.own:
+    def static(
+        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
+    ) -> dict[str, Number]:
+        """Return figures and rows of front dead centre and of the linkage as a whole, SI; all it has without names."""
+        available = self._available(given)
+        wanted = available if names is None else [name for name in available if name in names]
+        return {name: self._static(maths, given, front, name) for name in wanted}
+
+    def _available(self, given: Given) -> list[str]:
+        """Return the names of the static figures and rows that the scene's numbers suffice for."""
+        values = given.values
+        found = [*LINKAGE, *ASSEMBLY, "r4e_square"]
+        found += [name for name in ("l1", "l2", "l3", "l4", "m4e", "r4e", "s") if name in values]
+        found += ["M3_fdc"] if any(load.acts == "output" for load in self.loads) else []
+        found += ["alpha_fdc"] if "speed" in values else []
+        found += ["J4"] if "inertia" in given.own else []
+        found += ["r4"] if {"m4", "r4", "m4e"} <= values.keys() else []
+        return found + (["change"] if "width.l1" in values else [])
+
+    def _static(self, maths: Maths, given: Given, front: Sequence[Number], name: str) -> Number:
+        """Return one static figure or row."""
+        values = given.values
+        if name in LINKAGE:
+            return LINKAGE[name](maths, values)
+        if name in ASSEMBLY:
+            return ASSEMBLY[name](values)
+        if name == "M3_fdc":
+            return balance.output_force(maths, self.loads, FrontPose(values), given, front)
+        if name == "J4":
             own = given.own.get("counterweight_inertia", {})
-            found["J4"] = balance.total([given.own["inertia"]["J4"], values["s"], *own.values()])
-        if {"m4", "r4", "m4e"} <= values.keys():
-            moment = values["m4"] * values["r4"] - values["m4e"] * values["r4e"]
-            found["r4"] = moment / (values["m4"] + values["m4e"])
-        if "width.l1" in values:
-            found["change"] = change(values)
-        return found
+            return balance.total([given.own["inertia"]["J4"], values["s"], *own.values()])
+        return FIGURES[name](values) if name in FIGURES else values[name]
+
+
+def eccentricity(values: Values) -> Number:
+    """Return r4 of reed and counterweight together, m [Yuan24, section on eq 10]."""
+    moment = values["m4"] * values["r4"] - values["m4e"] * values["r4e"]
+    return moment / (values["m4"] + values["m4e"])
 
 
 def change(values: Values) -> Number:
@@ -125,11 +137,26 @@ def change(values: Values) -> Number:
     )
 
 
-def assembly_rows(values: Values) -> dict[str, Number]:
-    """Return by how much the dyad closes beyond the margin at φ = π and (twice) at φ = 0, m; never negative."""
-    l1, l2, l3, l4 = values["l1"], values["l2"], values["l3"], values["l4"]
-    return {
-        "assembly: l1 + l4 < l2 + l3": (l2 + l3) - ASSEMBLY_MARGIN * (l1 + l4),
-        "assembly: l1 + l2 < l3 + l4": (l4 - l1) - ASSEMBLY_MARGIN * (l2 - l3),
-        "assembly: l1 + l3 < l2 + l4": (l4 - l1) - ASSEMBLY_MARGIN * (l3 - l2),
-    }
+LINKAGE: dict[str, Callable[[Maths, Values], Number]] = {
+    "swing": lambda maths, values: values["centres"].swing,
+    "theta": lambda maths, values: values["centres"].theta,
+    "beta": lambda maths, values: values["centres"].beta,
+    "mu_near": lambda maths, values: crank_rocker.transmission_angle_near(maths, values["lengths"]),
+    "mu_far": lambda maths, values: crank_rocker.transmission_angle_far(maths, values["lengths"]),
+}
+"""Angles of the linkage, rad."""
+
+FIGURES: dict[str, Callable[[Values], Number]] = {
+    "alpha_fdc": lambda values: values["centres"].psi_2_front * values["speed"] ** 2,
+    "r4": eccentricity,
+    "r4e_square": lambda values: values["r4e"] ** 2,
+    "change": change,
+}
+"""Other figures and rows, SI."""
+
+ASSEMBLY: dict[str, Callable[[Values], Number]] = {
+    "assembly: l1 + l4 < l2 + l3": lambda v: (v["l2"] + v["l3"]) - ASSEMBLY_MARGIN * (v["l1"] + v["l4"]),
+    "assembly: l1 + l2 < l3 + l4": lambda v: (v["l4"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l2"] - v["l3"]),
+    "assembly: l1 + l3 < l2 + l4": lambda v: (v["l4"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l3"] - v["l2"]),
+}
+"""By how much the dyad closes beyond the margin at φ = π and (twice) at φ = 0, m; never negative."""

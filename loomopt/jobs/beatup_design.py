@@ -92,10 +92,9 @@ def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
 def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
     """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
     sampled = sampler(scene, design)
-    static = sampled.static
+    static = sampled.figures
     found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
     found["mu_min"] = min(static["mu_near"], static["mu_far"])
-    found["pulse_rms"] = math.sqrt(static["pulse_mean_square"]) if "pulse_mean_square" in static else None
     for name in sampled.model.quantities if sampled.model.loads else ():
         found[name] = sampled.peak(name)
     limited = bounds(scene)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from loomopt.errors import BadInput
-from loomopt.jobs.beatup import Beatup, assembly_rows
+from loomopt.jobs.beatup import ASSEMBLY, Beatup
 from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
 from loomopt.jobs.program import Limit, Objective, Program, Variable
 from loomopt.jobs.sampling import Sampler
@@ -82,7 +82,7 @@ def program(scene: Any, target: str) -> Program:
     limits = [limit for variable in variables for limit in _bound_limits(scene, variable)]
     limits += [] if direct else _mass_limits(limited["m4e"], sizes)
     limits += [limit for name, limit in scene.limits.items() for limit in _figure_limits(name, limit, sizes)]
-    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in assembly_rows(known)]
+    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in ASSEMBLY]
     limits += _target_limits(scene, target, sizes)
     taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}

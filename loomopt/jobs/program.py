@@ -4,7 +4,7 @@ A program knows no grid and no solver. Its structure (what is in it) is apart fr
 serves every scene of the same structure.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -18,9 +18,10 @@ Static = Mapping[str, Number]
 
 @dataclass(frozen=True)
 class Integral:
-    """A mean over the pieces where a load's switch is 1: of `quantity`, over the crank angle."""
+    """A mean over the pieces where a load's switch is 1: of `quantity`, over the crank angle; root: its square root."""
 
     name: str
+    root: str
     quantity: str
     load: int
 
@@ -46,8 +47,10 @@ class Model(Protocol):
     def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
         """Return each load's corner angles, rad."""
 
-    def static(self, maths: Maths, given: Given, front: Sequence[Number]) -> dict[str, Number]:
-        """Return every figure and row that needs one position only; `front` = the loads' switches there."""
+    def static(
+        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
+    ) -> dict[str, Number]:
+        """Return figures and rows that need one position only; `front` = the loads' switches there."""
 
     def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
         """Return a whole-cycle quantity at crank angle φ, rad."""

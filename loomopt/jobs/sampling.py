@@ -1,6 +1,7 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -42,6 +43,7 @@ class Sampler:
         self.model = model
         self.given: Given = model.given(maths.FLOAT, values)
         self.corners = model.corners(maths.FLOAT, self.given)
+        self._extremes: dict[str, list[Extreme]] = {}
         self.cycle: Cycle = cycle.split(model.loads, self.corners)
 
     @property
@@ -57,10 +59,16 @@ class Sampler:
 
     @functools.cached_property
     def static(self) -> dict[str, float]:
-        """Figures that need one position only, and the model's means over parts of the cycle."""
-        found = self.model.static(maths.FLOAT, self.given, self.front)
+        """Figures that need one position only."""
+        return self.model.static(maths.FLOAT, self.given, self.front)
+
+    @functools.cached_property
+    def figures(self) -> dict[str, float]:
+        """Static figures, the model's means over parts of the cycle, and their roots."""
+        found = dict(self.static)
         for integral in self.model.integrals:
             found[integral.name] = self.mean(integral)
+            found[integral.root] = math.sqrt(found[integral.name])
         return found
 
     def at(self, name: str, pieces: NDArray[np.intp], u: Floats) -> Floats:
@@ -80,9 +88,14 @@ class Sampler:
         pieces = np.repeat(np.arange(len(counts)), counts)
         return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
 
-    def extremes(self, name: str, samples: int = SAMPLES) -> list[Extreme]:
+    def extremes(self, name: str) -> list[Extreme]:
         """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding."""
-        pieces, u = self.grid(samples)
+        if name not in self._extremes:
+            self._extremes[name] = self._find_extremes(name)
+        return self._extremes[name]
+
+    def _find_extremes(self, name: str) -> list[Extreme]:
+        pieces, u = self.grid()
         values = self.at(name, pieces, u)
         size = np.abs(values)
         if not np.all(np.isfinite(size)):
@@ -119,7 +132,7 @@ class Sampler:
 
     def peak(self, name: str) -> float:
         """Return the largest |quantity| over the cycle, SI."""
-        return max(abs(extreme.value) for extreme in self.extremes(name))
+        return abs(self.extremes(name)[0].value)
 
     def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
         """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""

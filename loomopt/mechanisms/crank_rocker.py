@@ -90,54 +90,102 @@ class Pose:
 
 @dataclass(frozen=True)
 class DeadCentres:
-    """Both dead centres: β and β_r (the crank stands at β and at π + β_r), ψ there, ψ'' there; rad."""
+    """Both dead centres in closed form [Yuan24, eq 12], rad; each figure is computed when it is first read.
 
-    beta: Number
-    beta_r: Number
-    theta: Number
-    psi_front: Number
-    psi_rear: Number
-    swing: Number
-    psi_2_front: Number
-    psi_2_rear: Number
-
-
-def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
-    """Return both dead centres in closed form [Yuan24, eq 12].
-
-    θ = β − β_r and the swing are each one angle of a sine that carries the factor 4 l1 l2, so nothing is lost for
-    tiny cranks; ψ''(FDC) = l1 (l1+l2)/(l2 l3 sin μ_FDC) and its mirror at the rear. Assumes a crank-rocker.
+    The crank stands at β (front: crank and rod stretched) and at π + β_r (rear: folded). θ and the swing are each one
+    angle of a sine that carries the factor 4 l1 l2, so nothing is lost for tiny cranks. Assumes a crank-rocker.
     """
-    l1, l2, l3, l4, side = lengths.l1, lengths.l2, lengths.l3, lengths.l4, lengths.side
-    front, rear = l2 + l1, l2 - l1
-    area_front, area_rear = dyad.heron(maths, front, l3, l4), dyad.heron(maths, rear, l3, l4)
-    areas, spread = area_front + area_rear, 4 * l1 * l2
-    frame = (l4 - l3) * (l4 + l3)
-    at_front, at_rear = front * front + frame, rear * rear + frame
-    squares = l3 * l3 + l4 * l4
-    excess = squares - l1 * l1 - l2 * l2
-    sine_theta = spread * (excess * (at_front + at_rear) / areas - areas / 2)
-    sine_swing = spread * (2 * excess * excess / areas + areas / 2)
-    rock_front, rock_rear = squares - front * front, squares - rear * rear
-    return DeadCentres(
-        beta=side * maths.atan2(area_front, at_front),
-        beta_r=side * maths.atan2(area_rear, at_rear),
-        theta=side * maths.atan2(sine_theta, area_front * area_rear + at_front * at_rear),
-        psi_front=side * maths.atan2(area_front, -rock_front),
-        psi_rear=side * maths.atan2(area_rear, -rock_rear),
-        swing=maths.atan2(sine_swing, area_front * area_rear + rock_front * rock_rear),
-        psi_2_front=side * 2 * l1 * front * front / (l2 * area_front),
-        psi_2_rear=-side * 2 * l1 * rear * rear / (l2 * area_rear),
-    )
+
+    maths: Maths
+    lengths: Lengths
+
+    @functools.cached_property
+    def _areas(self) -> tuple[Number, Number]:
+        """Four times the area of the triangle A C D, m², at the front and at the rear."""
+        l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
+        return dyad.heron(self.maths, l2 + l1, l3, l4), dyad.heron(self.maths, l2 - l1, l3, l4)
+
+    @functools.cached_property
+    def _at_crank(self) -> tuple[Number, Number]:
+        """2 × distance × l4 × cosine of the angle at A, m², at the front and at the rear."""
+        l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
+        frame = (l4 - l3) * (l4 + l3)
+        return (l2 + l1) ** 2 + frame, (l2 - l1) ** 2 + frame
+
+    @functools.cached_property
+    def _at_rocker(self) -> tuple[Number, Number]:
+        """2 l3 l4 × cosine of the angle at D, m², at the front and at the rear."""
+        l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
+        squares = l3 * l3 + l4 * l4
+        return squares - (l2 + l1) ** 2, squares - (l2 - l1) ** 2
+
+    @functools.cached_property
+    def _excess(self) -> Number:
+        """l3² + l4² − l1² − l2², m²."""
+        l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
+        return l3 * l3 + l4 * l4 - l1 * l1 - l2 * l2
+
+    @functools.cached_property
+    def beta(self) -> Number:
+        """Crank angle β of front dead centre."""
+        return self.lengths.side * self.maths.atan2(self._areas[0], self._at_crank[0])
+
+    @functools.cached_property
+    def beta_r(self) -> Number:
+        """Crank angle of rear dead centre less π."""
+        return self.lengths.side * self.maths.atan2(self._areas[1], self._at_crank[1])
+
+    @functools.cached_property
+    def theta(self) -> Number:
+        """θ = β − β_r, as one angle."""
+        (front, rear), (at_front, at_rear) = self._areas, self._at_crank
+        total = front + rear
+        sine = 4 * self.lengths.l1 * self.lengths.l2 * (self._excess * (at_front + at_rear) / total - total / 2)
+        return self.lengths.side * self.maths.atan2(sine, front * rear + at_front * at_rear)
+
+    @functools.cached_property
+    def swing(self) -> Number:
+        """ψ_s = |ψ(rear) − ψ(front)|, as one angle."""
+        (front, rear), (at_front, at_rear) = self._areas, self._at_rocker
+        total = front + rear
+        sine = 4 * self.lengths.l1 * self.lengths.l2 * (2 * self._excess**2 / total + total / 2)
+        return self.maths.atan2(sine, front * rear + at_front * at_rear)
+
+    @functools.cached_property
+    def psi_front(self) -> Number:
+        """ψ at front dead centre."""
+        return self.lengths.side * self.maths.atan2(self._areas[0], -self._at_rocker[0])
+
+    @functools.cached_property
+    def psi_rear(self) -> Number:
+        """ψ at rear dead centre."""
+        return self.lengths.side * self.maths.atan2(self._areas[1], -self._at_rocker[1])
+
+    @functools.cached_property
+    def psi_2_front(self) -> Number:
+        """ψ'' at front dead centre: l1 (l1+l2)/(l2 l3 sin μ), the sine written through the triangle's area."""
+        l1, l2 = self.lengths.l1, self.lengths.l2
+        return self.lengths.side * 2 * l1 * (l2 + l1) ** 2 / (l2 * self._areas[0])
+
+    @functools.cached_property
+    def psi_2_rear(self) -> Number:
+        """ψ'' at rear dead centre."""
+        l1, l2 = self.lengths.l1, self.lengths.l2
+        return -self.lengths.side * 2 * l1 * (l2 - l1) ** 2 / (l2 * self._areas[1])
 
 
-def transmission_angles(maths: Maths, lengths: Lengths) -> tuple[Number, Number]:
-    """Return μ at φ = 0 and π − μ at φ = π, rad; the lesser is μ_min over the cycle [Yuan24, eq 17 corrected]."""
-    l1, l2, l3, l4 = lengths.l1, lengths.l2, lengths.l3, lengths.l4
-    near, far = l4 - l1, l4 + l1
-    folded = maths.atan2(maths.sqrt((near + l2 - l3) * (near - l2 + l3)), maths.sqrt((l2 + l3 - near) * (l2 + l3 + near)))
-    stretched = maths.atan2(maths.sqrt((l2 + l3 - far) * (l2 + l3 + far)), maths.sqrt((far + l2 - l3) * (far - l2 + l3)))
-    return 2 * folded, 2 * stretched
+def transmission_angle_near(maths: Maths, lengths: Lengths) -> Number:
+    """Return μ at φ = 0, rad: there μ is least [Yuan24, eq 17 with the square it lacks]."""
+    l2, l3, near = lengths.l2, lengths.l3, lengths.l4 - lengths.l1
+    opening = maths.sqrt((near + l2 - l3) * (near - l2 + l3))
+    return 2 * maths.atan2(opening, maths.sqrt((l2 + l3 - near) * (l2 + l3 + near)))
+
+
+def transmission_angle_far(maths: Maths, lengths: Lengths) -> Number:
+    """Return π − μ at φ = π, rad: there μ is largest; μ_min over the cycle is the lesser of this and the near one."""
+    l2, l3, far = lengths.l2, lengths.l3, lengths.l4 + lengths.l1
+    closing = maths.sqrt((l2 + l3 - far) * (l2 + l3 + far))
+    return 2 * maths.atan2(closing, maths.sqrt((far + l2 - l3) * (far - l2 + l3)))
 
 
 def assembly_margins(lengths: Lengths) -> dict[str, Number]:

@@ -106,6 +106,7 @@ class Transcription:
         self.nlp = {"x": ca.vertcat(scaled, extra), "p": self.parameters, "f": objective, "g": ca.vertcat(*rows)}
         self.extras = extra.numel()
         self._solvers: dict[Hashable, Any] = {}
+        self._derivatives: dict[str, Any] = {}
 
     def solver(self, warm: bool, callback: Any = None) -> Any:
         """Return IPOPT for this NLP, from scratch or from a solution nearby."""
@@ -118,7 +119,13 @@ class Transcription:
             if callback is not None:
                 sizes = (self.nlp["x"].numel(), self.nlp["g"].numel(), self.layout.size)
                 options["iteration_callback"] = callback.for_size(*sizes)
-            self._solvers[name] = ca.nlpsol("solver", "ipopt", self.nlp, options)
+            if self._derivatives:
+                options |= self._derivatives
+            solver = ca.nlpsol("solver", "ipopt", self.nlp, options)
+            if not self._derivatives:
+                functions = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
+                self._derivatives = {option: solver.get_function(made) for option, made in functions.items()}
+            self._solvers[name] = solver
         return self._solvers[name]
 
     def _is_row(self, limit: Any) -> bool:
@@ -156,8 +163,7 @@ class Transcription:
         static = model.static(m, given, read(vector, "front"))
         for integral in self.integrals:
             static[integral.name] = self._mean(given, corners, integral, vector)
-        if "pulse_mean_square" in static:
-            static["pulse_rms"] = m.sqrt(static["pulse_mean_square"])
+            static[integral.root] = m.sqrt(static[integral.name])
         static = {**values, **static}
         limit_values, limit_scales = read(vector, "limit"), read(vector, "limit scale")
         excess = dict.fromkeys(range(len(program.limits)), 0)
@@ -237,8 +243,7 @@ def families(program: Program, elastic: bool = False) -> list[Family]:
 def _wanted_integrals(program: Program) -> list[Any]:
     """Return the model's integrals that a limit or an objective reads."""
     read = {o.row for o in program.objectives} | {limit.row for limit in program.limits}
-    read |= {"pulse_mean_square"} if "pulse_rms" in read else set()
-    return [integral for integral in program.model.integrals if integral.name in read]
+    return [integral for integral in program.model.integrals if {integral.name, integral.root} & read]
 
 
 _cache: OrderedDict[Hashable, Transcription] = OrderedDict()

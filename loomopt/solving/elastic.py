@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from loomopt.jobs.program import Limit, Program
 from loomopt.nlp import exchange
 from loomopt.nlp.exchange import Point, Settings
-from loomopt.solve.solution import Relaxation
-from loomopt.solve.words import Words
+from loomopt.solving.solution import Relaxation
+from loomopt.solving.words import Words
 
 PRICED = 1e-6
 """Multipliers above this belong to the clash."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from loomopt.solve.certificate import Certificate
+from loomopt.solving.certificate import Certificate
 
 STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
 

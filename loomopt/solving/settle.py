@@ -5,13 +5,17 @@ They run only along moves verified flat at this design: objectives unchanged to 
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
+from loomopt.cycle import Floats
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
-from loomopt.solve.certificate import excesses, figures
+from loomopt.solving.certificate import excesses
 
 UNCHANGED = 1e-10
 SLACK = 1e-12
 BISECTIONS = 60
+NODES = 64
 
 
 def settle(
@@ -39,24 +43,22 @@ def _part_way(x: Mapping[str, float], goal: Mapping[str, float], share: float) -
 
 
 def _flat(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> bool:
-    """Say whether the objectives stay the same along the way to the goal, and a little beyond today's x."""
+    """Say whether the objectives stay the same along the way to the goal, and a little beyond x."""
     before = _objectives(program, x)
     nearby = {name: x[name] * (1 + 1e-3) for name in goal}
     shares = [_part_way(x, goal, share) for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
-    return all(
-        abs(after - value) <= UNCHANGED
-        for trial in shares
-        for value, after in zip(before, _objectives(program, trial), strict=True)
-    )
+    return all(np.abs(_objectives(program, trial) - before).max() <= UNCHANGED for trial in shares)
 
 
-def _objectives(program: Program, x: Mapping[str, float]) -> list[float]:
-    """Return the objectives' values in their natural sizes."""
+def _objectives(program: Program, x: Mapping[str, float]) -> Floats:
+    """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
     sampler = Sampler(program.model, {**program.parameters, **x})
-    static = figures(sampler)
-    return [
-        (sampler.peak(o.row) if o.form == "peak" else abs(static[o.row])) / o.scale for o in program.objectives
+    pieces, u = sampler.grid(NODES)
+    parts = [
+        (sampler.at(o.row, pieces, u) if o.form == "peak" else np.array([abs(sampler.figures[o.row])])) / o.scale
+        for o in program.objectives
     ]
+    return np.concatenate(parts)
 
 
 def _reach(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> float:

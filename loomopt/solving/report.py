@@ -5,10 +5,10 @@ from typing import Any
 
 from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import Task
-from loomopt.solve.certificate import FEASIBILITY, Certificate
-from loomopt.solve.elastic import Clash
-from loomopt.solve.solution import ADVICE, Evaluation, Finding, Price, Solution
-from loomopt.solve.words import Words
+from loomopt.solving.certificate import FEASIBILITY, Certificate
+from loomopt.solving.elastic import Clash
+from loomopt.solving.solution import ADVICE, Evaluation, Finding, Price, Solution
+from loomopt.solving.words import Words
 
 
 def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, float]) -> Evaluation:

@@ -12,12 +12,12 @@ from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.exchange import Point, Settings
-from loomopt.solve import report
-from loomopt.solve.certificate import Certificate, certify
-from loomopt.solve.elastic import clash
-from loomopt.solve.settle import settle
-from loomopt.solve.solution import Evaluation, Solution
-from loomopt.solve.words import Words
+from loomopt.solving import report
+from loomopt.solving.certificate import Certificate, certify
+from loomopt.solving.elastic import clash
+from loomopt.solving.settle import settle
+from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.words import Words
 
 ACCURACY = 1e-8
 TIGHTEST = 1e-11
@@ -240,5 +240,5 @@ def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[flo
     sampler = exchange.sampler_at(program, dict(x))
     if sampler is None:
         return (math.inf,) * len(program.objectives)
-    values = (sampler.peak(o.row) if o.form == "peak" else abs(sampler.static[o.row]) for o in program.objectives)
+    values = (sampler.peak(o.row) if o.form == "peak" else abs(sampler.figures[o.row]) for o in program.objectives)
     return tuple(value / o.scale for value, o in zip(values, program.objectives, strict=True))

@@ -12,8 +12,8 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Limit, Objective, Program
 from loomopt.jobs.sampling import Sampler
-from loomopt.solve.exact import Exact, Row
-from loomopt.solve.nnls import nnls
+from loomopt.solving.exact import Exact, Row
+from loomopt.solving.nnls import nnls
 
 FEASIBILITY, STATIONARITY, COMPLEMENTARITY = 1e-9, 1e-6, 1e-8
 ACTIVE = 1e-7
@@ -62,7 +62,7 @@ class Certificate:
 
 def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
     """Return how far each limit is exceeded, in its natural size (an equality: how far it is missed)."""
-    static = {**sampler.given.values, **figures(sampler)}
+    static = {**sampler.given.values, **sampler.figures}
     found = {}
     for k, limit in enumerate(program.limits):
         if limit.family == "cycle":
@@ -70,14 +70,6 @@ def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
         else:
             residual = limit.residual(static, limit.value) / limit.scale
             found[k] = abs(residual) if limit.sign == 0 else residual
-    return found
-
-
-def figures(sampler: Sampler) -> dict[str, float]:
-    """Return the sampler's static figures with the root of its mean square."""
-    found = dict(sampler.static)
-    if "pulse_mean_square" in found:
-        found["pulse_rms"] = float(np.sqrt(found["pulse_mean_square"]))
     return found
 
 
@@ -231,9 +223,9 @@ class _Trial:
 
     def _priced(self, limit: Limit, objective: Objective, multiplier: float) -> Binding:
         """Return a binding limit with its multiplier in SI units of objective per limit."""
-        weight = {**self.sampler.given.values, **figures(self.sampler)}[limit.weight] if limit.weight else 1.0
+        weight = {**self.sampler.given.values, **self.sampler.figures}[limit.weight] if limit.weight else 1.0
         worth = abs(multiplier) * objective.scale / limit.scale * weight
         if objective.power == 2:
-            worth /= 2 * figures(self.sampler)[objective.figure]
+            worth /= 2 * self.sampler.figures[objective.figure]
         side = limit.sign or (1 if multiplier > 0 else -1)
         return Binding(limit, side, objective, worth)

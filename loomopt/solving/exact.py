@@ -40,6 +40,11 @@ class Row:
         """The name of the value the row reads."""
         return self.limit.row if self.limit else self.objective.row if self.objective else self.name
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The names of all values the row reads."""
+        return (self.quantity, self.limit.weight) if self.limit else (self.quantity,)
+
 
 class Exact:
     """A program's rows around one design.
@@ -100,12 +105,12 @@ class Exact:
     def _rows(self, scaled: Sequence[Any]) -> list[Any]:
         """Return every row's value at variables in their own scale."""
         model, given = self.program.model, self._given(scaled)
-        static: dict[str, Any] = {**given.values, **model.static(self.maths, given, self.sampler.front)}
-        wanted = {row.quantity for row in self.rows}
+        wanted = {name for row in self.rows if not row.node for name in row.reads}
+        static = {**given.values, **model.static(self.maths, given, self.sampler.front, wanted)}
         for integral in model.integrals:
-            if {integral.name, "pulse_rms"} & wanted:
+            if {integral.name, integral.root} & wanted:
                 static[integral.name] = self._mean(given, integral)
-                static["pulse_rms"] = self.maths.sqrt(static["pulse_mean_square"])
+                static[integral.root] = self.maths.sqrt(static[integral.name])
         return [self._row(k, row, given, static) for k, row in enumerate(self.rows)]
 
     def _row(self, k: int, row: Row, given: Given, static: dict[str, Any]) -> Any:
