@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
 from loomopt.jobs import load, scene
-from loomopt.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.solution import Evaluation, Solution
+from loomopt.scenes import Scene
+from loomopt.solving import engine
+from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd

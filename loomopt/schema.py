@@ -12,7 +12,7 @@ from loomopt.maths import Maths, Number
 class Table(BaseModel):
     """One table of a scene: unknown keys are errors, values never change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 Values = Mapping[str, Number]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs.tasks import TASKS
 from loomopt.quantities import factor
-from loomopt.solve.solution import Evaluation, Solution
-from loomopt.solve.words import Words
+from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.words import Words
 
 if TYPE_CHECKING:
     import pandas as pd

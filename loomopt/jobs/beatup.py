@@ -52,7 +52,7 @@ class Beatup:
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
-        centres = crank_rocker.DeadCentres(maths, lengths)
+        centres = crank_rocker.dead_centres(maths, lengths)
         derived = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
         if "s" not in values:
             derived["s"] = values["m4e"] * values["r4e"] ** 2

@@ -174,6 +174,11 @@ class DeadCentres:
         return -self.lengths.side * 2 * l1 * (l2 - l1) ** 2 / (l2 * self._areas[1])
 
 
+def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
+    """Return both dead centres of a crank-rocker; lengths in m."""
+    return DeadCentres(maths, lengths)
+
+
 def transmission_angle_near(maths: Maths, lengths: Lengths) -> Number:
     """Return μ at φ = 0, rad: there μ is least [Yuan24, eq 17 with the square it lacks]."""
     l2, l3, near = lengths.l2, lengths.l3, lengths.l4 - lengths.l1

@@ -11,8 +11,8 @@ from loomopt import tables
 from loomopt.errors import BadInput
 from loomopt.jobs import load
 from loomopt.packaged import problem_names, results_path
-from loomopt.solve import engine
-from loomopt.solve.solution import Solution
+from loomopt.solving import engine
+from loomopt.solving.solution import Solution
 
 if TYPE_CHECKING:
     import pandas as pd

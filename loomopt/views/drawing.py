@@ -50,7 +50,7 @@ def linkage(design: Mapping[str, float], title: str) -> Drawing:
     Raises BadInput when the lengths are no crank-rocker.
     """
     lengths = _lengths(design)
-    centres = crank_rocker.dead_centres(FLOAT, lengths)
+    centres = crank_rocker.DeadCentres(FLOAT, lengths)
     height = 0.02 * (lengths.l4 + lengths.l1)
     joints = _joints(lengths, centres)
     strokes = [*_frame(joints, height), *_links(joints, lengths, height)]
@@ -66,7 +66,7 @@ def joints_csv(design: Mapping[str, float]) -> str:
     positions = {"A": "frame", "D": "frame", "B": "front dead centre", "C": "front dead centre"}
     rows = [
         f"{name},{positions.get(name, 'rear dead centre')},{point.x!r},{point.y!r}\n"
-        for name, point in _joints(lengths, crank_rocker.dead_centres(FLOAT, lengths)).items()
+        for name, point in _joints(lengths, crank_rocker.DeadCentres(FLOAT, lengths)).items()
     ]
     return "".join(["joint,position,x [mm],y [mm]\n", *rows])
 

@@ -90,7 +90,7 @@ def _geometry() -> list[Equation]:
 def _dead_centres() -> list[Equation]:
     """Run the mechanism's own closed forms on symbols."""
     lengths = crank_rocker.Lengths(*(_symbol(name) for name in ("l1", "l2", "l3", "l4")))
-    centres = crank_rocker.dead_centres(maths.sympy(), lengths)
+    centres = crank_rocker.DeadCentres(maths.sympy(), lengths)
     beta, beta_r, psi = _symbol("beta"), _symbol("beta_r"), _sympy().Function("psi")
     return [
         _equation("front dead centre", beta, centres.beta),

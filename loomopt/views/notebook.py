@@ -4,7 +4,7 @@ from html import escape
 from typing import Any
 
 from loomopt import tables
-from loomopt.solve.solution import Solution
+from loomopt.solving.solution import Solution
 from loomopt.views import drawing, svg
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from loomopt import tables
 from loomopt.errors import BadInput
 from loomopt.jobs.tasks import TASKS
-from loomopt.solve.solution import Solution
+from loomopt.solving.solution import Solution
 from loomopt.store import atomically, suffix
 
 PICTURES = (".png", ".svg", ".pdf")

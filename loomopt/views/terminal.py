@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from loomopt.quantities import factor
-from loomopt.solve.solution import Evaluation, Solution
-from loomopt.solve.words import Words
+from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.words import Words
 from loomopt.tables import rows
 
 NEGLIGIBLE = 1e-9
