@@ -78,16 +78,12 @@ def total(numbers: Sequence[Number]) -> Number:
     return result
 
 
-def output_force(
-    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
-) -> Number:
+def output_force(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:
     """Return Q, N or N·m: what the mechanism must supply at its output."""
     return total([term for load, term in terms(maths, loads, pose, given, switches) if load.acts == "output"])
 
 
-def crank_torque(
-    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
-) -> Number:
+def crank_torque(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:
     """Return the torque on the crank, N·m: Q q' and the drive's own terms."""
     found = list(terms(maths, loads, pose, given, switches))
     output = [term for load, term in found if load.acts == "output"]

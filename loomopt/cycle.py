@@ -64,7 +64,9 @@ def split(loads: Sequence[Load], corners: Sequence[Sequence[float]]) -> Cycle:
         return Cycle(starts, _switches(loads, corners, starts), ())
     base = flat[0]
     turns = [-math.floor((angle - base) / TURN) for angle in flat]
-    placed = sorted((angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(flat, turns, strict=True)))
+    placed = sorted(
+        (angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(flat, turns, strict=True))
+    )
     starts = np.array([angle for angle, _, _ in placed] + [placed[0][0] + TURN])
     return Cycle(starts, _switches(loads, corners, starts), tuple((index, turn) for _, index, turn in placed))
 

@@ -19,7 +19,9 @@ def read(path: Path, scene: Any) -> dict[str, float]:
             raise BadInput("the file is too large for a design", file=str(path), remedy="Give the JSON of an answer.")
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise BadInput(f"the design cannot be read: {error.strerror}", file=str(path), remedy="Check the path.") from None
+        raise BadInput(
+            f"the design cannot be read: {error.strerror}", file=str(path), remedy="Check the path."
+        ) from None
     except (ValueError, RecursionError):
         remedy = "Give the JSON that `loomopt solve --json` prints, or its design object."
         raise BadInput("the file is not JSON", file=str(path), remedy=remedy) from None
@@ -35,7 +37,12 @@ def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]
         raise BadInput("there is no design", file=origin, allowed=f"an object of {', '.join(known)}, SI")
     for name, value in data.items():
         if name not in known:
-            raise BadInput(f"{name!s:.60} is no design variable", file=origin, key=f"design.{name!s:.60}", allowed=", ".join(known))
+            raise BadInput(
+                f"{name!s:.60} is no design variable",
+                file=origin,
+                key=f"design.{name!s:.60}",
+                allowed=", ".join(known),
+            )
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value < 0:
             raise BadInput(
                 "it is not a number that a design can have",
@@ -47,5 +54,7 @@ def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]
     design = {name: float(value) for name, value in data.items()}
     fault = scene.job.fault({**scene.mechanism, **design})
     if fault:
-        raise BadInput(f"the design does not assemble: {fault}", file=origin, key="design", remedy="Correct its lengths.")
+        raise BadInput(
+            f"the design does not assemble: {fault}", file=origin, key="design", remedy="Correct its lengths."
+        )
     return design

@@ -8,7 +8,14 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
     """
 
     def __init__(
-        self, problem: str, *, file: str = "", key: str = "", value: str = "", allowed: str = "", remedy: str = ""
+        self,
+        problem: str,
+        *,
+        file: str = "",
+        key: str = "",
+        value: str = "",
+        allowed: str = "",
+        remedy: str = "",
     ) -> None:
         self.problem, self.file, self.key = problem, file, key
         self.value, self.allowed, self.remedy = value, allowed, remedy

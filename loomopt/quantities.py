@@ -104,9 +104,7 @@ def read(text: str, kind: str) -> float:
         raise _misreading(text, kind)
     number, unit_text = match.groups()
     if not unit_text:
-        raise _refusal(
-            kind, "the unit is missing", f'Write the unit too, such as "{number} {DISPLAY_UNIT[kind]}"'
-        )
+        raise _refusal(kind, "the unit is missing", f'Write the unit too, such as "{number} {DISPLAY_UNIT[kind]}"')
     try:
         unit = parse_unit(unit_text)
     except QuantityError as error:
@@ -122,9 +120,7 @@ def unit_of(text: str) -> str:
         return "1"
     match = _QUANTITY.fullmatch(text)
     if not match:
-        raise QuantityError(
-            "there is no number", "a number and a unit", 'Write a number and a unit, such as "31 mm"'
-        )
+        raise QuantityError("there is no number", "a number and a unit", 'Write a number and a unit, such as "31 mm"')
     return match[2]
 
 
@@ -162,9 +158,7 @@ def parse_unit(text: str) -> Unit:
     """
     if text == "1":
         return Unit(Fraction(1), (0, 0, 0, 0))
-    plain = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(
-        _LOOKALIKE
-    )
+    plain = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
     tokens = _TOKEN.findall(plain)
     reciprocal = tokens[:2] == ["1", "/"]
     if reciprocal:
@@ -292,11 +286,7 @@ def _refusal(kind: str, problem: str, remedy: str = "") -> QuantityError:
 
 def _unit_error(unit_text: str, remedy: str = "") -> QuantityError:
     joined = re.sub(r" *([*/^]) *| +", lambda gap: gap[1] or "*", unit_text)
-    hint = (
-        f'Join units by * or / without spaces: "{joined}"'
-        if re.fullmatch("[a-zA-Z*/^2-4 ]+", unit_text)
-        else ""
-    )
+    hint = f'Join units by * or / without spaces: "{joined}"' if re.fullmatch("[a-zA-Z*/^2-4 ]+", unit_text) else ""
     spaced = hint if " " in unit_text else ""
     return QuantityError(
         f'"{unit_text}" is not a unit',
@@ -312,9 +302,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
     if text.lstrip("+-").lower().startswith(("nan", "inf")):
         return _refusal(kind, "it is not a finite number")
     if re.match(r"[+-]?[0-9. ]*,", text):
-        return _refusal(
-            kind, "a comma stands in the number", "Write a decimal point and no thousands separators"
-        )
+        return _refusal(kind, "a comma stands in the number", "Write a decimal point and no thousands separators")
     if _GROUPED.match(text):
         return _refusal(kind, "the digits are grouped", "Write the digits without separators")
     if kind == "angular speed" and re.fullmatch(rf"{_NUMBER} */ *(min|s|sec)", text):

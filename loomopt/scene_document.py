@@ -83,9 +83,7 @@ def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> Any:
     return value
 
 
-def replaced(
-    document: Mapping[str, Any], parts: Sequence[str], value: Any, origin: str, key: str
-) -> dict[str, Any]:
+def replaced(document: Mapping[str, Any], parts: Sequence[str], value: Any, origin: str, key: str) -> dict[str, Any]:
     """Return tables in which one path has another value; tables on the way are made where they are missing.
 
     key: the whole path, for the BadInput raised where it leads through a value.
@@ -94,9 +92,7 @@ def replaced(
     if rest:
         inner = document.get(first, {})
         if not isinstance(inner, Mapping):
-            raise refusal(
-                f"{first} is a value, not a table", origin, key, inner, remedy=f"Set {first} itself"
-            )
+            raise refusal(f"{first} is a value, not a table", origin, key, inner, remedy=f"Set {first} itself")
         value = replaced(inner, rest, value, origin, key)
     return {**document, first: value}
 

@@ -62,9 +62,7 @@ def unknown(what: str, name: str, known: Iterable[str], origin: str, key: str) -
     names = list(known)
     near = difflib.get_close_matches(name[:_LONGEST_VALUE], names, n=1, cutoff=0.5)
     remedy = f'Perhaps "{near[0]}" is meant' if near else "Correct the name or take it out"
-    return refusal(
-        f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy
-    )
+    return refusal(f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy)
 
 
 def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:

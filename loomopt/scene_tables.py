@@ -88,9 +88,7 @@ def named(raw: Any, models: Mapping[str, type[Table]], what: str, origin: str, p
         if name not in models:
             raise unknown(what, name, models, origin, f"{path}.{name}")
     return {
-        name: checked(model, inner[name], origin, f"{path}.{name}")
-        for name, model in models.items()
-        if name in inner
+        name: checked(model, inner[name], origin, f"{path}.{name}") for name, model in models.items() if name in inner
     }
 
 
@@ -121,10 +119,7 @@ def places(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table]) 
 def bounds(raw: Any, job: Job, known: list[Place], origin: str) -> dict[str, Bound]:
     """Return [bounds]; known: places of the scene's numbers, any of which may be bounded."""
     inner = table(raw, origin, "bounds")
-    return {
-        name: _bound(inner[name], _bounded(name, job, known, origin), origin, f"bounds.{name}")
-        for name in inner
-    }
+    return {name: _bound(inner[name], _bounded(name, job, known, origin), origin, f"bounds.{name}") for name in inner}
 
 
 def _bounded(name: str, job: Job, known: list[Place], origin: str) -> Quantity:
@@ -133,17 +128,13 @@ def _bounded(name: str, job: Job, known: list[Place], origin: str) -> Quantity:
     found = [place for place in known if place.key == name]
     given = [place for place in found if place.given]
     if name in job.variables:
-        return next(
-            (place.quantity for place in found if place.table == "mechanism"), Quantity(job.variables[name])
-        )
+        return next((place.quantity for place in found if place.table == "mechanism"), Quantity(job.variables[name]))
     if not found:
         names = [*job.variables, *sorted({place.key for place in known if place.given} - set(job.variables))]
         raise unknown("number to bound", name, names, origin, key)
     if not given:
         where = " or ".join(f"{place.table}.{name}" for place in found)
-        raise refusal(
-            f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take the bound out"
-        )
+        raise refusal(f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take the bound out")
     if len(given) > 1:
         where = ", ".join(f"{place.table}.{name}" for place in given)
         raise refusal(f"{name} may mean {where}", origin, key, remedy="Take the bound out")
@@ -162,9 +153,7 @@ def _bound(raw: Any, quantity: Quantity, origin: str, key: str) -> Bound:
     free = {"true": True, "false": False}.get(str(raw.get("free", True)).lower())
     if free is None:
         free_key = f"{key}.free"
-        raise refusal(
-            "it is neither true nor false", origin, free_key, raw["free"], "true, false", "Correct the value"
-        )
+        raise refusal("it is neither true nor false", origin, free_key, raw["free"], "true, false", "Correct the value")
     low, high = (_value(quantity, raw[end], origin, f"{key}.{end}") for end in ("min", "max"))
     _ordered(raw, low, high, origin, key)
     return Bound(low, high, free, _unit(raw["min"]))
@@ -180,9 +169,7 @@ def limits(raw: Any, job: Job, effects: Mapping[str, Table], origin: str) -> dic
         for other, effect in job.effects.items():
             if isinstance(effect, Check) and name in effect.quantities and other not in effects:
                 remedy = f"Put it on (--with {other}), or take the limit out"
-                raise refusal(
-                    f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy
-                )
+                raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
     return {name: _limit(inner[name], job, name, origin) for name in inner}
 
 
@@ -198,9 +185,7 @@ def _limit(raw: Any, job: Job, name: str, origin: str) -> Limit:
             remedy = f"Limit its {sides}"
             raise refusal(f"{name} has no limit {side}", origin, f"{key}.{side}", raw[side], sides, remedy)
     if not raw:
-        raise refusal(
-            "the limit is empty", origin, key, allowed=sides, remedy="Give a side, or take the limit out"
-        )
+        raise refusal("the limit is empty", origin, key, allowed=sides, remedy="Give a side, or take the limit out")
     quantity = Quantity(figure.kind)
     found = {side: _value(quantity, value, origin, f"{key}.{side}") for side, value in raw.items()}
     if len(found) == 2:

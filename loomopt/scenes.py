@@ -1,6 +1,5 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -110,14 +109,14 @@ class Scene:
                 held = ", ".join(bound for bound in ranges if not self.bounds[bound].free)
                 allowed = held or "nothing: no bound has free = false"
                 remedy = "Give it min and max in [bounds]"
-                raise refusal(
-                    f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy
-                )
+                raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
         return self.update({f"bounds.{name}.free": True for name in asked})
 
     @property
     def hash(self) -> str:
         """Twelve hex digits of all that decides an answer: the checked numbers, SI, no name or title."""
+        import hashlib
+
         content = {
             "job": self.job.name,
             "operation": dict(self.operation),

@@ -1,7 +1,6 @@
 """Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
 
 import datetime
-import importlib.metadata
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,8 @@ VERSIONED = ("loomopt", "casadi", "numpy")
 
 def provenance(scene: Any, **more: object) -> dict[str, str]:
     """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
+    import importlib.metadata
+
     versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     told = {name: str(value) for name, value in more.items()}
@@ -29,7 +30,7 @@ def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
     import pandas as pd
 
     frame = pd.DataFrame(rows(solution, scene))
-    frame.attrs = provenance(scene)
+    frame.attrs.update(provenance(scene))
     return frame.set_index("name")
 
 
@@ -59,7 +60,7 @@ def curves(scene: Any, design: Mapping[str, float]) -> "pd.DataFrame":
     task = TASKS[scene.job.name]
     full = {**task.today(scene), **design}
     frame = pd.DataFrame(task.curves(scene, full))
-    frame.attrs = provenance(scene)
+    frame.attrs.update(provenance(scene))
     return frame
 
 

@@ -255,9 +255,7 @@ def test_a_bad_change(method, arguments, key, problem, remedy):
     told(caught(getattr(BEATUP, method), *arguments), "beatup.toml: ", key, problem, remedy)
 
 
-@pytest.mark.parametrize(
-    ("content", "problem", "remedy"), FILES, ids=[row[1] + str(n) for n, row in enumerate(FILES)]
-)
+@pytest.mark.parametrize(("content", "problem", "remedy"), FILES, ids=[row[1] + str(n) for n, row in enumerate(FILES)])
 def test_a_bad_file(tmp_path, content, problem, remedy):
     path = tmp_path / "scene.toml"
     path.write_bytes(content)
@@ -279,9 +277,7 @@ def test_files_that_are_none(tmp_path):
 
 
 def test_an_unknown_packaged_name_tells_the_nearest():
-    told(
-        caught(load, "beatup-lite"), "beatup-lite", "", "no packaged scene", '"beatup-light"', '"beatup-lite"'
-    )
+    told(caught(load, "beatup-lite"), "beatup-lite", "", "no packaged scene", '"beatup-light"', '"beatup-lite"')
     told(caught(load, ""), "", "", "no packaged scene", "beatup, beatup-heavy")
     told(caught(load, "x\x1b[2J"), "x\\x1b[2J", "", "no packaged scene", ".toml")
     told(caught(scene, nested(50)), "<dict>", "a.a.a...", "nested too deep", "loomopt new")
@@ -305,12 +301,8 @@ def test_a_long_message_is_shortened():
 
 SCALARS = st.one_of(
     st.text(max_size=12),
-    st.sampled_from(
-        ["1e60 m", "1e-59 m", "1 mm", "5 deg", "0 kg", "inf m", "1e999 kg", "60 mm", "exact", "true"]
-    ),
-    st.builds(
-        "{} {}".format, st.floats(width=32), st.sampled_from(["mm", "deg", "kg", "N*m", "rpm", "kg*m^2"])
-    ),
+    st.sampled_from(["1e60 m", "1e-59 m", "1 mm", "5 deg", "0 kg", "inf m", "1e999 kg", "60 mm", "exact", "true"]),
+    st.builds("{} {}".format, st.floats(width=32), st.sampled_from(["mm", "deg", "kg", "N*m", "rpm", "kg*m^2"])),
     st.integers(),
     st.floats(),
     st.booleans(),
@@ -321,9 +313,7 @@ JUNK = st.recursive(
     SCALARS,
     lambda inner: (
         st.lists(inner, max_size=2)
-        | st.dictionaries(
-            st.sampled_from(["min", "max", "free", "J4"]) | st.text(max_size=4), inner, max_size=3
-        )
+        | st.dictionaries(st.sampled_from(["min", "max", "free", "J4"]) | st.text(max_size=4), inner, max_size=3)
     ),
     max_leaves=4,
 )
@@ -332,12 +322,7 @@ KEYS = st.sampled_from(["l1", "l2", "J4", "pulse", "swing", "balance", "gravity"
 
 def paths(table, start=()):
     """Return the path of everything in nested tables."""
-    inner = [
-        path
-        for name, value in table.items()
-        if isinstance(value, dict)
-        for path in paths(value, (*start, name))
-    ]
+    inner = [path for name, value in table.items() if isinstance(value, dict) for path in paths(value, (*start, name))]
     return [(*start, name) for name in table] + inner
 
 
@@ -383,9 +368,7 @@ def test_mutated_tables_are_read_or_refused(document):
     read_or_refused(scene, document)
 
 
-@given(
-    st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK
-)
+@given(st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK)
 @settings(deadline=None, derandomize=True, max_examples=200)
 def test_any_key_set_is_read_or_refused(keys, value):
     read_or_refused(BEATUP.update, dict.fromkeys(keys, value))

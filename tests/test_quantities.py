@@ -141,9 +141,7 @@ def test_one_length_in_every_unit(millimetres):
     for unit, size in (("mm", "1"), ("cm", "10"), ("m", "1000"), ("km", "1000000"), ("um", "0.001")):
         assert read(f"{millimetres / Decimal(size):f} {unit}", "length") == in_metres
     for unit, size in (("in", "25.4"), ("ft", "304.8")):
-        assert read(f"{millimetres / Decimal(size):f} {unit}", "length") == pytest.approx(
-            in_metres, rel=1e-15
-        )
+        assert read(f"{millimetres / Decimal(size):f} {unit}", "length") == pytest.approx(in_metres, rel=1e-15)
 
 
 MISREADINGS = [
@@ -287,7 +285,5 @@ def test_every_kind_has_units_of_its_own_kind(kind):
     assert parse_unit(SI_UNIT[kind]).factor == 1
     assert quantities.fits(DISPLAY_UNIT[kind], kind)
     if kind != "number":
-        assert read(f"2 {DISPLAY_UNIT[kind]}", kind) == pytest.approx(
-            2 * factor(DISPLAY_UNIT[kind]), rel=3e-16
-        )
+        assert read(f"2 {DISPLAY_UNIT[kind]}", kind) == pytest.approx(2 * factor(DISPLAY_UNIT[kind]), rel=3e-16)
         assert DISPLAY_UNIT[kind] in quantities.described(kind)

@@ -83,9 +83,7 @@ def test_the_template_loads_with_and_without_its_optional_tables():
     assert list(scene(tomllib.loads(everything)).effects) == list(BEATUP.job.effects)
 
 
-@pytest.mark.parametrize(
-    ("unit", "millimetres"), [("m", "1000"), ("km", "1e6"), ("in", "25.4"), ("ft", "304.8")]
-)
+@pytest.mark.parametrize(("unit", "millimetres"), [("m", "1000"), ("km", "1e6"), ("in", "25.4"), ("ft", "304.8")])
 def test_any_unit_of_length_reads_the_same(unit, millimetres):
     def converted(value):
         if isinstance(value, dict):
@@ -100,9 +98,7 @@ def test_any_unit_of_length_reads_the_same(unit, millimetres):
     for name, value in BEATUP.mechanism.items():
         assert other.mechanism[name] == pytest.approx(value, rel=1e-15)
     for name, bound in BEATUP.bounds.items():
-        assert (other.bounds[name].min, other.bounds[name].max) == pytest.approx(
-            (bound.min, bound.max), rel=1e-15
-        )
+        assert (other.bounds[name].min, other.bounds[name].max) == pytest.approx((bound.min, bound.max), rel=1e-15)
     assert other.bounds["l1"].unit == other.unit("l1", "length") == unit
 
 
@@ -156,9 +152,7 @@ def test_effects_go_on_and_off_in_the_order_of_the_job():
     assert off.with_effect("inertia").effects == on.effects
     assert BEATUP.with_effect("inertia") is BEATUP
     assert BEATUP.without_effect("gravity") is BEATUP
-    assert (
-        scene(edited({"available": {}})).with_effect("centrifugal").effects["centrifugal"].model_dump() == {}
-    )
+    assert scene(edited({"available": {}})).with_effect("centrifugal").effects["centrifugal"].model_dump() == {}
 
 
 def test_bounds_that_hold_free_and_fix():
@@ -203,12 +197,7 @@ def test_a_scene_travels_to_another_process():
 def test_a_path_wins_over_a_packaged_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "beatup.toml").write_text(BEATUP_TEMPLATE, encoding="utf-8")
-    assert (
-        load("beatup.toml").name
-        == load("./beatup.toml").name
-        == load(tmp_path / "beatup.toml").name
-        == "my-loom"
-    )
+    assert load("beatup.toml").name == load("./beatup.toml").name == load(tmp_path / "beatup.toml").name == "my-loom"
     assert load("beatup").name == "beatup"
     assert load("./beatup.toml").origin == "./beatup.toml"
 

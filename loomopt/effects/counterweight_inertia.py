@@ -22,5 +22,10 @@ def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -
 
 
 EFFECT = Load(
-    "counterweight_inertia", "counterweight about its own centre", Own, "output", force, needs=("operation.speed",)
+    "counterweight_inertia",
+    "counterweight about its own centre",
+    Own,
+    "output",
+    force,
+    needs=("operation.speed",),
 )

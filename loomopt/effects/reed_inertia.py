@@ -22,5 +22,11 @@ def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -
 
 
 EFFECT = Load(
-    "inertia", "reed system about the rocking shaft", Own, "output", force, reads=("s",), needs=("operation.speed",)
+    "inertia",
+    "reed system about the rocking shaft",
+    Own,
+    "output",
+    force,
+    reads=("s",),
+    needs=("operation.speed",),
 )

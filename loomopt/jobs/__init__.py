@@ -6,8 +6,8 @@ from typing import Any
 
 from loomopt import packaged
 from loomopt.jobs import beatup_tables
-from loomopt.scenes import Scene, build
 from loomopt.scene_document import read_document
+from loomopt.scenes import Scene, build
 from loomopt.schema import Job
 
 JOBS: dict[str, Job] = {job.name: job for job in (beatup_tables.SCHEMA,)}

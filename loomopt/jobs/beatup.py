@@ -42,7 +42,11 @@ class Beatup:
     def integrals(self) -> tuple[Integral, ...]:
         """The mean square of M3 over the pulse, where the cloth resists."""
         names = [load.name for load in self.loads]
-        return (Integral("pulse_mean_square", "pulse_rms", "M3_square", names.index("resistance")),) if "resistance" in names else ()
+        return (
+            (Integral("pulse_mean_square", "pulse_rms", "M3_square", names.index("resistance")),)
+            if "resistance" in names
+            else ()
+        )
 
     @property
     def quantities(self) -> tuple[str, ...]:

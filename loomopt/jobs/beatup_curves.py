@@ -40,7 +40,10 @@ def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
 def marks(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     """Return the crank angles a reader looks for, rad: both dead centres, and the pulse's ends where there is one."""
     values = sampler(scene, design).given.values
-    found = {"front dead centre": values["beta"] % TURN, "rear dead centre": (np.pi + values["beta_r"]) % TURN}
+    found = {
+        "front dead centre": values["beta"] % TURN,
+        "rear dead centre": (np.pi + values["beta_r"]) % TURN,
+    }
     if "resistance" in scene.effects:
         half = scene.effects["resistance"].pulse / 2
         found |= {"pulse begins": values["beta"] - half, "pulse ends": values["beta"] + half}

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup import ASSEMBLY, Beatup
@@ -192,7 +192,12 @@ def _starts(variables: Sequence[Variable], known: Mapping[str, float], retrofit:
     for v in variables:
         room = 0.01 * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
         first[v.name] = min(max(known.get(v.name, 0.0), v.lower + room), v.upper - room)
-    used = {v.name: v.range[0] + share * (v.range[1] - v.range[0]) for v in variables for share in (USED.get(v.name),) if share}
+    used = {
+        v.name: v.range[0] + share * (v.range[1] - v.range[0])
+        for v in variables
+        for share in (USED.get(v.name),)
+        if share
+    }
     return ({**first, **used}, first) if retrofit else ({**first, **used},)
 
 
@@ -209,7 +214,7 @@ def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
 
 def _figure_limits(name: str, limit: Any, sizes: _Sizes) -> list[Limit]:
     """Return the limits on one figure, row by row."""
-    family = "cycle" if name in CYCLE_FIGURES else "static"
+    family: Literal["static", "cycle"] = "cycle" if name in CYCLE_FIGURES else "static"
     scale = sizes.figure(name)
     if limit.min is not None and limit.min == limit.max:
         return [Limit(name, 0, name, limit.min, scale, "static")]
@@ -233,7 +238,8 @@ def _target_limits(scene: Any, target: str, sizes: _Sizes) -> list[Limit]:
 
 def _change_parameters(scene: Any, known: Mapping[str, float], limited: Mapping[str, Any]) -> dict[str, float]:
     """Return today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing."""
-    weights, found = scene.targets["retrofit"].weights, {}
+    weights = scene.targets["retrofit"].weights
+    found: dict[str, float] = {}
     for name in VARIABLES:
         width = limited[name][1] - limited[name][0]
         found |= {f"today.{name}": known[name], f"width.{name}": width or 1.0}

@@ -77,9 +77,7 @@ TARGETS = {
     target.name: target
     for target in (
         Target("balance", "reed torque zero at front dead centre, then least peak crank torque", TargetTable),
-        Target(
-            "pulse", "least reed torque over the whole pulse", TargetTable, needs_effects=("resistance",)
-        ),
+        Target("pulse", "least reed torque over the whole pulse", TargetTable, needs_effects=("resistance",)),
         Target("torque", "least peak crank torque, reed torque within a tolerance", TorqueTarget),
         Target("retrofit", "reed torque zero with the least change from today's machine", RetrofitTarget),
     )

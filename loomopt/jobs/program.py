@@ -38,6 +38,10 @@ class Model(Protocol):
         """The loads of the balance, in order."""
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """Whole-cycle quantities whose largest |value| is a figure."""
+
+    @property
     def integrals(self) -> tuple[Integral, ...]:
         """The means over part of the cycle this model knows."""
 
@@ -61,7 +65,7 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Variable:
-    """A design variable of the NLP, SI: its name among the model's values, bounds, scale, and range of random starts."""
+    """A design variable of the NLP, SI: name among the model's values, bounds, scale, range of random starts."""
 
     name: str
     lower: float

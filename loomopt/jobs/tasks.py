@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt.jobs import beatup_curves, beatup_design, beatup_program
 from loomopt.cycle import Floats
+from loomopt.jobs import beatup_curves, beatup_design, beatup_program
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
 
@@ -14,13 +14,14 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Task:
-    """A job at work. All numbers SI.
+    """A job at work; all numbers SI.
 
-    demand(scene, target): raises BadInput where the scene lacks what the target needs; program(scene, target): the
-    task as data; today(scene): today's design; design(program, x) and values(program, design): NLP variables to
-    design and back; tidy(program, x): x without what is only rounding; moves(program), wish(scene, move, x): the silent levels; figures(scene, design): every figure;
-    sampler(scene, design): the design's cycle; curves(scene, design): its curves by column; marks(scene, design): the
-    crank angles a reader looks for, rad.
+    demand(scene, target): raises BadInput where the scene lacks what the target needs.
+    program(scene, target): the task as data. today(scene): today's design.
+    design(program, x), values(program, design): NLP variables to design and back.
+    tidy(program, x): x without what is only rounding. moves(program), wish(scene, move, x): the silent levels.
+    figures(scene, design): every figure. sampler(scene, design): the design's cycle.
+    curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
     """
 
     demand: Callable[[Any, str], None]

@@ -1,0 +1,1 @@
+"""Geometry of the mechanisms: positions, derivatives, margins; no forces."""

@@ -1,0 +1,1 @@
+"""From programs to nonlinear programs: scaling, whole-cycle rows, starts; no physics."""

@@ -25,7 +25,7 @@ def _make(report: Callable[[int], None], variables: int, rows: int, parameters: 
 
     shapes = {"x": variables, "f": 1, "g": rows, "lam_x": variables, "lam_g": rows, "lam_p": parameters}
 
-    class Report(ca.Callback):  # type: ignore[misc]
+    class Report(ca.Callback):
         def __init__(self) -> None:
             super().__init__()
             self.count = 0

@@ -18,7 +18,7 @@ from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.transcribe import Transcription, families, transcribe
 
 ROUNDS = 16
-FIRST_SLOTS = 8
+FIRST_SLOTS, LEADING = 6, 4
 PENALTY = 10.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -67,7 +67,11 @@ def sampler_at(program: Program, x: Mapping[str, float]) -> Sampler | None:
 
 
 def solve(
-    program: Program, start: Mapping[str, float], settings: Settings, warm: Point | None = None, elastic: bool = False
+    program: Program,
+    start: Mapping[str, float],
+    settings: Settings,
+    warm: Point | None = None,
+    elastic: bool = False,
 ) -> Point:
     """Solve a program from a start (SI) or warm from a solved neighbour of the same structure."""
     run = _Run(program, settings, elastic)
@@ -108,7 +112,7 @@ class _Run:
             violation = self._extend(sampler, nodes, peaks, extra)
             if status not in SUCCESS or violation <= self.settings.accuracy / 100:
                 break
-        relaxed = self._relaxed(extra) if self.elastic else {}
+        relaxed = self._relaxed(extra) if self.elastic and extra is not None else {}
         kept = tuple(tuple(chosen) for chosen in nodes)
         return Point(x, status, self.iterations, kept, violation, raw, self.built, relaxed)
 
@@ -192,7 +196,10 @@ class _Run:
         soft = [k for k, limit in enumerate(self.program.limits) if limit.relaxable]
         for chosen, found, family in zip(nodes, peaks, self.families, strict=True):
             if family.objective >= 0:
-                scale, bound = self.program.objectives[family.objective].scale, extra[epigraphs.index(family.objective)]
+                scale, bound = (
+                    self.program.objectives[family.objective].scale,
+                    extra[epigraphs.index(family.objective)],
+                )
             else:
                 limit = self.program.limits[family.limit]
                 scale, bound = limit.scale, limit.value / limit.scale
@@ -207,13 +214,16 @@ class _Run:
     def _relaxed(self, extra: Floats) -> dict[int, float]:
         """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
         soft = [k for k, limit in enumerate(self.program.limits) if limit.relaxable]
-        needs = {k: extra[2 * place] - extra[2 * place + 1] * (self.program.limits[k].sign == 0) for place, k in enumerate(soft)}
+        needs = {
+            k: extra[2 * place] - extra[2 * place + 1] * (self.program.limits[k].sign == 0)
+            for place, k in enumerate(soft)
+        }
         return {k: float(need * self.program.limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
 
 
 def _leading(found: list[Extreme]) -> list[Extreme]:
     """Return the extremes worth starting with."""
-    return found[:FIRST_SLOTS // 2]
+    return found[:LEADING]
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

@@ -99,11 +99,17 @@ class Transcription:
         self.integrals = _wanted_integrals(program)
         self.quadrature = {i.name: len(sampler.quadrature(i)[0]) for i in self.integrals}
         self.layout = self._layout()
+        self._quantities: dict[str, tuple[Any, list[str]]] = {}
         scaled = ca.SX.sym("x", len(program.variables))
         extra = ca.SX.sym("t", len(self.soft) * 2 if elastic else len(self.epigraphs))
         self.parameters = ca.SX.sym("p", self.layout.size)
         objective, rows = self._expressions(ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(self.parameters))
-        self.nlp = {"x": ca.vertcat(scaled, extra), "p": self.parameters, "f": objective, "g": ca.vertcat(*rows)}
+        self.nlp = {
+            "x": ca.vertcat(scaled, extra),
+            "p": self.parameters,
+            "f": objective,
+            "g": ca.vertcat(*rows),
+        }
         self.extras = extra.numel()
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
@@ -114,7 +120,11 @@ class Transcription:
 
         name = (warm, callback)
         if name not in self._solvers:
-            options: dict[str, Any] = {"ipopt": IPOPT | (WARM if warm else {}), "print_time": False, "calc_lam_p": False}
+            options: dict[str, Any] = {
+                "ipopt": IPOPT | (WARM if warm else {}),
+                "print_time": False,
+                "calc_lam_p": False,
+            }
             options["error_on_fail"] = False
             if callback is not None:
                 sizes = (self.nlp["x"].numel(), self.nlp["g"].numel(), self.layout.size)
@@ -193,8 +203,32 @@ class Transcription:
 
     def _at(self, given: Given, corners: list[Any], name: str, node: Sequence[Any]) -> Any:
         """Return a whole-cycle quantity at a node of parameters."""
+        import casadi as ca
+
+        if name not in self._quantities:
+            self._quantities[name] = self._quantity(name)
+        function, inputs = self._quantities[name]
         angle = node_angle(node[0], node[1 : 1 + self.corners], corners)
-        return self.program.model.quantity(maths.casadi(), given, name, angle, node[1 + 2 * self.corners :])
+        arguments = [given.values[key] for key in inputs]
+        return function(ca.vertcat(*arguments), angle, ca.vertcat(*node[1 + 2 * self.corners :]))
+
+    def _quantity(self, name: str) -> tuple[Any, list[str]]:
+        """Return a quantity as a function of the scene's numbers, angle and switches: traced once, not per node.
+
+        Numbers that follow from others at once (the corners' angles among them) are inputs too, so that each node
+        shares them.
+        """
+        import casadi as ca
+
+        names = [*self.program.parameters, *(v.name for v in self.program.variables)]
+        symbols = {key: ca.SX.sym(key) for key in names}
+        given = self.program.model.given(maths.casadi(), symbols)
+        derived = {key: ca.SX.sym(key) for key, value in given.values.items() if isinstance(value, ca.SX)}
+        inputs = {**derived, **symbols}
+        angle, switches = ca.SX.sym("phi"), ca.SX.sym("switch", self.loads)
+        values = Given({**given.values, **inputs}, given.own)
+        value = self.program.model.quantity(maths.casadi(), values, name, angle, ca.vertsplit(switches))
+        return ca.Function(name, [ca.vertcat(*inputs.values()), angle, switches], [value]), list(inputs)
 
     def _mean(self, given: Given, corners: list[Any], integral: Any, vector: list[Any]) -> Any:
         """Return an integral's mean by its Gauss rule."""
@@ -213,7 +247,9 @@ class Transcription:
         switches = sampler.cycle.switches[piece]
         return [weight * (end - start), offset, *coefficients, *(weight * (at_end - at_start)), *switches]
 
-    def vector(self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[list[Extreme]]) -> Floats:
+    def vector(
+        self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[list[Extreme]]
+    ) -> Floats:
         """Return the parameter vector for a program's numbers and the nodes of each family."""
         p, write = np.zeros(self.layout.size), self.layout.write
         write(p, "values", list(program.parameters.values()))

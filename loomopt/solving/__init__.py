@@ -1,0 +1,1 @@
+"""Answers: certified, explained, or honestly refused."""

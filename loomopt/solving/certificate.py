@@ -114,7 +114,8 @@ class _Trial:
         top = abs(found[0].value)
         touching = [e for e in found if abs(e.value) >= top - ACTIVE * objective.scale]
         return [
-            Row(objective.figure, objective.scale, float(np.sign(e.value)), objective=objective, node=e) for e in touching
+            Row(objective.figure, objective.scale, float(np.sign(e.value)), objective=objective, node=e)
+            for e in touching
         ]
 
     def verdict(self) -> Certificate:
@@ -138,7 +139,14 @@ class _Trial:
         if not self.minimum:
             reasons.append("second order fails: along some direction the objective falls (a saddle or a maximum)")
         return Certificate(
-            not reasons, tuple(reasons), tuple(levels), feasibility, violation, self.minimum, self.unique, self._binding()
+            not reasons,
+            tuple(reasons),
+            tuple(levels),
+            feasibility,
+            violation,
+            self.minimum,
+            self.unique,
+            self._binding(),
         )
 
     def _between_points(self) -> float:

@@ -1,27 +1,18 @@
 """When nothing is admissible: which limits clash, and the least relaxations that help."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from loomopt.jobs.program import Limit, Program
 from loomopt.nlp import exchange
 from loomopt.nlp.exchange import Point, Settings
-from loomopt.solving.solution import Relaxation
+from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
 
 PRICED = 1e-6
 """Multipliers above this belong to the clash."""
 NEEDED = 1e-7
 """Excess, in natural sizes, below which a set of limits is admissible after all."""
-
-
-@dataclass(frozen=True)
-class Clash:
-    """Why nothing is admissible: the limits that clash, the relaxations that help, and where they lead (SI)."""
-
-    limits: tuple[str, ...] = ()
-    relaxations: tuple[Relaxation, ...] = ()
-    x: Mapping[str, float] = field(default_factory=dict)
 
 
 def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Settings, words: Words) -> Clash:

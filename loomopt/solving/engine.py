@@ -14,7 +14,6 @@ from loomopt.nlp import exchange
 from loomopt.nlp.exchange import Point, Settings
 from loomopt.solving import report
 from loomopt.solving.certificate import Certificate, certify
-from loomopt.solving.elastic import clash
 from loomopt.solving.settle import settle
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -90,7 +89,10 @@ def _check_numbers(accuracy: float, starts: int) -> None:
     """Raise BadInput for settings outside what can be kept."""
     if not TIGHTEST <= accuracy <= 0.1:
         raise BadInput(
-            "the accuracy is out of range", key="--accuracy", value=f"{accuracy:g}", allowed=f"{TIGHTEST:g} to 0.1"
+            "the accuracy is out of range",
+            key="--accuracy",
+            value=f"{accuracy:g}",
+            allowed=f"{TIGHTEST:g} to 0.1",
         )
     if not 1 <= starts <= 10_000:
         raise BadInput("the number of starts is out of range", key="--starts", value=str(starts), allowed="1 to 10000")
@@ -171,8 +173,11 @@ class _Search:
         """Run the silent levels and the certificate."""
         began = time.perf_counter()
         task, program = self.task, self.program
-        x, settled, flat = settle(
-            program, task.tidy(program, point.x), task.moves(program), lambda move, at: task.wish(self.scene, move, at)
+        x, settled = settle(
+            program,
+            task.tidy(program, point.x),
+            task.moves(program),
+            lambda move, at: task.wish(self.scene, move, at),
         )
         self.x = x
         exact = task.values(program, task.design(program, x))
@@ -198,6 +203,8 @@ class _Search:
         before = report.evaluation(scene, task, program, task.today(scene))
         if self.best is None:
             tried = exchange.starts(program, MORE_STARTS, self.seed)
+            from loomopt.solving.elastic import clash
+
             found = clash(program, tried, self.settings, Words(scene))
             if self.points:
                 solver["status"] = self.points[0].status
@@ -206,7 +213,11 @@ class _Search:
             here = report.evaluation(scene, task, program, design)
             return report.without_optimum(scene, target, here, found, solver, before)
         same = [p for p in self.points if p.succeeded and self._compare(p, self.best) == 0]
-        solver |= {"status": self.best.status, "iterations": self.best.iterations, "starts_at_best": len(same)}
+        solver |= {
+            "status": self.best.status,
+            "iterations": self.best.iterations,
+            "starts_at_best": len(same),
+        }
         here = report.evaluation(scene, task, program, task.design(program, self.x))
         assert self.certificate is not None
         answer = report.with_optimum(scene, program, target, here, self.certificate, solver, before)

@@ -174,4 +174,3 @@ class Exact:
         moved = [self._given(self._along(direction, step)) for direction in directions]
         slopes = [(value(given, u + step) - value(given, u - step)) / (2 * step) for given in moved]
         return np.array([float((after - slope) / step) for after in slopes]), float(bend)
-

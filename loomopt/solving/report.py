@@ -6,8 +6,7 @@ from typing import Any
 from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import Task
 from loomopt.solving.certificate import FEASIBILITY, Certificate
-from loomopt.solving.elastic import Clash
-from loomopt.solving.solution import ADVICE, Evaluation, Finding, Price, Solution
+from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
 from loomopt.solving.words import Words
 
 
@@ -28,9 +27,7 @@ def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, fl
     )
 
 
-def _findings(
-    program: Program, values: Mapping[str, float | None], design: Mapping[str, float]
-) -> tuple[Finding, ...]:
+def _findings(program: Program, values: Mapping[str, float | None], design: Mapping[str, float]) -> tuple[Finding, ...]:
     """Return every limit beside its value; held to 1e-9 of its natural size."""
     sides: dict[str, dict[int, float]] = {}
     sizes: dict[str, float] = {}

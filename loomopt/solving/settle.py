@@ -19,20 +19,22 @@ NODES = 64
 
 
 def settle(
-    program: Program, x: Mapping[str, float], moves: tuple[Move, ...], wish: Callable[[Move, Mapping[str, float]], Wish | None]
-) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
-    """Return x (SI) after the silent levels, what they settled, and the names of all flat moves found."""
-    settled, flat = [], []
+    program: Program,
+    x: Mapping[str, float],
+    moves: tuple[Move, ...],
+    wish: Callable[[Move, Mapping[str, float]], Wish | None],
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return x (SI) after the silent levels, and what they settled."""
+    settled = []
     for move in moves:
         wanted = wish(move, x)
         if wanted is None or not _flat(program, x, wanted.goal):
             continue
-        flat.append(move.name)
         share = _reach(program, x, wanted.goal)
         if share > 0.0 and any(abs(wanted.goal[name] - x[name]) > SLACK for name in wanted.goal):
             x = _part_way(x, wanted.goal, share)
             settled.append(f"{move.name}: {wanted.reason}")
-    return dict(x), tuple(settled), tuple(flat)
+    return dict(x), tuple(settled)
 
 
 def _part_way(x: Mapping[str, float], goal: Mapping[str, float], share: float) -> dict[str, float]:

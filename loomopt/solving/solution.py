@@ -61,6 +61,15 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
+class Clash:
+    """Why nothing is admissible: the limits that clash, the relaxations that help, and where they lead (SI)."""
+
+    limits: tuple[str, ...] = ()
+    relaxations: tuple[Relaxation, ...] = ()
+    x: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """A given design: its figures and limits, SI and rad."""
 
@@ -112,7 +121,12 @@ class Solution(Evaluation):
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""
         base = super().as_dict()
-        head = {"problem": self.problem, "target": self.target, "status": self.status, "message": self.message}
+        head = {
+            "problem": self.problem,
+            "target": self.target,
+            "status": self.status,
+            "message": self.message,
+        }
         tail: dict[str, Any] = {
             "binding": [
                 {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}

@@ -65,7 +65,7 @@ def reference(found: Solution, scene: Any) -> "pd.DataFrame":
         columns["objectives"] = " | ".join(level.objective for level in found.certificate.levels)
         columns["unique"] = found.certificate.unique
     frame = pd.DataFrame([columns])
-    frame.attrs = tables.provenance(scene, target=found.target, accuracy=engine.ACCURACY)
+    frame.attrs.update(tables.provenance(scene, target=found.target, accuracy=engine.ACCURACY))
     return frame
 
 

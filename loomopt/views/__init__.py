@@ -1,0 +1,1 @@
+"""Tables, drawings and figures for people; they read, they never solve."""

@@ -30,9 +30,7 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
         placing.Wish(*label.near, label.side, size.right - size.left, size.top - size.bottom)
         for label, size in zip(labels, sizes, strict=True)
     ]
-    boxes = placing.place(
-        wishes, np.concatenate([shapes.marks(stroke, height) for stroke in strokes]), height
-    )
+    boxes = placing.place(wishes, np.concatenate([shapes.marks(stroke, height) for stroke in strokes]), height)
     return [
         Text(label.layer, Point((box.left + box.right) / 2, (box.bottom + box.top) / 2), label.text)
         for label, box in zip(labels, boxes, strict=True)

@@ -60,9 +60,7 @@ def terms(model: Beatup) -> dict[str, Expression]:
 def _geometry() -> list[Equation]:
     """Close the loop A B C D, and differentiate it once and twice: equations linear in the rates."""
     sp = _sympy()
-    l1, l2, l3, l4, phi, gamma, psi = (
-        _symbol(name) for name in ("l1", "l2", "l3", "l4", "phi", "gamma", "psi")
-    )
+    l1, l2, l3, l4, phi, gamma, psi = (_symbol(name) for name in ("l1", "l2", "l3", "l4", "phi", "gamma", "psi"))
     sides = (
         (l1 * sp.cos(phi) + l2 * sp.cos(gamma), l4 + l3 * sp.cos(psi)),
         (l1 * sp.sin(phi) + l2 * sp.sin(gamma), l3 * sp.sin(psi)),
@@ -77,11 +75,7 @@ def _geometry() -> list[Equation]:
         for left, right in sides:
             loop = (left - right).subs({angle: function for function, angle, _, _ in moving}).diff(phi, order)
             for function, angle, rate, rate_2 in moving:
-                loop = (
-                    loop.subs(function.diff(phi, 2), rate_2)
-                    .subs(function.diff(phi), rate)
-                    .subs(function, angle)
-                )
+                loop = loop.subs(function.diff(phi, 2), rate_2).subs(function.diff(phi), rate).subs(function, angle)
             matrix, rest = sp.linear_eq_to_matrix([loop], unknowns)
             found.append(_equation(name, (matrix * sp.Matrix(unknowns))[0], rest[0]))
     return found
@@ -161,8 +155,7 @@ def _given(model: Beatup) -> balance.Given:
     words = {(effect, key): word for effect, key, word in model.options}
     own: dict[str, Values] = {
         effect.name: {
-            key: words.get((effect.name, key), _symbol(_OWN_NAMES.get(key, key)))
-            for key in effect.own.model_fields
+            key: words.get((effect.name, key), _symbol(_OWN_NAMES.get(key, key))) for key in effect.own.model_fields
         }
         for effect in model.loads + model.checks
     }
@@ -191,9 +184,7 @@ def _term_equation(load: Load, pieces: Sequence[Piece]) -> Equation:
     if len(pieces) == 1:
         return _equation(load.name, symbol, last)
     cases = [f"{_text(term)} for {_text(a)} <= {_text(phi)} <= {_text(b)}" for term, (a, b) in pieces[:-1]]
-    rows = [
-        rf"{_latex(term)} & {_latex(a)} \le {_latex(phi)} \le {_latex(b)}" for term, (a, b) in pieces[:-1]
-    ]
+    rows = [rf"{_latex(term)} & {_latex(a)} \le {_latex(phi)} \le {_latex(b)}" for term, (a, b) in pieces[:-1]]
     choice = r" \\ ".join([*rows, rf"{_latex(last)} & \text{{else}}"])
     latex = rf"{_latex(symbol)} = \begin{{cases}} {choice} \end{{cases}}"
     return Equation(load.name, f"{_text(symbol)} = {', '.join(cases)}, else {_text(last)}", latex)

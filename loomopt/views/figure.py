@@ -73,9 +73,7 @@ def curves(frame: "pd.DataFrame", path: Path, title: str, marks: Mapping[str, fl
     store.suffix(path, SUFFIXES)
     columns = [name for name in frame.columns if _COLUMN.fullmatch(name) and name != "phi [rad]"]
     if not columns or "phi [rad]" not in frame:
-        raise ValueError(
-            "a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`"
-        )
+        raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
     wide = 1 if len(columns) <= 4 else 2
     rows = math.ceil(len(columns) / wide)
     angle = np.degrees(frame["phi [rad]"].to_numpy(dtype=float))

@@ -12,9 +12,7 @@ def answer(solution: Solution, scene: Any) -> str:
     """Return an answer as HTML: what was found, design beside today, what binds, the mechanism."""
     head = f"<p><b>{escape(solution.problem)}, {escape(solution.target)}: {escape(solution.status)}.</b> "
     text = f"{head}{escape(solution.message)}</p>"
-    table = tables.answer(solution, scene).to_html(
-        float_format=lambda value: f"{value:.6g}", na_rep="", border=0
-    )
+    table = tables.answer(solution, scene).to_html(float_format=lambda value: f"{value:.6g}", na_rep="", border=0)
     binding = "".join(
         f"<li>{escape(price.text)}: {escape(next(iter(price.worth)))} {escape(price.reading)}</li>"
         for price in solution.binding

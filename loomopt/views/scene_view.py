@@ -69,7 +69,9 @@ def curves(scene: Any, design: Mapping[str, float]) -> Any:
     columns = task.curves(scene, full)
     angle = np.degrees(columns.pop("phi [rad]"))
     marks = [np.degrees(value) for name, value in task.marks(scene, full).items() if "dead" in name]
-    shown = [k for k, a in enumerate(angle) if abs(a / 15 - round(a / 15)) < 1e-9 or min(abs(a - m) for m in marks) < 1e-9]
+    shown = [
+        k for k, a in enumerate(angle) if abs(a / 15 - round(a / 15)) < 1e-9 or min(abs(a - m) for m in marks) < 1e-9
+    ]
     names = [name if "rad" not in name else name.replace("rad", "deg") for name in columns]
     values = [np.degrees(v) if "rad" in name else v for name, v in columns.items()]
     lines = [(f"{angle[k]:.3f}", *(f"{column[k]:.5g}" for column in values)) for k in shown]

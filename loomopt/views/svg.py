@@ -63,9 +63,7 @@ def _style(name: str, text_height: float) -> dict[str, str]:
         "stroke-width": _number(layer.width * unit),
     }
     style |= {"stroke-linecap": "round", "stroke-linejoin": "round"}
-    return style | (
-        {"stroke-dasharray": f"{_number(DASH * unit)} {_number(GAP * unit)}"} if layer.dashed else {}
-    )
+    return style | ({"stroke-dasharray": f"{_number(DASH * unit)} {_number(GAP * unit)}"} if layer.dashed else {})
 
 
 def _append(group: ElementTree.Element, primitive: Primitive, text_height: float) -> None:

@@ -17,9 +17,7 @@ NEGLIGIBLE = 1e-9
 """Shown as 0 when below this share of the column's largest neighbour."""
 
 
-def grid(
-    title: str, columns: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[int] = ()
-) -> Table:
+def grid(title: str, columns: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> Table:
     """Return a plain table; right: places of right-aligned columns."""
     table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     for place, column in enumerate(columns):
@@ -103,8 +101,8 @@ def certificate_line(answer: Solution) -> str:
     settled = f" Settled: {'; '.join(found.settled)}." if found.settled else ""
     unique = "unique" if found.unique else "not unique before the silent rules"
     return (
-        f"Certificate: passed - limits held to {max(found.feasibility, 1e-16):.0e}, stationarity {worst:.0e}, whole cycle "
-        f"within {max(found.violation, 1e-16):.0e}, a minimum, {unique}.{settled}"
+        f"Certificate: passed - limits held to {max(found.feasibility, 1e-16):.0e}, stationarity {worst:.0e}, "
+        f"whole cycle within {max(found.violation, 1e-16):.0e}, a minimum, {unique}.{settled}"
     )
 
 

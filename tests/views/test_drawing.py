@@ -47,9 +47,7 @@ def test_links_are_drawn_at_full_scale_and_meet(layer, design):
     crank, rod, rocker = links(drawing.linkage(design, ""), layer)
     scale = 1e3 * design["l4"]
     lengths = [math.dist(*link) for link in (crank, rod, rocker)]
-    assert lengths == pytest.approx(
-        [1e3 * design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * scale
-    )
+    assert lengths == pytest.approx([1e3 * design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * scale)
     assert crank[0] == rod[0]
     assert rod[1] == rocker[1]
     assert crank[1] == (0, 0)
@@ -101,9 +99,7 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
 @few
 @given(design=designs())
 def test_no_two_texts_overlap(design):
-    drawn = drawing.linkage(
-        design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
-    )
+    drawn = drawing.linkage(design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines")
     boxes = [shapes.text_box(text, drawn.height) for text in texts(drawn)]
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
 

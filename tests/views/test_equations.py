@@ -58,8 +58,7 @@ def numbers(given, pose, phi):
     named |= {"beta_r": given.values["beta_r"], "l2_today": NUMBERS["today.l2"]} | NUMBERS
     for own in OWN.values():
         named |= {
-            {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v
-            for k, v in own.items()
+            {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v for k, v in own.items()
         }
     return named
 
@@ -72,9 +71,7 @@ def value(expression, named):
 def setting(found, phi):
     """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
     values = NUMBERS | {f"{name}.{key}": number for name, own in OWN.items() for key, number in own.items()}
-    given = found.given(
-        FLOAT, {k: v for k, v in values.items() if "." not in k or k.split(".")[0] in (*OWN, "today")}
-    )
+    given = found.given(FLOAT, {k: v for k, v in values.items() if "." not in k or k.split(".")[0] in (*OWN, "today")})
     split = cycle.split(found.loads, found.corners(FLOAT, given))
     turned = split.starts[0] + (phi - split.starts[0]) % cycle.TURN
     switches = split.switches[np.searchsorted(split.starts, turned, side="right") - 1]
@@ -183,12 +180,8 @@ def test_balance_and_crank_torque_list_what_is_on(names, lines):
 
 
 def test_a_term_with_corners_says_where_each_formula_holds():
-    shown = {
-        equation.name: equation for equation in equations.equations(model("resistance", "bearing_friction"))
-    }
-    pulse = (
-        "M_resistance = M0*cos(pi*(-beta + phi)/delta) for beta - delta/2 <= phi <= beta + delta/2, else 0"
-    )
+    shown = {equation.name: equation for equation in equations.equations(model("resistance", "bearing_friction"))}
+    pulse = "M_resistance = M0*cos(pi*(-beta + phi)/delta) for beta - delta/2 <= phi <= beta + delta/2, else 0"
     assert shown["resistance"].text == pulse
     assert r"\begin{cases}" in shown["resistance"].latex
     assert "for beta <= phi <= beta_r + pi, else T_c" in shown["bearing_friction"].text

@@ -44,9 +44,7 @@ def test_a_drawing_as_svg_is_the_one_at_full_scale(tmp_path):
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
-    figure.draw(
-        drawing.linkage({name: size * value for name, value in PAPER.items()}, "t"), tmp_path / "a.png"
-    )
+    figure.draw(drawing.linkage({name: size * value for name, value in PAPER.items()}, "t"), tmp_path / "a.png")
     image = matplotlib.image.imread(tmp_path / "a.png")
     assert max(image.shape[:2]) == pytest.approx(1417, abs=2)
     assert image[..., :3].min() < 0.3

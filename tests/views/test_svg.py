@@ -73,9 +73,7 @@ def test_a_sheet_lies_under_the_drawing_and_every_colour_is_legible_on_it(root):
     for style in LAYERS.values():
         channels = [int(style.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
         linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
-        luminance = sum(
-            weight * value for weight, value in zip((0.2126, 0.7152, 0.0722), linear, strict=True)
-        )
+        luminance = sum(weight * value for weight, value in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
         assert 1.05 / (luminance + 0.05) >= 4.5
 
 
