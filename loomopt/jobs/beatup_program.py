@@ -38,7 +38,7 @@ def model(scene: Any) -> Beatup:
 
 
 def numbers(scene: Any) -> dict[str, float]:
-    """Return every number of the scene by name, SI; an effect's own as `effect.key`, today's lengths also as today.*."""
+    """Return every number of the scene by name, SI; an effect's as `effect.key`, today's lengths also as today.*."""
     found: dict[str, float] = {**scene.mechanism, **scene.operation}
     found |= {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
     for effect, own in scene.effects.items():
@@ -59,7 +59,7 @@ def today(scene: Any) -> dict[str, float]:
 
 
 def bounds(scene: Any) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of every number that is bounded, by its full name, SI; held ones at today's value."""
+    """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
     known = numbers(scene)
     found = {name: (known[name], known[name]) for name in VARIABLES}
     for name, bound in scene.bounds.items():

@@ -19,7 +19,7 @@ class Operation(Table):
 
 
 class Mechanism(Table):
-    """Today's machine: link lengths, m; counterweight m4e, kg, at radius r4e, m; reed system m4, kg, centre at r4, m."""
+    """Today's machine: links, m; counterweight m4e, kg, at radius r4e, m; reed system m4, kg, centre at r4, m."""
 
     l1: PositiveLength
     l2: PositiveLength
