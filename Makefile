@@ -25,6 +25,7 @@ benchmark: .venv/installed-test
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install -q -e .
+	$(BIN)/python -m compileall -q loomopt
 	touch $@
 
 .venv/installed-test: .venv/installed

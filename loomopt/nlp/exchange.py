@@ -15,10 +15,13 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.nlp.polish import polished
 from loomopt.nlp.transcribe import Transcription, families, transcribe
 
 ROUNDS = 16
 FIRST_SLOTS, LEADING = 6, 4
+SAME_EXTREME = 1e-3
+"""Nodes of one piece this close in u stand for one extreme."""
 PENALTY = 10.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -102,9 +105,13 @@ class _Run:
                 slots *= 2
             began = time.perf_counter()
             nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
-            nlp.solver(bool(raw), self.settings.callback)
+            warmed = bool(raw)
+            nlp.solver(warmed, self.settings.callback)
             self.built += time.perf_counter() - began if fresh else 0.0
-            status, x, extra, raw = self._solve(nlp, sampler, x, extra, peaks, nodes, raw)
+            before = x
+            status, x, extra, raw = self._solve(nlp, sampler, before, extra, peaks, nodes, raw)
+            if status not in SUCCESS and warmed:
+                status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
             sampler = sampler_at(self.program, x)
             if sampler is None:
                 return Point(x, "Invalid_Number_Detected", self.iterations)
@@ -158,11 +165,13 @@ class _Run:
         if status in {"NonIpopt_Exception_Thrown", "User_Requested_Stop"}:
             raise KeyboardInterrupt
         self.iterations += int(stats.get("iter_count", 0))
+        keep = {"lam_x": np.asarray(answer["lam_x"]).ravel(), "lam_g": np.asarray(answer["lam_g"]).ravel()}
         flat = np.asarray(answer["x"]).ravel()
+        if status in SUCCESS:
+            flat = polished(nlp.jacobian, arguments, flat, **keep)
         found = {v.name: float(value * v.scale) for v, value in zip(variables, flat, strict=False)}
         if not self.elastic:
             found = {v.name: min(max(found[v.name], v.lower), v.upper) for v in variables}
-        keep = {"lam_x": np.asarray(answer["lam_x"]).ravel(), "lam_g": np.asarray(answer["lam_g"]).ravel()}
         keep["extra"] = flat[len(variables) :]
         return status, found, keep["extra"], keep
 
@@ -208,7 +217,7 @@ class _Run:
                 excess = abs(extreme.value) / scale - bound
                 worst = max(worst, excess)
                 if excess > self.settings.accuracy / 100:
-                    chosen.append(extreme)
+                    _add(chosen, extreme)
         return worst
 
     def _relaxed(self, extra: Floats) -> dict[int, float]:
@@ -219,6 +228,16 @@ class _Run:
             for place, k in enumerate(soft)
         }
         return {k: float(need * self.program.limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
+
+
+def _add(chosen: list[Extreme], extreme: Extreme) -> None:
+    """Add an extreme, or move the node that was meant for it: two nodes on one extreme are one row too many."""
+    for place, node in enumerate(chosen):
+        same = node.piece == extreme.piece and np.sign(node.value) == np.sign(extreme.value)
+        if same and abs(node.u - extreme.u) <= SAME_EXTREME:
+            chosen[place] = extreme
+            return
+    chosen.append(extreme)
 
 
 def _leading(found: list[Extreme]) -> list[Extreme]:

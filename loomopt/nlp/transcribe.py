@@ -138,6 +138,11 @@ class Transcription:
             self._solvers[name] = solver
         return self._solvers[name]
 
+    @property
+    def jacobian(self) -> Any:
+        """Rows and their derivatives, as the solver computes them: (x, p) → (g, dg/dx)."""
+        return self._derivatives["jac_g"]
+
     def _is_row(self, limit: Any) -> bool:
         return limit.family == "static" or (self.elastic and limit.family == "variable")
 
