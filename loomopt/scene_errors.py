@@ -10,7 +10,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from loomopt.errors import BadInput
-from loomopt.quantities import QuantityError, described, quantity_of
+from loomopt.quantities import described, quantity_of
+from loomopt.units import QuantityError
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 1000
 _NOTHING = object()

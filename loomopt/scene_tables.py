@@ -6,9 +6,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
-from loomopt.quantities import Quantity, QuantityError, quantity_of, unit_of
+from loomopt.quantities import Quantity, quantity_of, unit_of
 from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
 from loomopt.schema import Check, Job, Table
+from loomopt.units import QuantityError
 
 _Model = TypeVar("_Model", bound=Table)
 

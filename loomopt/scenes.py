@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt import scene_tables as read
-from loomopt.quantities import DISPLAY_UNIT, fits, unit_of
+from loomopt.quantities import unit_of
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Job, Table
+from loomopt.units import DISPLAY_UNIT, fits
 
 TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "targets")
 

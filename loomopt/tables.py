@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs.tasks import TASKS
-from loomopt.quantities import factor
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
+from loomopt.units import factor
 
 if TYPE_CHECKING:
     import pandas as pd

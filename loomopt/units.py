@@ -1,0 +1,192 @@
+"""Units: what each is in SI, exactly, and how an expression of units is read.
+
+Factors are exact fractions. Angle is a dimension of its own, so that rpm and Hz cannot be mistaken for each other.
+"""
+
+import difflib
+import functools
+import math
+import re
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+
+class QuantityError(ValueError):
+    """Text that is not the quantity asked for: problem, what is allowed, remedy; each in plain words."""
+
+    def __init__(self, problem: str, allowed: str, remedy: str) -> None:
+        super().__init__(problem)
+        self.problem, self.allowed, self.remedy = problem, allowed, remedy
+
+
+class Unit(NamedTuple):
+    """A unit: its size in SI units; its powers of m, kg, s, rad."""
+
+    factor: Fraction
+    powers: tuple[int, int, int, int]
+
+
+_PI = Fraction("3.14159265358979323846264338327950288419716939937511")
+_INCH, _POUND, _GRAVITY = Fraction("0.0254"), Fraction("0.45359237"), Fraction("9.80665")
+_PSI = _POUND * _GRAVITY / _INCH**2
+
+_TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] = (
+    ((1, 0, 0, 0), {"m": "1", "mm": "1e-3", "cm": "1e-2", "dm": "0.1", "km": "1000", "um": "1e-6"}),
+    ((1, 0, 0, 0), {"in": _INCH, "inch": _INCH, "ft": 12 * _INCH}),
+    ((0, 1, 0, 0), {"kg": "1", "g": "1e-3", "mg": "1e-6", "t": "1000", "lb": _POUND}),
+    ((0, 0, 1, 0), {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60", "h": "3600"}),
+    ((0, 0, 0, 1), {"rad": "1", "mrad": "1e-3", "deg": _PI / 180, "turn": 2 * _PI}),
+    ((0, 0, -1, 1), {"rpm": _PI / 30}),
+    ((0, 0, -1, 0), {"Hz": "1"}),
+    ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
+    ((-1, 1, -2, 0), {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "bar": "1e5", "psi": _PSI}),
+)
+UNITS = {name: Unit(Fraction(factor), powers) for powers, names in _TABLE for name, factor in names.items()}
+"""Common units by name; any other is looked up in pint, which is imported only then."""
+
+SI_UNIT: dict[str, str] = {
+    "length": "m",
+    "angle": "rad",
+    "mass": "kg",
+    "time": "s",
+    "force": "N",
+    "torque": "N*m",
+    "inertia": "kg*m^2",
+    "angular speed": "rad/s",
+    "angular acceleration": "rad/s^2",
+    "stiffness": "N/m",
+    "rotary stiffness": "N*m/rad",
+    "damping": "N*s/m",
+    "rotary damping": "N*m*s/rad",
+    "number": "1",
+    "pressure": "Pa",
+    "density": "kg/m^3",
+}
+"""Kind of quantity → the SI unit its numbers have inside the program."""
+
+DISPLAY_UNIT = SI_UNIT | {"length": "mm", "angle": "deg", "angular speed": "rpm", "pressure": "MPa"}
+"""Kind of quantity → the unit it is shown in where a scene writes none."""
+
+_LARGEST_EXPONENT = 4
+_TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
+_SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
+"""What pint would take for a yarn count, a plural or a gon → what is meant."""
+_LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg"})
+
+
+def factor(unit_text: str) -> float:
+    """Return how many SI units one `unit_text` is. Raises QuantityError for an unknown unit."""
+    return float(parse_unit(unit_text).factor)
+
+
+def show(value: float, unit_text: str, digits: int = 6) -> str:
+    """Return an SI value as text in `unit_text`, such as "30 mm"; digits: significant digits."""
+    number = f"{value / factor(unit_text) + 0.0:.{digits}g}"
+    return number if unit_text == "1" else f"{number} {unit_text}"
+
+
+def fits(unit_text: str, kind: str) -> bool:
+    """Say whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
+    *mechanical, angle = parse_unit(unit_text).powers
+    *asked, asked_angle = parse_unit(SI_UNIT[kind]).powers
+    return mechanical == asked and (angle == asked_angle or angle == 0 > asked_angle)
+
+
+@functools.lru_cache(maxsize=512)
+def parse_unit(text: str) -> Unit:
+    """Return the unit that an expression gives: names joined by * or /, powers ^ or ** up to 4, parentheses.
+
+    Raises QuantityError for an unknown unit and for anything else, a space or arithmetic included.
+    """
+    if text == "1":
+        return Unit(Fraction(1), (0, 0, 0, 0))
+    plain = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
+    tokens = _TOKEN.findall(plain)
+    reciprocal = tokens[:2] == ["1", "/"]
+    if reciprocal:
+        tokens[:2] = []
+    unit = _product(tokens, text)
+    if tokens:
+        raise _unit_error(text)
+    return _times(parse_unit("1"), unit, -1) if reciprocal else unit
+
+
+def _product(tokens: list[str], text: str) -> Unit:
+    """Take a product from the front of `tokens`; text: the whole unit, for messages."""
+    unit = _operand(tokens, text)
+    while tokens and tokens[0] in ("*", "/"):
+        sign = 1 if tokens.pop(0) == "*" else -1
+        unit = _times(unit, _operand(tokens, text), sign)
+    return unit
+
+
+def _operand(tokens: list[str], text: str) -> Unit:
+    """Take a name with its power, or a parenthesis, from the front of `tokens`."""
+    token = tokens.pop(0) if tokens else ""
+    if token == "(":
+        unit = _product(tokens, text)
+        if not tokens or tokens.pop(0) != ")":
+            raise _unit_error(text)
+        return unit
+    if not token.isalpha():
+        raise _unit_error(text)
+    unit = UNITS.get(token) or _from_pint(token)
+    if not tokens or tokens[0] not in ("^", "**"):
+        return unit
+    del tokens[0]
+    exponent = tokens.pop(0) if tokens else ""
+    if not re.fullmatch(r"[+-]?[0-9]+", exponent) or abs(int(exponent)) > _LARGEST_EXPONENT:
+        raise _unit_error(text, f"Write whole powers up to {_LARGEST_EXPONENT}, such as kg*m^2")
+    return _times(parse_unit("1"), unit, int(exponent))
+
+
+def _times(unit: Unit, other: Unit, exponent: int) -> Unit:
+    a, b = unit.powers, other.powers
+    return Unit(
+        unit.factor * other.factor**exponent,
+        (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2], a[3] + exponent * b[3]),
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _from_pint(name: str) -> Unit:
+    """Look one name up in pint, which never sees a number."""
+    near = [_MISTAKEN[name]] if name in _MISTAKEN else difflib.get_close_matches(name, UNITS, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name.lower(), UNITS, n=1, cutoff=0.9) or near
+    meant = f'Perhaps "{near[0]}" is meant; units' if near else "Units"
+    unknown = _unit_error(name, f"{meant} are case-sensitive and joined by * or /")
+    if name in _MISTAKEN:
+        raise unknown
+    pint, registry = _pint_registry()
+    try:
+        size = registry.Quantity(1, registry.parse_units(name)).to_base_units()
+    except (pint.errors.PintError, AssertionError):
+        raise unknown from None
+    bases = {"meter": 0, "kilogram": 1, "second": 2, "radian": 3}
+    powers = [0, 0, 0, 0]
+    for base, power in size.unit_items():
+        if base not in bases or power != int(power):
+            raise unknown
+        powers[bases[base]] = int(power)
+    if not 0 < size.magnitude < math.inf:
+        raise unknown
+    return Unit(Fraction(repr(float(size.magnitude))), (powers[0], powers[1], powers[2], powers[3]))
+
+
+@functools.cache
+def _pint_registry() -> tuple[Any, Any]:
+    import pint
+
+    return pint, pint.UnitRegistry()
+
+
+def _unit_error(unit_text: str, remedy: str = "") -> QuantityError:
+    joined = re.sub(r" *([*/^]) *| +", lambda gap: gap[1] or "*", unit_text)
+    hint = f'Join units by * or / without spaces: "{joined}"' if re.fullmatch("[a-zA-Z*/^2-4 ]+", unit_text) else ""
+    spaced = hint if " " in unit_text else ""
+    return QuantityError(
+        f'"{unit_text}" is not a unit',
+        "units such as mm, deg, kg, N*m, rpm",
+        remedy or spaced or "Correct the unit",
+    )
