@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,8 @@ CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
 SAMPLES = 720
 """Samples of one turn from which extremes are refined; no piece gets fewer than SAMPLES/8."""
+REFINEMENTS = (1 / 16, 1 / 16)
+"""Shrinking steps at which a sampled extreme is refined: its value is then right to rounding."""
 GAUSS_NODES = 32
 
 
@@ -34,6 +36,14 @@ class Extreme:
     piece: int
     u: float
     value: float
+
+
+def _vertex(centre: Floats, step: Floats, around: Sequence[Floats]) -> Floats:
+    """Return where the parabola through three values, a step apart, is highest: within a step, and within [0, 1]."""
+    low, mid, high = around
+    bend = low - 2 * mid + high
+    shift = 0.5 * (low - high) / np.where(bend < 0, bend, -np.inf)
+    return np.clip(centre + step * np.clip(shift, -1, 1), 0, 1)
 
 
 class Sampler:
@@ -101,8 +111,9 @@ class Sampler:
         if not np.all(np.isfinite(size)):
             return [Extreme(0, 0.0, float("inf"))]
         first, last = u == 0.0, u == 1.0
-        left = np.where(first, -np.inf, np.roll(size, 1))
-        right = np.where(last, -np.inf, np.roll(size, -1))
+        left, right = np.full_like(size, -np.inf), np.full_like(size, -np.inf)
+        left[1:], right[:-1] = size[:-1], size[1:]
+        left[first] = right[last] = -np.inf
         peaks = np.flatnonzero((size >= left) & (size >= right) & ((size > left) | (size > right)))
         found = self._refine(name, pieces, u, values, peaks)
         return sorted(found, key=lambda extreme: -abs(extreme.value))
@@ -112,22 +123,21 @@ class Sampler:
     ) -> list[Extreme]:
         """Refine sampled peaks by parabolas over ever smaller steps; a peak at a piece's end may stay there."""
         piece, sign = pieces[peaks], np.sign(values[peaks])
-        widths = np.diff(self.cycle.starts)
-        step = np.full(len(peaks), TURN / SAMPLES) / widths[piece]
-        step = np.minimum(step, 0.25)
+        inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
+        step = u[inner + 1] - u[inner]
         best_u, best = u[peaks], np.abs(values[peaks])
-        for shrink in (1 / 16, 1 / 16, 1 / 4):
-            centre = np.clip(best_u, step, 1 - step)
-            stencil = np.concatenate([centre - step, centre, centre + step])
-            low, mid, high = np.split(np.tile(sign, 3) * self.at(name, np.tile(piece, 3), stencil), 3)
-            bend = low - 2 * mid + high
-            with np.errstate(divide="ignore", invalid="ignore"):
-                shift = np.where(bend < 0, 0.5 * (low - high) / bend, 0.0)
-            vertex = np.clip(centre + step * np.clip(shift, -1, 1), 0, 1)
-            value = sign * self.at(name, piece, vertex)
+        vertex = _vertex(u[inner], step, sign * values[inner + np.array([[-1], [0], [1]])])
+        for shrink in REFINEMENTS:
+            step = step * shrink
+            centre = np.clip(vertex, step, 1 - step)
+            nodes = np.array([vertex, centre - step, centre, centre + step])
+            value, *around = sign * self.at(name, np.tile(piece, 4), nodes.ravel()).reshape(nodes.shape)
             better = value >= best
             best_u, best = np.where(better, vertex, best_u), np.where(better, value, best)
-            step = step * shrink
+            vertex = _vertex(centre, step, around)
+        value = sign * self.at(name, piece, vertex)
+        better = value >= best
+        best_u, best = np.where(better, vertex, best_u), np.where(better, value, best)
         return [Extreme(int(p), float(w), float(s * b)) for p, w, s, b in zip(piece, best_u, sign, best, strict=True)]
 
     def peak(self, name: str) -> float:
