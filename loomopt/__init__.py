@@ -15,11 +15,23 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+_HOMES = {
+    "Answer": "loomopt.api",
+    "BadInput": "loomopt.errors",
+    "Evaluation": "loomopt.solving.solution",
+    "Scene": "loomopt.scenes",
+    "evaluate": "loomopt.api",
+    "load": "loomopt.api",
+    "scene": "loomopt.api",
+    "simulate": "loomopt.api",
+    "solve": "loomopt.api",
+}
+
 __all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "scene", "simulate", "solve"]
 
 
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first asked for: the command line starts without what it does not use."""
-    if name not in __all__:
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module("loomopt.api"), name)
+    return getattr(importlib.import_module(_HOMES[name]), name)

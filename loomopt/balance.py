@@ -65,7 +65,11 @@ def terms(
 ) -> Iterator[tuple[Load, Number]]:
     """Yield each load with its term; switches[i] says which of its formulas holds (see `Load.switch`)."""
     for load, switch in zip(loads, switches, strict=True):
-        yield load, load.force(maths, pose, given.values, given.own[load.name], switch)
+        yield load, _term(maths, load, pose, given, switch)
+
+
+def _term(maths: Maths, load: Load, pose: Motion, given: Given, switch: Number) -> Number:
+    return load.force(maths, pose, given.values, given.own[load.name], switch)
 
 
 def total(numbers: Sequence[Number]) -> Number:
@@ -80,7 +84,8 @@ def total(numbers: Sequence[Number]) -> Number:
 
 def output_force(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:
     """Return Q, N or N·m: what the mechanism must supply at its output."""
-    return total([term for load, term in terms(maths, loads, pose, given, switches) if load.acts == "output"])
+    acting = [(load, switch) for load, switch in zip(loads, switches, strict=True) if load.acts == "output"]
+    return total([_term(maths, load, pose, given, switch) for load, switch in acting])
 
 
 def crank_torque(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:

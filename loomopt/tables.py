@@ -34,10 +34,10 @@ def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
     return frame.set_index("name")
 
 
-def rows(solution: Evaluation, scene: Any) -> list[dict[str, Any]]:
-    """Return the rows of `answer` as plain data; a figure the scene cannot have is left out."""
+def rows(solution: Evaluation, scene: Any, before: Evaluation | None = None) -> list[dict[str, Any]]:
+    """Return the rows of `answer` as plain data; a figure the scene cannot have is left out; before: today's."""
     words = Words(scene)
-    before = solution.before if isinstance(solution, Solution) else None
+    before = before or (solution.before if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
     found = []
     for name, value in {**solution.design, **solution.figures}.items():

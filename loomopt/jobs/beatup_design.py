@@ -103,7 +103,7 @@ def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
     changes = [
         weights.get(name, 1.0) * ((design[name] - old) / widths[name]) ** 2
         for name, old in today(scene).items()
-        if widths[name] > 0.0
+        if widths.get(name, 0.0) > 0.0
     ]
     found["change"] = math.fsum(changes)
     return found

@@ -54,8 +54,10 @@ def full_name(known: Mapping[str, float], name: str) -> str:
 
 
 def today(scene: Any) -> dict[str, float]:
-    """Return today's design, SI."""
-    return {name: scene.mechanism[name] for name in VARIABLES}
+    """Return today's design, SI, with every other number that the scene bounds."""
+    known = numbers(scene)
+    others = [full_name(known, name) for name in scene.bounds if name not in VARIABLES]
+    return {name: known[name] for name in (*VARIABLES, *others)}
 
 
 def bounds(scene: Any) -> dict[str, tuple[float, float]]:

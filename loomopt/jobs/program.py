@@ -159,6 +159,12 @@ class Program:
             tuple((objective.row, objective.form) for objective in self.objectives),
         )
 
+    @property
+    def held(self) -> frozenset[str]:
+        """Variables that are held without being limited: their value is today's, not a choice."""
+        limited = {limit.row for limit in self.limits if limit.family == "variable"}
+        return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)
+
     def values(self, design: Mapping[str, Number], maths: Maths) -> dict[str, Number]:
         """Return all values of one number system, with `design` for the variables."""
         return {name: maths.number(value) for name, value in self.parameters.items()} | dict(design)

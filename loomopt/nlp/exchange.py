@@ -16,12 +16,12 @@ from loomopt.cycle import Floats
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.polish import polished
-from loomopt.nlp.transcribe import Transcription, families, transcribe
+from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
 
 ROUNDS = 16
 FIRST_SLOTS, LEADING = 6, 4
-SAME_EXTREME = 1e-3
-"""Nodes of one piece this close in u stand for one extreme."""
+TOUCHING, POLISHES = 1e-8, 2
+"""Rows this close to their bound are polished onto it."""
 PENALTY = 10.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -96,32 +96,65 @@ class _Run:
         if sampler is None:
             return Point(x, "Not_Assembled")
         peaks = [sampler.extremes(family.row) for family in self.families]
-        nodes = [list(kept) for kept in warm.nodes] if warm else [_leading(found) for found in peaks]
+        nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
         status, violation, extra = "Maximum_Rounds_Exceeded", math.inf, None
         for _ in range(ROUNDS):
-            slots = FIRST_SLOTS
-            while slots < max(map(len, nodes), default=0):
-                slots *= 2
-            began = time.perf_counter()
-            nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
-            warmed = bool(raw)
-            nlp.solver(warmed, self.settings.callback)
-            self.built += time.perf_counter() - began if fresh else 0.0
-            before = x
+            nlp = self._transcribed(sampler, max(map(len, nodes), default=0), warm=bool(raw))
+            before, cold = x, not raw
             status, x, extra, raw = self._solve(nlp, sampler, before, extra, peaks, nodes, raw)
-            if status not in SUCCESS and warmed:
+            if status not in SUCCESS and not cold:
                 status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
             sampler = sampler_at(self.program, x)
             if sampler is None:
                 return Point(x, "Invalid_Number_Detected", self.iterations)
             peaks = [sampler.extremes(family.row) for family in self.families]
-            violation = self._extend(sampler, nodes, peaks, extra)
+            violation = self._extend(nodes, peaks, extra)
             if status not in SUCCESS or violation <= self.settings.accuracy / 100:
                 break
         relaxed = self._relaxed(extra) if self.elastic and extra is not None else {}
+        if status in SUCCESS and extra is not None and not self.elastic:
+            x = self._polish(x, extra, raw)
         kept = tuple(tuple(chosen) for chosen in nodes)
         return Point(x, status, self.iterations, kept, violation, raw, self.built, relaxed)
+
+    def _transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
+        """Return the NLP with room for that many nodes a family, its solver made; charges what had to be built."""
+        slots = FIRST_SLOTS
+        while slots < nodes:
+            slots *= 2
+        began = time.perf_counter()
+        nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
+        nlp.solver(warm, self.settings.callback)
+        self.built += time.perf_counter() - began if fresh else 0.0
+        return nlp
+
+    def _polish(self, x: dict[str, float], extra: Floats, raw: Mapping[str, Floats]) -> dict[str, float]:
+        """Return x put exactly on what binds, each touching extreme of the cycle as one row at its own angle."""
+        for _ in range(POLISHES):
+            sampler = sampler_at(self.program, x)
+            if sampler is None:
+                return x
+            peaks = [sampler.extremes(family.row) for family in self.families]
+            touching = [
+                [e for e in found if self._excess(family, e, extra) >= -TOUCHING]
+                for family, found in zip(self.families, peaks, strict=True)
+            ]
+            nlp = self._transcribed(sampler, max(map(len, touching), default=0), warm=False)
+            arguments = self._arguments(nlp, sampler, x, extra, touching)
+            rows = len(arguments["ubg"]) - len(self.families) * nlp.slots
+            active = ~np.array(self._idle_rows(nlp, touching)[rows:], dtype=bool)
+            lam_g = np.concatenate([raw["lam_g"][:rows], active.astype(float)])
+            flat = polished(nlp.jacobian, arguments, arguments["x0"], raw["lam_x"], lam_g)
+            x, extra = self._design(flat), flat[len(self.program.variables) :]
+        return x
+
+    def _design(self, flat: Floats) -> dict[str, float]:
+        """Return the variables, SI, of the NLP's scaled vector."""
+        found = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, flat, strict=False)}
+        if self.elastic:
+            return found
+        return {v.name: min(max(found[v.name], v.lower), v.upper) for v in self.program.variables}
 
     def _solve(
         self,
@@ -134,11 +167,39 @@ class _Run:
         raw: Mapping[str, Floats],
     ) -> tuple[str, dict[str, float], Floats, Mapping[str, Floats]]:
         """Run IPOPT once; returns its status, the variables, the epigraph or elastic variables, and the raw answer."""
-        variables = self.program.variables
-        p = nlp.vector(self.program, sampler, self.weights, nodes)
-        scaled = np.array([x[v.name] / v.scale for v in variables])
         if extra is None:
             extra = raw["extra"] if raw else self._first_extra(nlp, sampler, peaks)
+        arguments = self._arguments(nlp, sampler, x, extra, nodes)
+        if self._overdetermined(arguments):
+            return "Not_Enough_Degrees_Of_Freedom", dict(x), extra, {}
+        if raw:
+            arguments |= {"lam_x0": raw["lam_x"], "lam_g0": _padded(raw["lam_g"], len(arguments["lbg"]))}
+        solver = nlp.solver(bool(raw), self.settings.callback)
+        answer = solver(**arguments)
+        stats = solver.stats()
+        status = str(stats["return_status"])
+        if status in {"NonIpopt_Exception_Thrown", "User_Requested_Stop"}:
+            raise KeyboardInterrupt
+        self.iterations += int(stats.get("iter_count", 0))
+        flat = np.asarray(answer["x"]).ravel()
+        extra = flat[len(self.program.variables) :]
+        keep = {
+            "lam_x": np.asarray(answer["lam_x"]).ravel(),
+            "lam_g": np.asarray(answer["lam_g"]).ravel(),
+            "extra": extra,
+        }
+        return status, self._design(flat), extra, keep
+
+    def _arguments(
+        self,
+        nlp: Transcription,
+        sampler: Sampler,
+        x: Mapping[str, float],
+        extra: Floats,
+        nodes: Sequence[list[Extreme]],
+    ) -> dict[str, Any]:
+        """Return what the NLP is called with: start, parameters and bounds, all scaled."""
+        variables = self.program.variables
         lower = np.array([v.lower / v.scale for v in variables])
         upper = np.array([v.upper / v.scale for v in variables])
         if self.elastic:
@@ -147,33 +208,19 @@ class _Run:
             lower = np.where(open_ended, np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
             upper = np.where(open_ended, np.inf, upper)
         equal = [limit.sign == 0 for limit in nlp.static] + [False] * (nlp.nlp["g"].numel() - len(nlp.static))
-        idle = self._idle_rows(nlp, nodes)
-        arguments = {
+        scaled = np.array([x[v.name] / v.scale for v in variables])
+        return {
             "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
-            "p": p,
+            "p": nlp.vector(self.program, sampler, self.weights, nodes),
             "lbx": np.concatenate([lower, np.zeros(len(extra))]),
             "ubx": np.concatenate([upper, np.full(len(extra), np.inf)]),
             "lbg": np.where(equal, 0.0, -np.inf),
-            "ubg": np.where(idle, 1.0, 0.0),
+            "ubg": np.where(self._idle_rows(nlp, nodes), 1.0, 0.0),
         }
-        if raw:
-            arguments |= {"lam_x0": raw["lam_x"], "lam_g0": _padded(raw["lam_g"], len(equal))}
-        solver = nlp.solver(bool(raw), self.settings.callback)
-        answer = solver(**arguments)
-        stats = solver.stats()
-        status = str(stats["return_status"])
-        if status in {"NonIpopt_Exception_Thrown", "User_Requested_Stop"}:
-            raise KeyboardInterrupt
-        self.iterations += int(stats.get("iter_count", 0))
-        keep = {"lam_x": np.asarray(answer["lam_x"]).ravel(), "lam_g": np.asarray(answer["lam_g"]).ravel()}
-        flat = np.asarray(answer["x"]).ravel()
-        if status in SUCCESS:
-            flat = polished(nlp.jacobian, arguments, flat, **keep)
-        found = {v.name: float(value * v.scale) for v, value in zip(variables, flat, strict=False)}
-        if not self.elastic:
-            found = {v.name: min(max(found[v.name], v.lower), v.upper) for v in variables}
-        keep["extra"] = flat[len(variables) :]
-        return status, found, keep["extra"], keep
+
+    def _overdetermined(self, arguments: Mapping[str, Any]) -> bool:
+        """Say whether more equalities than free variables leave nothing to solve for."""
+        return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
 
     def _first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[list[Extreme]]) -> Floats:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
@@ -196,28 +243,27 @@ class _Run:
             rows += [k >= len(chosen) for k in range(nlp.slots)]
         return rows
 
-    def _extend(
-        self, sampler: Sampler, nodes: Sequence[list[Extreme]], peaks: Sequence[list[Extreme]], extra: Floats
-    ) -> float:
+    def _excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
+        """Return by how much an extreme exceeds its bound, relative to the row's size."""
+        if family.objective >= 0:
+            epigraphs = [k for k, o in enumerate(self.program.objectives) if o.form != "value"]
+            scale, bound = self.program.objectives[family.objective].scale, extra[epigraphs.index(family.objective)]
+        else:
+            limit = self.program.limits[family.limit]
+            soft = [k for k, other in enumerate(self.program.limits) if other.relaxable]
+            scale, bound = limit.scale, limit.value / limit.scale
+            bound += extra[2 * soft.index(family.limit)] if self.elastic and family.limit in soft else 0.0
+        return float(abs(extreme.value) / scale - bound)
+
+    def _extend(self, nodes: Sequence[list[Extreme]], peaks: Sequence[list[Extreme]], extra: Floats) -> float:
         """Add the extremes that exceed their bound; returns the largest excess relative to the row's size."""
         worst = 0.0
-        epigraphs = [k for k, o in enumerate(self.program.objectives) if o.form != "value"]
-        soft = [k for k, limit in enumerate(self.program.limits) if limit.relaxable]
         for chosen, found, family in zip(nodes, peaks, self.families, strict=True):
-            if family.objective >= 0:
-                scale, bound = (
-                    self.program.objectives[family.objective].scale,
-                    extra[epigraphs.index(family.objective)],
-                )
-            else:
-                limit = self.program.limits[family.limit]
-                scale, bound = limit.scale, limit.value / limit.scale
-                bound += extra[2 * soft.index(family.limit)] if self.elastic else 0.0
             for extreme in found:
-                excess = abs(extreme.value) / scale - bound
+                excess = self._excess(family, extreme, extra)
                 worst = max(worst, excess)
                 if excess > self.settings.accuracy / 100:
-                    _add(chosen, extreme)
+                    chosen.append(extreme)
         return worst
 
     def _relaxed(self, extra: Floats) -> dict[int, float]:
@@ -228,21 +274,6 @@ class _Run:
             for place, k in enumerate(soft)
         }
         return {k: float(need * self.program.limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
-
-
-def _add(chosen: list[Extreme], extreme: Extreme) -> None:
-    """Add an extreme, or move the node that was meant for it: two nodes on one extreme are one row too many."""
-    for place, node in enumerate(chosen):
-        same = node.piece == extreme.piece and np.sign(node.value) == np.sign(extreme.value)
-        if same and abs(node.u - extreme.u) <= SAME_EXTREME:
-            chosen[place] = extreme
-            return
-    chosen.append(extreme)
-
-
-def _leading(found: list[Extreme]) -> list[Extreme]:
-    """Return the extremes worth starting with."""
-    return found[:LEADING]
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

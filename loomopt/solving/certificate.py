@@ -21,6 +21,8 @@ ACTIVE = 1e-7
 POSITIVE = 1e-8
 """Multipliers above this, in natural sizes, bind."""
 FLAT = 1e-7
+CURVED, CORRECTED = 1e-5, 1e-10
+"""Curvature that Newton's step may follow, and the slope it need not mind."""
 DENSE = 16384
 
 
@@ -58,6 +60,13 @@ class Certificate:
     binding: tuple[Binding, ...] = ()
     by: str = "refined"
     settled: tuple[str, ...] = field(default=())
+    correction: Mapping[str, float] = field(default_factory=dict)
+    """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
+
+    @property
+    def stationarity(self) -> float:
+        """The largest KKT residual of all levels."""
+        return max((level.stationarity for level in self.levels), default=0.0)
 
 
 def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
@@ -92,6 +101,9 @@ class _Trial:
         self.gradients = self.exact.gradients()
         self.multipliers: list[Floats] = []
         self.minimum, self.unique = True, True
+        self.correction: dict[str, float] = {}
+        self.settled_alone = False
+        """Whether the levels so far leave a single design: then later ones have nothing to choose, and no KKT point."""
 
     def _limit_rows(self, k: int, limit: Limit) -> list[Row]:
         """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
@@ -130,6 +142,10 @@ class _Trial:
             reasons.append(f"a whole-cycle value is exceeded by {violation:.2g} between refined points")
         levels = []
         for place, objective in enumerate(self.program.objectives):
+            if self.settled_alone:
+                self.multipliers.append(np.zeros(len(self.rows)))
+                levels.append(Level(objective.figure, 0.0, 0.0, 0.0))
+                continue
             level = self._level(place, objective)
             levels.append(level)
             if not level.stationarity <= STATIONARITY:
@@ -147,6 +163,7 @@ class _Trial:
             self.minimum,
             self.unique,
             self._binding(),
+            correction=self.correction,
         )
 
     def _between_points(self) -> float:
@@ -173,7 +190,7 @@ class _Trial:
         """Solve one level's KKT system and judge its curvature."""
         pieces, inequalities, equal = self._columns(place)
         signed = [(k, 1.0) for k in pieces + inequalities + equal] + [(k, -1.0) for k in equal]
-        size = len(self.program.variables)
+        size = self.gradients.shape[1]
         matrix = np.zeros((size + 1, len(signed)))
         for column, (k, sign) in enumerate(signed):
             matrix[:size, column] = sign * self.gradients[k]
@@ -202,14 +219,18 @@ class _Trial:
 
     def _curve(self, pieces: list[int], binding: list[int], equal: list[int], multipliers: Floats) -> None:
         """Judge the Lagrangian's curvature along the directions that no binding row forbids."""
+        self.unique = True
         rows = sorted({*binding, *equal, *(k for k in pieces if len(pieces) == 1)})
         _, sizes, basis = np.linalg.svd(self.gradients[rows])
         free = basis[int(np.sum(sizes > FLAT * max(1.0, sizes.max(initial=0.0)))) :].T
         if free.shape[1] == 0:
+            self.settled_alone = True
             return
         curved = self.exact.curvatures(free)
         weights = np.where(np.isin(np.arange(len(self.rows)), rows), multipliers, 0.0)
         values, vectors = np.linalg.eigh(np.tensordot(weights, curved, axes=1))
+        self.settled_alone = bool(values.min() > FLAT)
+        self._correct(free @ vectors[:, values > CURVED], values[values > CURVED], multipliers)
         weak = [k for k in range(len(self.limits)) if k not in rows]
         for value, vector in zip(values, vectors.T, strict=True):
             slopes = self.gradients[weak] @ (free @ vector) if weak else np.zeros(0)
@@ -218,6 +239,15 @@ class _Trial:
                 self.unique = False
             if value < -FLAT and not blocked:
                 self.minimum = False
+
+    def _correct(self, directions: Floats, bends: Floats, multipliers: Floats) -> None:
+        """Keep Newton's step along curved directions (variables, k), unless an earlier level already asks for one."""
+        pull = directions.T @ (multipliers @ self.gradients)
+        if self.correction or np.abs(pull).max(initial=0.0) <= CORRECTED:
+            return
+        step = -directions @ (pull / bends)
+        sizes = {v.name: v.scale for v in self.program.variables}
+        self.correction = {name: float(part * sizes[name]) for name, part in zip(self.exact.names, step, strict=True)}
 
     def _binding(self) -> tuple[Binding, ...]:
         """Return the limits that bind, each with its worth for the first objective it moves."""

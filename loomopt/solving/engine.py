@@ -13,7 +13,7 @@ from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.exchange import Point, Settings
 from loomopt.solving import report
-from loomopt.solving.certificate import Certificate, certify
+from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, Certificate, certify
 from loomopt.solving.settle import settle
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -24,7 +24,8 @@ MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified."""
 SAME = 1e-7
 """Objectives that agree to this, relative to their natural size, are one optimum."""
-STRONGEST_PENALTY = 1e6
+CORRECTIONS, PRECISE = 4, 1e-9
+STRONGER, STRONGEST_PENALTY = 100.0, 1e7
 
 
 def evaluate(scene: Any, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
@@ -160,30 +161,48 @@ class _Search:
             self.best = best
             self._certify(best)
         assert self.certificate is not None
-        held = max((level.held for level in self.certificate.levels[1:]), default=0.0)
-        if self.settings.penalty <= 2 * held and self.settings.penalty < STRONGEST_PENALTY:
-            self.settings = replace(self.settings, penalty=10 * held)
+        if self._too_weak(self.certificate):
+            self.settings = replace(self.settings, penalty=self.settings.penalty * STRONGER)
             start = self.best.x
             self.points.remove(self.best)
-            self.certificate = None
+            self.best = None
             return self._try(start, None) and self._judge()
         return self.certificate.passed
 
+    def _too_weak(self, certificate: Certificate) -> bool:
+        """Say whether an earlier objective gave way to a later one: its weight must exceed twice its multiplier."""
+        if self.settings.penalty * STRONGER > STRONGEST_PENALTY:
+            return False
+        held = max((level.held for level in certificate.levels[1:]), default=0.0)
+        earlier = any(level.stationarity > STATIONARITY for level in certificate.levels[:-1])
+        return earlier or self.settings.penalty <= 2 * held
+
     def _certify(self, point: Point) -> None:
-        """Run the silent levels and the certificate."""
+        """Run the silent levels and the certificate; where there is a slope left, follow it to its end."""
         began = time.perf_counter()
+        self.x, self.certificate = self._judged(point.x)
+        for _ in range(CORRECTIONS):
+            if not self.certificate.correction or self.certificate.stationarity <= PRECISE:
+                break
+            x, better = self._judged(self._corrected(self.x, self.certificate.correction))
+            if better.stationarity >= self.certificate.stationarity or better.feasibility > FEASIBILITY:
+                break
+            self.x, self.certificate = x, better
+        self.certified += time.perf_counter() - began
+
+    def _judged(self, x: Mapping[str, float]) -> tuple[dict[str, float], Certificate]:
+        """Return x (SI) after the silent levels, and its certificate."""
         task, program = self.task, self.program
         x, settled = settle(
-            program,
-            task.tidy(program, point.x),
-            task.moves(program),
-            lambda move, at: task.wish(self.scene, move, at),
+            program, task.tidy(program, x), task.moves(program), lambda move, at: task.wish(self.scene, move, at)
         )
-        self.x = x
         exact = task.values(program, task.design(program, x))
-        found = certify(program, exact, self.settings.accuracy)
-        self.certificate = replace(found, settled=settled)
-        self.certified += time.perf_counter() - began
+        return x, replace(certify(program, exact, self.settings.accuracy), settled=settled)
+
+    def _corrected(self, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:
+        """Return x moved by a step, both SI, within its bounds."""
+        moved = {v.name: x[v.name] + step.get(v.name, 0.0) for v in self.program.variables}
+        return {v.name: min(max(moved[v.name], v.lower), v.upper) for v in self.program.variables}
 
     def objectives(self, point: Point) -> tuple[float, ...]:
         """Return a point's objectives in their natural sizes, true over the whole cycle."""

@@ -49,7 +49,7 @@ class Row:
 class Exact:
     """A program's rows around one design.
 
-    x: variables, SI; all results are with respect to variables in their own scale.
+    x: variables, SI; all results are with respect to the variables that are not held, in their own scale.
     """
 
     def __init__(self, program: Program, x: dict[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
@@ -57,8 +57,11 @@ class Exact:
         self.maths = maths.mpmath(DIGITS)
         self.number: Callable[[Any], Any] = self.maths.number
         self.parameters = {name: self.number(value) for name, value in program.parameters.items()}
-        self.scales = [self.number(v.scale) for v in program.variables]
-        self.base = [self.number(x[v.name]) / scale for v, scale in zip(program.variables, self.scales, strict=True)]
+        self.names = [v.name for v in program.variables if v.name not in program.held]
+        self.parameters |= {name: self.number(x[name]) for name in program.held}
+        sizes = {v.name: v.scale for v in program.variables}
+        self.scales = [self.number(sizes[name]) for name in self.names]
+        self.base = [self.number(x[name]) / scale for name, scale in zip(self.names, self.scales, strict=True)]
         self.rows = list(rows)
         self.u = {k: self._settled(row) for k, row in enumerate(self.rows) if row.node}
 
@@ -98,8 +101,7 @@ class Exact:
         return [x + step * d for x, d in zip(self.base, direction, strict=True)]
 
     def _given(self, scaled: Sequence[Any]) -> Given:
-        names = [v.name for v in self.program.variables]
-        x = {name: value * scale for name, value, scale in zip(names, scaled, self.scales, strict=True)}
+        x = {name: value * scale for name, value, scale in zip(self.names, scaled, self.scales, strict=True)}
         return self.program.model.given(self.maths, {**self.parameters, **x})
 
     def _rows(self, scaled: Sequence[Any]) -> list[Any]:

@@ -18,6 +18,7 @@ ADVICE = {
     "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts (--starts 20).",
     "Diverging_Iterates": "The objective falls without end; bound every variable.",
     "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of l1 to l4.",
+    "Not_Enough_Degrees_Of_Freedom": "More is fixed than the design can follow; free a dimension.",
     "Not_Assembled": "The start does not assemble; narrow the bounds of l1 to l4.",
 }
 """What each of IPOPT's statuses means to a designer."""

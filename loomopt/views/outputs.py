@@ -2,19 +2,34 @@
 
 import functools
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from loomopt import tables
+from loomopt import __version__, tables
 from loomopt.errors import BadInput
 from loomopt.jobs.tasks import TASKS
-from loomopt.solving.solution import Solution
+from loomopt.solving.solution import Evaluation, Solution
 from loomopt.store import atomically, suffix
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
 DRAWINGS = (".svg", ".dxf", ".csv")
+
+
+def document(found: Evaluation) -> str:
+    """Return an evaluation or an answer as one JSON object; what is undefined is null."""
+    return json.dumps(_speakable({"loomopt": __version__, **found.as_dict()}), indent=1, allow_nan=False)
+
+
+def _speakable(data: Any) -> Any:
+    """Return data without the numbers JSON cannot say."""
+    if isinstance(data, Mapping):
+        return {name: _speakable(value) for name, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_speakable(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def text(path: Path, content: str) -> None:
@@ -30,19 +45,30 @@ def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
     """Write an answer into a folder: answer.json, table.csv, curves.csv, linkage.svg; returns the files."""
     from loomopt.views import drawing, svg
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"the folder cannot be made: {error.strerror}", file=str(folder), key="--out") from None
     contents = {
-        "answer.json": json.dumps(solution.as_dict(), indent=1) + "\n",
+        "answer.json": document(solution) + "\n",
         "table.csv": tables.csv(tables.answer(solution, scene)),
         "curves.csv": tables.csv(tables.curves(scene, solution.design)),
         "linkage.svg": svg.render(drawing.linkage(solution.design, scene.name)),
     }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _no_folder(folder, error.strerror) from None
     for name, content in contents.items():
         text(folder / name, content)
     return [folder / name for name in contents]
+
+
+def check_folder(folder: Path) -> None:
+    """Raise BadInput, before anything is computed, where an answer's folder cannot be."""
+    taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+    if not taken.is_dir():
+        raise _no_folder(folder, f"{taken} is a file")
+
+
+def _no_folder(folder: Path, reason: str) -> BadInput:
+    return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
 
 
 def curves(path: Path, scene: Any, design: Mapping[str, float]) -> None:

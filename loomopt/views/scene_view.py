@@ -1,28 +1,55 @@
 """A scene for the terminal: numbers as given and in SI, its equations, its curves."""
 
-from collections.abc import Iterator, Mapping
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from loomopt.jobs import beatup_program
 from loomopt.jobs.tasks import TASKS
-from loomopt.views import equations as printer
-from loomopt.views import terminal
+from loomopt.solving.words import Words
+from loomopt.views.plain import Grid
+
+COLUMNS = 7
+"""Curves printed side by side; more go into a second table."""
+STEP = 15
+"""Crank angle between printed rows, deg."""
 
 
-def parts(scene: Any) -> list[Any]:
+def listing(scenes: Iterable[Any]) -> Grid:
+    """Return the packaged scenes: title, targets, source."""
+    lines: list[tuple[str, str]] = []
+    for scene in scenes:
+        lines += [
+            (scene.name, scene.title),
+            ("", f"job {scene.job.name}; targets {', '.join(scene.job.targets)}"),
+            ("", f"source: {scene.source or 'not given'}"),
+        ]
+    return Grid("", ("problem", "what it is"), tuple(lines))
+
+
+def parts(scene: Any) -> list[str | Grid]:
     """Return the tables of `loomopt show`."""
-    lines = [(key, scene.given(key) or "(default)", f"{value:.9g}") for key, value in _numbers(scene)]
-    effects = [(name, scene.job.effects[name].summary) for name in scene.effects]
+    words = Words(scene)
+    lines = []
+    for key, value in _numbers(scene):
+        name = key.split(".")[2 if key.startswith("effects.") else 1]
+        unit = words.si(name)
+        lines.append((key, scene.given(key) or "(default)", f"{value:.9g}", "" if unit == "1" else unit))
+    effects = tuple((name, scene.job.effects[name].summary) for name in scene.effects)
     off = [name for name in scene.job.effects if name not in scene.effects]
+    figures = tuple((figure.name, figure.text) for figure in scene.job.figures.values())
     return [
         f"{scene.name}: {scene.title}",
-        f"Job: {scene.job.name}, {scene.job.title}. Source: {scene.source or 'not given'}",
-        terminal.grid("Numbers", ("key", "as given", "SI"), lines, right=(1, 2)),
-        terminal.grid("Effects that are on", ("effect", "what it is"), effects),
+        f"Job: {scene.job.name}, {scene.job.title}",
+        f"Source: {scene.source or 'not given'}",
+        Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
+        Grid("Effects that are on", ("effect", "what it is"), effects),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
-        terminal.grid("Targets", ("target", "what it asks", "expected"), _targets(scene)),
+        Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
+        Grid("Figures", ("figure", "what it is"), figures),
     ]
 
 
@@ -56,23 +83,43 @@ def _ended(scene: Any, key: str, end: str) -> str:
     return key if scene.given(key) else f"{key}.{end}"
 
 
-def equations(scene: Any) -> list[Any]:
-    """Return the equations a scene really uses, as text."""
+def equations(scene: Any) -> list[str]:
+    """Return the equations a scene really uses, as text, those of one name together."""
+    from loomopt.views import equations as printer
+
     found = printer.equations(beatup_program.model(scene))
-    return [f"{equation.name}\n    {equation.text}" for equation in found]
+    groups = itertools.groupby(found, key=lambda equation: equation.name)
+    return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> Any:
-    """Return the curves every 15 degrees and at the dead centres as a table."""
+def curves(scene: Any, design: Mapping[str, float]) -> list[str | Grid]:
+    """Return the curves every 15 degrees and at the dead centres, both sides of a jump, as tables."""
     task = TASKS[scene.job.name]
     full = {**task.today(scene), **design}
-    columns = task.curves(scene, full)
+    columns = dict(task.curves(scene, full))
     angle = np.degrees(columns.pop("phi [rad]"))
-    marks = [np.degrees(value) for name, value in task.marks(scene, full).items() if "dead" in name]
-    shown = [
-        k for k, a in enumerate(angle) if abs(a / 15 - round(a / 15)) < 1e-9 or min(abs(a - m) for m in marks) < 1e-9
+    centres = {name: math.degrees(value) for name, value in task.marks(scene, full).items() if "dead" in name}
+    rows = [
+        k
+        for k, a in enumerate(angle)
+        if abs(a / STEP - round(a / STEP)) < 1e-9 or min(abs(a - mark) for mark in centres.values()) < 1e-9
     ]
-    names = [name if "rad" not in name else name.replace("rad", "deg") for name in columns]
-    values = [np.degrees(v) if "rad" in name else v for name, v in columns.items()]
-    lines = [(f"{angle[k]:.3f}", *(f"{column[k]:.5g}" for column in values)) for k in shown]
-    return terminal.grid(scene.title, ("phi [deg]", *names), lines, right=range(len(names) + 1))
+    cells = [_curve(name, values) for name, values in columns.items()]
+    marks = ", ".join(f"{name} at {value:.3f} deg" for name, value in centres.items())
+    found: list[str | Grid] = [f"{scene.title}: {marks}"]
+    for first in range(0, len(cells), COLUMNS):
+        some = cells[first : first + COLUMNS]
+        lines = tuple((f"{angle[k]:.3f}", *(texts[k] for _, texts in some)) for k in rows)
+        heads = ("phi\n[deg]", *(head for head, _ in some))
+        found.append(Grid("", heads, lines, right=tuple(range(len(heads)))))
+    return found
+
+
+def _curve(name: str, values: Any) -> tuple[str, list[str]]:
+    """Return a curve's heading and its cells, four digits of the largest, angles in degrees."""
+    symbol, _, unit = name.removesuffix("]").partition(" [")
+    numbers = np.degrees(values) if unit == "rad" else np.asarray(values, dtype=float)
+    largest = float(np.max(np.abs(numbers), initial=0.0))
+    places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 and math.isfinite(largest) else 0
+    texts = [f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
+    return f"{symbol}\n[{'deg' if unit == 'rad' else unit}]", texts

@@ -1,51 +1,32 @@
-"""What a person sees in the terminal: short tables, plain sentences. Rich is imported only here."""
+"""What a person sees of an answer: a sentence, short tables, the certificate in one line."""
 
-from collections.abc import Sequence
 from typing import Any
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
-from loomopt.quantities import factor
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
+from loomopt.units import factor
+from loomopt.views.plain import Grid, joined
 
-NEGLIGIBLE = 1e-9
-"""Shown as 0 when below this share of the column's largest neighbour."""
-
-
-def grid(title: str, columns: Sequence[str], lines: Sequence[Sequence[str]], right: Sequence[int] = ()) -> Table:
-    """Return a plain table; right: places of right-aligned columns."""
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for place, column in enumerate(columns):
-        table.add_column(column, justify="right" if place in right else "left", no_wrap=place == 0)
-    for line in lines:
-        table.add_row(*(Text(cell) for cell in line))
-    return table
+NEGLIGIBLE = 1e-8
+"""Shown as 0 when below this share of the largest number in the same unit."""
 
 
-def show(*parts: Any) -> None:
-    """Print tables and sentences to stdout."""
-    console = Console(highlight=False, soft_wrap=False)
-    for part in parts:
-        console.print(Text(part) if isinstance(part, str) else part)
-
-
-def solution(answer: Solution, scene: Any) -> list[Any]:
+def solution(answer: Solution, scene: Any) -> list[str | Grid]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
-    parts: list[Any] = [
-        f"{answer.problem} - {answer.target}: {answer.status}",
-        answer.message,
-        comparison(answer, scene),
-    ]
-    if answer.binding:
-        lines = [(price.text, f"{next(iter(price.worth))}: {price.reading}") for price in answer.binding]
-        parts.append(grid("What binds, and what loosening it is worth", ("limit", "worth"), lines))
+    heading = "relaxed" if answer.relaxation else "design"
+    parts: list[str | Grid] = [f"{answer.problem}, {answer.target}: {answer.status}"]
+    if answer.relaxation:
+        clash = ", ".join(joined(limit) for limit in answer.clash)
+        parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]
+    elif answer.status == "optimal":
+        parts.append(scene.job.headline(scene, answer.target, answer.figures))
+    else:
+        parts.append(answer.message)
+    parts.append(comparison(answer, scene, answer.before, heading))
     if answer.certificate:
-        parts.append(certificate_line(answer))
+        parts.append(_binding(answer))
+        parts += certificate(answer)
     if answer.solver.get("starts", 1) > 1:
         parts.append(_starts(answer, scene))
     time = answer.time
@@ -56,30 +37,40 @@ def solution(answer: Solution, scene: Any) -> list[Any]:
     return parts
 
 
-def comparison(evaluation: Evaluation, scene: Any) -> Table:
+def evaluation(found: Evaluation, scene: Any, before: Evaluation | None) -> list[str | Grid]:
+    """Return the parts of an evaluated design; before: today's machine, where the design is another."""
+    broken = ", ".join(limit.name for limit in found.limits if not limit.ok)
+    held = f"NOT admissible: {broken}" if broken else "all limits held"
+    return [f"{found.problem}: {held}", comparison(found, scene, before, "design" if before else "today")]
+
+
+def comparison(found: Evaluation, scene: Any, before: Evaluation | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits."""
+    table = rows(found, scene, before)
+    sizes: dict[str, float] = {}
+    for row in table:
+        largest = max(abs(row["design"]), abs(row["today"] or 0.0))
+        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), largest)
     lines = []
-    for row in rows(evaluation, scene):
-        limit = _limit(row["min"], row["max"])
-        flag = "" if row["ok"] else "  <- not held"
-        before = _number(row["today"]) if row["today"] is not None else ""
-        unit = row["unit"] if row["unit"] != "1" else ""
-        lines.append((row["name"], before, _number(row["design"]), unit, limit + flag))
-    today = isinstance(evaluation, Solution)
-    columns = ("", "today" if today else "", "design", "unit", "limits")
-    others = [
-        f"{limit.name}: {'held' if limit.ok else 'NOT held'}"
-        for limit in evaluation.limits
-        if limit.name not in {row["name"] for row in rows(evaluation, scene)} and not limit.ok
+    for row in table:
+        size = sizes[row["unit"]]
+        today = [] if before is None else ["" if row["today"] is None else _number(row["today"], size)]
+        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else "  <- not held"))
+        unit = "" if row["unit"] == "1" else row["unit"]
+        lines.append((row["name"], *today, _number(row["design"], size), unit, limit))
+    shown = {row["name"] for row in table}
+    lines += [
+        (limit.name, *([""] if before else []), "", "", joined("<- not held"))
+        for limit in found.limits
+        if limit.name not in shown and not limit.ok
     ]
-    table = grid("", columns, lines, right=(1, 2))
-    table.caption = "; ".join(others) or None
-    return table
+    first = ("", "today") if before else ("",)
+    return Grid("", (*first, heading, "unit", "limits"), tuple(lines), right=tuple(range(1, len(first) + 1)))
 
 
-def _number(value: float) -> str:
-    """Return six significant digits; what is only rounding is 0."""
-    return "0" if abs(value) < NEGLIGIBLE else f"{value:.6g}"
+def _number(value: float, size: float) -> str:
+    """Return six significant digits; what is only rounding beside `size` is 0."""
+    return "0" if abs(value) <= NEGLIGIBLE * size else f"{value:.6g}"
 
 
 def _limit(low: float | None, high: float | None) -> str:
@@ -91,25 +82,43 @@ def _limit(low: float | None, high: float | None) -> str:
     return f">= {low:.6g}" if low is not None else f"<= {high:.6g}" if high is not None else ""
 
 
-def certificate_line(answer: Solution) -> str:
-    """Return the certificate in one line."""
+def _relaxation(answer: Solution) -> Grid:
+    """Return what would have to give way."""
+    together = [joined(r.text) for r in answer.relaxation if not r.alone]
+    alone = [joined(r.text) for r in answer.relaxation if r.alone]
+    first = "all of these" if len(together) > 1 else "this"
+    lines = [(first if place == 0 else "", text) for place, text in enumerate(together)]
+    lines += [("or this alone" if lines else "this alone", text) for text in alone]
+    return Grid("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
+
+
+def _binding(answer: Solution) -> str | Grid:
+    """Return the limits that bind, each with its price."""
+    if not answer.binding:
+        return "No limit binds."
+    lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
+    return Grid("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
+
+
+def certificate(answer: Solution) -> list[str]:
+    """Return the certificate in one line, and in a second one what chose among equally good designs."""
     found = answer.certificate
     assert found is not None
     if not found.passed:
-        return "Certificate: NOT passed - " + "; ".join(found.reasons)
+        return ["Certificate NOT passed: " + "; ".join(found.reasons)]
     worst = max((level.stationarity for level in found.levels), default=0.0)
-    settled = f" Settled: {'; '.join(found.settled)}." if found.settled else ""
-    unique = "unique" if found.unique else "not unique before the silent rules"
-    return (
-        f"Certificate: passed - limits held to {max(found.feasibility, 1e-16):.0e}, stationarity {worst:.0e}, "
-        f"whole cycle within {max(found.violation, 1e-16):.0e}, a minimum, {unique}.{settled}"
-    )
+    limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (found.feasibility, found.violation))
+    unique = "unique" if found.unique else "not unique"
+    line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
+    return [line, *([f"Chosen among equals by {'; '.join(found.settled)}"] if found.settled else [])]
 
 
 def _starts(answer: Solution, scene: Any) -> str:
     """Return how many starts found the best, and what other optima there are."""
     solver, words = answer.solver, Words(scene)
-    text = f"Starts: {solver['starts_at_best']} of {solver['starts']} reached the best."
+    if not solver["starts_at_best"]:
+        return f"Starts: {solver['starts']}, none reached an admissible design"
+    text = f"Starts: {solver['starts_at_best']} of {solver['starts']} reached the best"
     others = [
         ", ".join(
             f"{name} {value / factor(words.unit(name)):.6g} {words.unit(name)}"
@@ -119,4 +128,4 @@ def _starts(answer: Solution, scene: Any) -> str:
         + f" ({count})"
         for figures, count in answer.optima[1:]
     ]
-    return text + (f" Other optima: {'; '.join(others)}." if others else "")
+    return text + (f". Other optima: {'; '.join(others)}" if others else "")
