@@ -7,10 +7,17 @@ the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cr
 import functools
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths import FLOAT, Maths, Number, numpy
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -52,29 +59,25 @@ class Pose:
     def _rates(self) -> tuple[Number, Number]:
         return dyad.rates(self.dyad, Vector(self.crank.y, -self.crank.x))
 
-    @functools.cached_property
-    def _second_rates(self) -> tuple[Number, Number]:
-        return dyad.second_rates(self.dyad, self.crank, *self._rates, self.lengths.l2, self.lengths.l3)
-
     @property
     def psi_1(self) -> Number:
         """ψ' = dψ/dφ."""
         return self._rates[1]
 
-    @property
+    @functools.cached_property
     def psi_2(self) -> Number:
         """ψ'' = d²ψ/dφ²."""
-        return self._second_rates[1]
+        return dyad.second_rate_2(self.dyad, self.crank, *self._rates, self.lengths.l2)
 
     @property
     def rod_1(self) -> Number:
         """First derivative of the rod's angle."""
         return self._rates[0]
 
-    @property
+    @functools.cached_property
     def rod_2(self) -> Number:
         """Second derivative of the rod's angle."""
-        return self._second_rates[0]
+        return dyad.second_rate_1(self.dyad, self.crank, *self._rates, self.lengths.l3)
 
     @functools.cached_property
     def cos_crank_rod(self) -> Number:
@@ -86,6 +89,23 @@ class Pose:
         """Sine of the angle from rod to crank."""
         rod, crank = self.dyad.link1, self.crank
         return (rod.x * crank.y - rod.y * crank.x) / (self.lengths.l1 * self.lengths.l2)
+
+
+def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats", "Floats", "Floats"]:
+    """Return ψ, ψ', ψ'' at an array of crank angles φ, rad; lengths in m.
+
+    Evaluated `chunk` positions at a time, so that what a formula needs stays in the processor's cache.
+    """
+    import numpy as np
+
+    phi = np.asarray(phi, dtype=float)
+    flat, found = phi.ravel(), np.empty((3, phi.size))
+    for begin in range(0, phi.size, chunk):
+        part = slice(begin, begin + chunk)
+        pose = Pose(numpy(), lengths, flat[part])
+        found[0, part], found[1, part], found[2, part] = pose.psi, pose.psi_1, pose.psi_2
+    psi, psi_1, psi_2 = found.reshape(3, *phi.shape)
+    return psi, psi_1, psi_2
 
 
 @dataclass(frozen=True)
