@@ -2,26 +2,29 @@
 
 import atexit
 import gc
-import json
 import os
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 # One short-lived process: collecting garbage, and searching all installed packages for pydantic plugins, would cost
 # a third of the time from the shell to the answer.
+_COLLECTING = gc.isenabled()
 gc.disable()
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 import typer  # noqa: E402
 
-from loomopt import api, designs  # noqa: E402
+from loomopt import __version__, api  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.jobs import JOBS, load  # noqa: E402
 from loomopt.packaged import problem_names  # noqa: E402
-from loomopt.scenes import Scene  # noqa: E402
+from loomopt.scene_errors import refusal, unknown  # noqa: E402
+from loomopt.shell import Progress, mistake, read_design, read_number, read_scene, remark  # noqa: E402
+from loomopt.solving.solution import Evaluation  # noqa: E402
+
+if _COLLECTING:
+    gc.enable()
 
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
 BAD_INPUT, DIFFERS, INTERRUPTED = 2, 1, 130
@@ -30,9 +33,9 @@ CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 
 app = typer.Typer(
     add_completion=False,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs.",
 )
 
@@ -47,46 +50,31 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
 
-def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> Scene:
-    """Return a scene with what the command line changes in it."""
-    scene, changes = load(problem), {}
-    for item in sets or ():
-        key, equals, value = item.partition("=")
-        if not equals:
-            raise BadInput("it is not KEY=VALUE", key="--set", value=item, remedy='Write --set operation.M0="800 N*m".')
-        changes[key.strip()] = value.strip()
-    if changes:
-        scene = scene.update(changes)
-    for name in on or ():
-        scene = scene.with_effect(name)
-    for name in off or ():
-        scene = scene.without_effect(name)
-    return scene
-
-
-def read_design(path: Path | None, scene: Scene) -> dict[str, float]:
-    """Return the design of a file, or none for today's."""
-    return designs.read(path, scene) if path else {}
-
-
-def remark(text: str) -> None:
-    """Say something beside the result."""
-    print(text, file=sys.stderr)
-
-
-def printed(data: dict[str, Any]) -> None:
+def printed(found: Evaluation) -> None:
     """Print one JSON object."""
-    print(json.dumps(data, indent=1, allow_nan=False))
+    from loomopt.views import outputs
+
+    print(outputs.document(found))
+
+
+@app.callback(invoke_without_command=True)
+def start(
+    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Show the version.")] = False
+) -> None:
+    """Show the version, or what there is to do."""
+    if version:
+        print(f"loomopt {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @app.command("list")
 def list_problems() -> None:
-    """List the packaged problems, their targets, where they come from."""
-    from loomopt.views import terminal
+    """List the packaged problems and their targets."""
+    from loomopt.views import plain, scene_view
 
-    scenes = [load(name) for name in problem_names()]
-    lines = [(s.name, s.job.name, ", ".join(s.job.targets), s.title, s.source) for s in scenes]
-    terminal.show(terminal.grid("", ("problem", "job", "targets", "title", "source"), lines))
+    plain.show(scene_view.listing([load(name) for name in problem_names()]))
 
 
 @app.command()
@@ -98,9 +86,9 @@ def new(
     from loomopt.store import atomically
 
     if job not in JOBS:
-        raise BadInput(f"there is no job {job}", value=job, allowed=", ".join(JOBS), remedy="Name one of them.")
+        raise unknown("job", job, JOBS, "", "")
     if file.exists():
-        raise BadInput("the file exists already", file=str(file), remedy="Choose another name, or remove it first.")
+        raise refusal("the file exists already", str(file), remedy="Choose another name, or remove it first")
     atomically(file, lambda place: _write(place, JOBS[job].template))
     remark(f"Wrote {file}. Next: loomopt show {file}, then loomopt solve {file}")
 
@@ -118,17 +106,17 @@ def show(
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Show a scene as it was read, in SI and as given; its equations; a drawing."""
-    from loomopt.views import outputs, scene_view, terminal
+    """Show a scene as it was read; its equations; a drawing."""
+    from loomopt.views import outputs, plain, scene_view
 
     scene = read_scene(problem, sets, on, off)
     if figure:
         outputs.picture(figure, scene, {})
         remark(f"Wrote {figure}")
     if equations:
-        terminal.show(*scene_view.equations(scene))
+        plain.show(*scene_view.equations(scene))
     elif not figure:
-        terminal.show(*scene_view.parts(scene))
+        plain.show(*scene_view.parts(scene))
 
 
 @app.command()
@@ -139,40 +127,31 @@ def solve(
     free: Free = None,
     on: With = None,
     off: Without = None,
-    accuracy: Annotated[float, typer.Option(help="Relative accuracy of every figure and the optimum.")] = 1e-8,
-    starts: Annotated[int, typer.Option(help="How many starts to try.")] = 1,
+    accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
+    starts: Annotated[str, typer.Option(metavar="N", help="How many starts to try.")] = "1",
     as_json: Json = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
     """Solve a problem and certify the answer."""
+    from loomopt.views import outputs, plain, terminal
+
     scene = read_scene(problem, sets, on, off)
     if free:
         scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
-    answer = api.solve(scene, target, accuracy=accuracy, starts=starts, on_start=_progress())
+    settings = {"accuracy": read_number("--accuracy", accuracy, float), "starts": read_number("--starts", starts, int)}
     if out:
-        from loomopt.views import outputs
-
+        outputs.check_folder(out)
+    with Progress() as progress:
+        answer = api.solve(
+            scene, target, **settings, on_start=lambda number, of: progress.say(f"start {number} of {of}")
+        )
+    if out:
         remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
     if as_json:
-        printed(answer.as_dict())
+        printed(answer)
     else:
-        from loomopt.views import terminal
-
-        terminal.show(*terminal.solution(answer, scene))
+        plain.show(*terminal.solution(answer, scene))
     raise typer.Exit(EXIT[answer.status])
-
-
-def _progress() -> Callable[[int, int], None] | None:
-    """Return a reporter of starts for a terminal; it keeps silent through the first second."""
-    if not sys.stderr.isatty():
-        return None
-    began = time.monotonic()
-
-    def report(number: int, of: int) -> None:
-        if time.monotonic() - began > 1.0:
-            print(f"\rstart {number} of {of}", end="" if number < of else "\n", file=sys.stderr, flush=True)
-
-    return report
 
 
 @app.command()
@@ -184,20 +163,16 @@ def evaluate(
     off: Without = None,
     as_json: Json = False,
 ) -> None:
-    """Show the figures of a given design (today's without one), nothing optimised."""
+    """Show the figures of a design (today's without one)."""
     scene = read_scene(problem, sets, on, off)
-    found = api.evaluate(scene, read_design(design, scene))
+    given = read_design(design, scene)
+    found = api.evaluate(scene, given)
     if as_json:
-        printed(found.as_dict())
+        printed(found)
         return
-    from loomopt.views import terminal
+    from loomopt.views import plain, terminal
 
-    held = (
-        "all limits held"
-        if found.admissible
-        else "NOT admissible: " + ", ".join(limit.name for limit in found.limits if not limit.ok)
-    )
-    terminal.show(f"{found.problem}: {held}", terminal.comparison(found, scene))
+    plain.show(*terminal.evaluation(found, scene, api.evaluate(scene) if given else None))
 
 
 @app.command()
@@ -212,8 +187,8 @@ def simulate(
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Compute curves over the cycle; without --out, print them every 15 degrees."""
-    from loomopt.views import outputs, scene_view, terminal
+    """Compute curves over the cycle; print them without --out."""
+    from loomopt.views import outputs, plain, scene_view
 
     scene = read_scene(problem, sets, on, off)
     given = read_design(design, scene)
@@ -221,7 +196,7 @@ def simulate(
         outputs.curves(path, scene, given)
         remark(f"Wrote {path}")
     if not out:
-        terminal.show(scene_view.curves(scene, given))
+        plain.show(*scene_view.curves(scene, given, plain.width()))
 
 
 @app.command()
@@ -231,7 +206,7 @@ def export(
     design: Design = None,
     sets: Set = None,
 ) -> None:
-    """Export the linkage in both dead centres, at true scale, for the workshop."""
+    """Export the linkage at true scale, for the workshop."""
     from loomopt.views import outputs
 
     scene = read_scene(problem, sets, None, None)
@@ -244,17 +219,26 @@ def check(
     problems: Annotated[list[str] | None, typer.Argument(help="Packaged scenes; all of them without a name.")] = None,
     write: Annotated[Path | None, typer.Option(metavar="DIR", help="Write new reference tables there instead.")] = None,
 ) -> None:
-    """Solve the packaged problems again and compare with the reference results."""
+    """Solve the packaged problems again; compare with results/."""
     from loomopt.studies import check as study
-    from loomopt.views import terminal
+    from loomopt.views import plain
 
     if write:
         remark(f"Wrote {len(study.write(write))} reference tables to {write}")
         return
-    outcomes = list(study.check(problems or ()))
-    lines = [(o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes]
-    terminal.show(terminal.grid("", ("problem", "target", "status", "against the reference"), lines))
-    if any(outcome.differences for outcome in outcomes):
+    outcomes: list[study.Outcome] = []
+    try:
+        with Progress() as progress:
+            for outcome in study.check(problems or ()):
+                outcomes.append(outcome)
+                progress.say(f"checked {outcome.problem}, {outcome.target}")
+    finally:
+        if outcomes:
+            lines = tuple((o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes)
+            plain.show(plain.Grid("", ("problem", "target", "status", "against the reference"), lines))
+    differ = [outcome for outcome in outcomes if outcome.differences]
+    if differ:
+        remark(f"loomopt: {len(differ)} of {len(outcomes)} differ from the reference")
         raise typer.Exit(DIFFERS)
 
 
@@ -262,19 +246,21 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
         status = int(app(arguments, standalone_mode=False) or 0)
+    except typer.Exit as error:
+        status = error.exit_code
     except BadInput as error:
         remark(f"loomopt: {error}")
         return BAD_INPUT
     except CommandLineError as error:
-        remark(f"loomopt: {error.format_message()} See `loomopt --help`.")
+        remark(f"loomopt: {mistake(error)}")
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         status = INTERRUPTED
-    except typer.Exit as error:
-        status = error.exit_code
-    except BrokenPipeError:
-        sys.stderr.close()
+    except (BrokenPipeError, SystemExit):  # nobody reads on: Click leaves by SystemExit
         return 0
+    except OSError as error:
+        remark(f"loomopt: the output cannot be written: {error.strerror or error}")
+        return BAD_INPUT
     if status == INTERRUPTED:
         remark("loomopt: stopped; nothing was left half-written.")
     return status
@@ -282,8 +268,19 @@ def run(arguments: list[str] | None = None) -> int:
 
 def main() -> None:
     """Enter from the shell; leave without taking the interpreter apart object by object, a tenth of the whole time."""
+    gc.disable()
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:
+            reconfigure(errors="replace")
     status = run()
     atexit._run_exitfuncs()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except BrokenPipeError:
+        pass
+    except OSError as error:
+        remark(f"loomopt: the output cannot be written: {error.strerror}")
+        status = BAD_INPUT
     os._exit(status)

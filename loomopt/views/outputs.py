@@ -54,7 +54,7 @@ def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _no_folder(folder, error.strerror) from None
+        raise _no_folder(folder, error.strerror or str(error)) from None
     for name, content in contents.items():
         text(folder / name, content)
     return [folder / name for name in contents]

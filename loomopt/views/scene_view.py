@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,8 @@ import numpy as np
 from loomopt.jobs import beatup_program
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.words import Words
-from loomopt.views.plain import Grid
+from loomopt.views.plain import GAP, Grid
 
-COLUMNS = 7
-"""Curves printed side by side; more go into a second table."""
 STEP = 15
 """Crank angle between printed rows, deg."""
 
@@ -92,8 +90,8 @@ def equations(scene: Any) -> list[str]:
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> list[str | Grid]:
-    """Return the curves every 15 degrees and at the dead centres, both sides of a jump, as tables."""
+def curves(scene: Any, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
+    """Return the curves every 15 degrees and at the dead centres, both sides of a jump; more tables where too wide."""
     task = TASKS[scene.job.name]
     full = {**task.today(scene), **design}
     columns = dict(task.curves(scene, full))
@@ -104,15 +102,27 @@ def curves(scene: Any, design: Mapping[str, float]) -> list[str | Grid]:
         for k, a in enumerate(angle)
         if abs(a / STEP - round(a / STEP)) < 1e-9 or min(abs(a - mark) for mark in centres.values()) < 1e-9
     ]
-    cells = [_curve(name, values) for name, values in columns.items()]
     marks = ", ".join(f"{name} at {value:.3f} deg" for name, value in centres.items())
-    found: list[str | Grid] = [f"{scene.title}: {marks}"]
-    for first in range(0, len(cells), COLUMNS):
-        some = cells[first : first + COLUMNS]
-        lines = tuple((f"{angle[k]:.3f}", *(texts[k] for _, texts in some)) for k in rows)
-        heads = ("phi\n[deg]", *(head for head, _ in some))
-        found.append(Grid("", heads, lines, right=tuple(range(len(heads)))))
-    return found
+    first = ("phi\n[deg]", [f"{degrees:.3f}" for degrees in angle])
+    groups: list[list[tuple[str, list[str]]]] = [[]]
+    for curve in (_curve(name, values) for name, values in columns.items()):
+        if width and groups[-1] and sum(map(_width, (first, *groups[-1], curve))) > width + len(GAP):
+            groups.append([])
+        groups[-1].append(curve)
+    tables = [_table([first, *group], rows) for group in groups]
+    return [f"{scene.title}: {marks}", *tables]
+
+
+def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> Grid:
+    """Return some curves as a table; rows: places of the rows it shows."""
+    lines = tuple(tuple(texts[k] for _, texts in some) for k in rows)
+    return Grid("", tuple(head for head, _ in some), lines, right=tuple(range(len(some))))
+
+
+def _width(curve: tuple[str, list[str]]) -> int:
+    """Return the characters a curve's column takes with the gap after it."""
+    head, texts = curve
+    return max(len(text) for text in (*head.split("\n"), *texts)) + len(GAP)
 
 
 def _curve(name: str, values: Any) -> tuple[str, list[str]]:

@@ -110,7 +110,7 @@ def certificate(answer: Solution) -> list[str]:
     limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (found.feasibility, found.violation))
     unique = "unique" if found.unique else "not unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
-    return [line, *([f"Chosen among equals by {'; '.join(found.settled)}"] if found.settled else [])]
+    return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
 
 
 def _starts(answer: Solution, scene: Any) -> str:
