@@ -17,6 +17,8 @@ ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
 """Share of the counterweight's room that a solve starts from."""
+MASKED = 1e-3
+"""A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
 
 
@@ -99,13 +101,15 @@ class _Sizes:
 
     def __init__(self, physics: Beatup, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> None:
         sampler = Sampler(physics, known)
-        front = abs(sampler.static.get("M3_fdc", 0.0))
         resistance = known.get("M0", 0.0) if "resistance.pulse" in known else 0.0
+        front = sampler.static.get("M3_fdc", 0.0)
         self.known, self.limited, self.sampler = known, limited, sampler
         self.length = known["l4"]
         self.inertia = max(known.get("inertia.J4", 0.0), limited["m4e"][1] * limited["r4e"][1] ** 2) or 1.0
         self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
-        self.torque = max(front, resistance) or self.peak
+        # What a design can change of the reed torque is its share beside the resistance.
+        self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
+        self.mean_square = self.torque * max(self.torque, resistance)
 
     def variable(self, name: str) -> float:
         """Return the size of a variable: its kind's, or its own largest value."""
@@ -255,6 +259,6 @@ def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
     return {
         "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", sizes.torque), peak),
         "torque": (peak,),
-        "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.torque**2, power=2),),
+        "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.mean_square, power=2),),
         "retrofit": (Objective("change", "change", "value", 1.0),),
     }[target]

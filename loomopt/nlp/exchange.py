@@ -20,8 +20,10 @@ from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
 
 ROUNDS = 16
 FIRST_SLOTS, LEADING = 6, 4
-TOUCHING, POLISHES = 1e-8, 2
-"""Rows this close to their bound are polished onto it."""
+STANDS = 1e-7
+"""Largest excess of a row at a point that the certificate should look at."""
+TOUCHING, SETTLED, POLISHES = 1e-8, 1e-8, 3
+"""Rows this close to their bound are polished onto it; a smaller step no longer moves an extreme's value."""
 PENALTY = 10.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -46,6 +48,8 @@ class Point:
 
     x: dict[str, float]
     status: str
+    reached: bool
+    """Whether the point is worth a certificate: IPOPT converged, or gave up where all rows hold."""
     iterations: int = 0
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     violation: float = math.inf
@@ -53,11 +57,6 @@ class Point:
     built: float = 0.0
     relaxed: dict[int, float] = field(default_factory=dict)
     """Elastic solves only: limit's place → excess it needs, SI."""
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether IPOPT reports a solution."""
-        return self.status in SUCCESS
 
 
 def sampler_at(program: Program, x: Mapping[str, float]) -> Sampler | None:
@@ -94,11 +93,11 @@ class _Run:
     def go(self, x: dict[str, float], warm: Point | None) -> Point:
         sampler = sampler_at(self.program, x)
         if sampler is None:
-            return Point(x, "Not_Assembled")
+            return Point(x, "Not_Assembled", False)
         peaks = [sampler.extremes(family.row) for family in self.families]
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
-        status, violation, extra = "Maximum_Rounds_Exceeded", math.inf, None
+        status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None
         for _ in range(ROUNDS):
             nlp = self._transcribed(sampler, max(map(len, nodes), default=0), warm=bool(raw))
             before, cold = x, not raw
@@ -107,16 +106,17 @@ class _Run:
                 status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
             sampler = sampler_at(self.program, x)
             if sampler is None:
-                return Point(x, "Invalid_Number_Detected", self.iterations)
+                return Point(x, "Invalid_Number_Detected", False, self.iterations)
             peaks = [sampler.extremes(family.row) for family in self.families]
             violation = self._extend(nodes, peaks, extra)
-            if status not in SUCCESS or violation <= self.settings.accuracy / 100:
+            reached = status in SUCCESS or self._stands(nlp, sampler, x, extra, nodes)
+            if not reached or violation <= self.settings.accuracy / 100:
                 break
         relaxed = self._relaxed(extra) if self.elastic and extra is not None else {}
-        if status in SUCCESS and extra is not None and not self.elastic:
-            x = self._polish(x, extra, raw)
+        if reached and extra is not None and not self.elastic:
+            x = self._polish(x, extra, raw, peaks)
         kept = tuple(tuple(chosen) for chosen in nodes)
-        return Point(x, status, self.iterations, kept, violation, raw, self.built, relaxed)
+        return Point(x, status, reached, self.iterations, kept, violation, raw, self.built, relaxed)
 
     def _transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
         """Return the NLP with room for that many nodes a family, its solver made; charges what had to be built."""
@@ -129,13 +129,29 @@ class _Run:
         self.built += time.perf_counter() - began if fresh else 0.0
         return nlp
 
-    def _polish(self, x: dict[str, float], extra: Floats, raw: Mapping[str, Floats]) -> dict[str, float]:
+    def _stands(
+        self,
+        nlp: Transcription,
+        sampler: Sampler,
+        x: Mapping[str, float],
+        extra: Floats,
+        nodes: Sequence[list[Extreme]],
+    ) -> bool:
+        """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
+        if self.elastic or len(extra) != nlp.extras or max(map(len, nodes), default=0) > nlp.slots:
+            return False
+        arguments = self._arguments(nlp, sampler, x, extra, nodes)
+        rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
+        return bool(np.all(rows <= arguments["ubg"] + STANDS) and np.all(rows >= arguments["lbg"] - STANDS))
+
+    def _polish(
+        self, x: dict[str, float], extra: Floats, raw: Mapping[str, Floats], peaks: Sequence[list[Extreme]]
+    ) -> dict[str, float]:
         """Return x put exactly on what binds, each touching extreme of the cycle as one row at its own angle."""
         for _ in range(POLISHES):
             sampler = sampler_at(self.program, x)
             if sampler is None:
                 return x
-            peaks = [sampler.extremes(family.row) for family in self.families]
             touching = [
                 [e for e in found if self._excess(family, e, extra) >= -TOUCHING]
                 for family, found in zip(self.families, peaks, strict=True)
@@ -147,6 +163,10 @@ class _Run:
             lam_g = np.concatenate([raw["lam_g"][:rows], active.astype(float)])
             flat = polished(nlp.jacobian, arguments, arguments["x0"], raw["lam_x"], lam_g)
             x, extra = self._design(flat), flat[len(self.program.variables) :]
+            moved = sampler_at(self.program, x)
+            if moved is None or np.abs(flat - arguments["x0"]).max() <= SETTLED:
+                return x
+            peaks = [moved.extremes(family.row) for family in self.families]
         return x
 
     def _design(self, flat: Floats) -> dict[str, float]:

@@ -123,6 +123,7 @@ class Transcription:
             options: dict[str, Any] = {
                 "ipopt": IPOPT | (WARM if warm else {}),
                 "print_time": False,
+                "show_eval_warnings": False,
                 "calc_lam_p": False,
             }
             options["error_on_fail"] = False

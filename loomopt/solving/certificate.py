@@ -206,7 +206,7 @@ class _Trial:
         slack = [abs(found[k]) * max(0.0, -self._slack(k)) for k in inequalities]
         held = sum(abs(found[k]) for k in equal if k >= len(self.limits))
         if not (objective.form == "magnitude" and len(pieces) == 2):
-            self._curve(pieces, [k for k in range(len(self.rows)) if abs(found[k]) > POSITIVE], equal, found)
+            self._curve(pieces, equal, found)
         return Level(objective.figure, float(residual), float(max(slack, default=0.0)), float(held))
 
     def _slack(self, k: int) -> float:
@@ -217,18 +217,23 @@ class _Trial:
             return (abs(row.node.value) - row.limit.value) / row.limit.scale
         return self.excess[self.program.limits.index(row.limit)]
 
-    def _curve(self, pieces: list[int], binding: list[int], equal: list[int], multipliers: Floats) -> None:
-        """Judge the Lagrangian's curvature along the directions that no binding row forbids."""
+    def _curve(self, pieces: list[int], equal: list[int], multipliers: Floats) -> None:
+        """Judge the Lagrangian's curvature along the directions that no binding row forbids.
+
+        Binding are limits with a multiplier, equalities, and the differences between pieces that share the objective.
+        """
         self.unique = True
-        rows = sorted({*binding, *equal, *(k for k in pieces if len(pieces) == 1)})
-        _, sizes, basis = np.linalg.svd(self.gradients[rows])
+        bound = np.abs(multipliers) > POSITIVE
+        rows = sorted({*equal, *(k for k in range(len(self.limits)) if bound[k])})
+        shared = [k for k in pieces if bound[k]]
+        jacobian = np.vstack([self.gradients[rows], self.gradients[shared[1:]] - self.gradients[shared[:1]]])
+        _, sizes, basis = np.linalg.svd(jacobian)
         free = basis[int(np.sum(sizes > FLAT * max(1.0, sizes.max(initial=0.0)))) :].T
         if free.shape[1] == 0:
             self.settled_alone = True
             return
         curved = self.exact.curvatures(free)
-        weights = np.where(np.isin(np.arange(len(self.rows)), rows), multipliers, 0.0)
-        values, vectors = np.linalg.eigh(np.tensordot(weights, curved, axes=1))
+        values, vectors = np.linalg.eigh(np.tensordot(multipliers, curved, axes=1))
         self.settled_alone = bool(values.min() > FLAT)
         self._correct(free @ vectors[:, values > CURVED], values[values > CURVED], multipliers)
         weak = [k for k in range(len(self.limits)) if k not in rows]

@@ -47,7 +47,7 @@ def _least(
 ) -> tuple[Point, dict[int, float]] | None:
     """Return the point that needs least, and each limit's need in SI, both rows of one limit counted once."""
     points = [exchange.solve(program, start, settings, elastic=True) for start in starts]
-    solved = [point for point in points if point.succeeded]
+    solved = [point for point in points if point.reached]
     if not solved:
         return None
     best = min(solved, key=lambda point: _total(program, point))

@@ -149,11 +149,11 @@ class _Search:
         self.spent += time.perf_counter() - began
         self.built += point.built
         self.points.append(point)
-        return point.succeeded
+        return point.reached
 
     def _judge(self) -> bool:
         """Settle and certify the best point so far; says whether it passed."""
-        solved = [point for point in self.points if point.succeeded]
+        solved = [point for point in self.points if point.reached]
         if not solved:
             return False
         best = min(solved, key=functools.cmp_to_key(self._compare))
@@ -163,10 +163,11 @@ class _Search:
         assert self.certificate is not None
         if self._too_weak(self.certificate):
             self.settings = replace(self.settings, penalty=self.settings.penalty * STRONGER)
-            start = self.best.x
-            self.points.remove(self.best)
-            self.best = None
-            return self._try(start, None) and self._judge()
+            before = self.best, self.certificate, self.x
+            if self._try(self.best.x, None):
+                self.points.remove(self.best)
+                return self._judge()
+            self.best, self.certificate, self.x = before
         return self.certificate.passed
 
     def _too_weak(self, certificate: Certificate) -> bool:
@@ -231,7 +232,7 @@ class _Search:
             design = task.design(program, found.x) if found.x else task.today(scene)
             here = report.evaluation(scene, task, program, design)
             return report.without_optimum(scene, target, here, found, solver, before)
-        same = [p for p in self.points if p.succeeded and self._compare(p, self.best) == 0]
+        same = [p for p in self.points if p.reached and self._compare(p, self.best) == 0]
         solver |= {
             "status": self.best.status,
             "iterations": self.best.iterations,
@@ -245,7 +246,7 @@ class _Search:
     def _optima(self) -> tuple[tuple[Mapping[str, float | None], int], ...]:
         """Return the distinct optima the starts ended in, best first, with how many starts did."""
         groups: list[tuple[Point, int]] = []
-        for point in sorted((p for p in self.points if p.succeeded), key=functools.cmp_to_key(self._compare)):
+        for point in sorted((p for p in self.points if p.reached), key=functools.cmp_to_key(self._compare)):
             if groups and self._compare(groups[-1][0], point) == 0:
                 groups[-1] = (groups[-1][0], groups[-1][1] + 1)
             else:

@@ -17,6 +17,8 @@ from loomopt.solving.solution import Solution
 if TYPE_CHECKING:
     import pandas as pd
 
+LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0}
+"""Sizes below which a difference is measured against the size instead, by unit, SI."""
 OBJECTIVE, DESIGN = 1e-8, 1e-6
 """Allowed differences, relative to the value (to the peak torque where a torque is zero)."""
 
@@ -107,7 +109,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
                 found.append(f"{name}: {new}, reference {old}")
             continue
         allowed = OBJECTIVE if name.split(" [")[0] in objectives else DESIGN
-        size = max(abs(float(old)), peak if "N*m" in name else 0.0 if abs(float(old)) else 1.0)
+        size = max(abs(float(old)), peak if "N*m]" in name else LEAST.get(name.rpartition(" ")[2], 1e-3))
         if not abs(float(new) - float(old)) <= allowed * size:
             found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")
     return found
