@@ -30,7 +30,8 @@ def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
     import pandas as pd
 
     frame = pd.DataFrame(rows(solution, scene))
-    frame.attrs.update(provenance(scene))
+    more = {"target": solution.target} if isinstance(solution, Solution) else {}
+    frame.attrs.update(provenance(scene, **more))
     return frame.set_index("name")
 
 

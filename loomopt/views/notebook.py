@@ -1,24 +1,28 @@
-"""How an answer shows itself in Jupyter: sentence, table and drawing, as self-contained HTML."""
+"""How an answer shows itself in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
 
 from html import escape
 from typing import Any
 
-from loomopt import tables
 from loomopt.solving.solution import Solution
-from loomopt.views import drawing, svg
+from loomopt.views import drawing, svg, terminal
+from loomopt.views.plain import Grid
 
 
 def answer(solution: Solution, scene: Any) -> str:
-    """Return an answer as HTML: what was found, design beside today, what binds, the mechanism."""
-    head = f"<p><b>{escape(solution.problem)}, {escape(solution.target)}: {escape(solution.status)}.</b> "
-    text = f"{head}{escape(solution.message)}</p>"
-    table = tables.answer(solution, scene).to_html(float_format=lambda value: f"{value:.6g}", na_rep="", border=0)
-    binding = "".join(
-        f"<li>{escape(price.text)}: {escape(next(iter(price.worth)))} {escape(price.reading)}</li>"
-        for price in solution.binding
-    )
-    listed = f"<p>What binds, and what loosening it is worth:</p><ul>{binding}</ul>" if binding else ""
-    passed = solution.certificate is not None and solution.certificate.passed
-    mark = "Certificate passed." if passed else "Not certified."
-    picture = svg.render(drawing.linkage(solution.design, solution.problem))
-    return f"<div>{text}{table}{listed}<p>{mark}</p>{picture}</div>"
+    """Return an answer as HTML: what was found, design beside today, what binds, certificate, the mechanism."""
+    shown = terminal.solution(solution, scene)
+    parts = (table(part) if isinstance(part, Grid) else f"<p>{escape(part)}</p>" for part in shown)
+    return f"<div>{''.join(parts)}{svg.render(drawing.linkage(solution.design, solution.problem))}</div>"
+
+
+def table(grid: Grid) -> str:
+    """Return a table as HTML, numbers to the right."""
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in grid.columns)
+    rows = ("".join(_cell(cell, place in grid.right) for place, cell in enumerate(line)) for line in grid.lines)
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    caption = f"<caption>{escape(grid.title)}</caption>" if grid.title else ""
+    return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cell(text: str, right: bool) -> str:
+    return f'<td style="text-align: {"right" if right else "left"}">{escape(text)}</td>'
