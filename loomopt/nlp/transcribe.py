@@ -144,6 +144,11 @@ class Transcription:
         """Rows and their derivatives, as the solver computes them: (x, p) → (g, dg/dx)."""
         return self._derivatives["jac_g"]
 
+    @property
+    def gradient(self) -> Any:
+        """The objective and its derivatives: (x, p) → (f, df/dx)."""
+        return self._derivatives["grad_f"]
+
     def _is_row(self, limit: Any) -> bool:
         return limit.family == "static" or (self.elastic and limit.family == "variable")
 
@@ -254,7 +259,7 @@ class Transcription:
         return [weight * (end - start), offset, *coefficients, *(weight * (at_end - at_start)), *switches]
 
     def vector(
-        self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[list[Extreme]]
+        self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[Sequence[Extreme]]
     ) -> Floats:
         """Return the parameter vector for a program's numbers and the nodes of each family."""
         p, write = np.zeros(self.layout.size), self.layout.write

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from loomopt.jobs.program import Limit, Program
 from loomopt.nlp import exchange
-from loomopt.nlp.exchange import Point, Settings
+from loomopt.nlp.point import Point, Settings
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
 

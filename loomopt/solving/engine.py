@@ -11,7 +11,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
-from loomopt.nlp.exchange import Point, Settings
+from loomopt.nlp.point import Point, Settings, sampler_at
 from loomopt.solving import report
 from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, Certificate, certify
 from loomopt.solving.settle import settle
@@ -268,7 +268,7 @@ class _Search:
 
 def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
     """Return the objectives of variables x (SI) in their natural sizes; infinite where they have no value."""
-    sampler = exchange.sampler_at(program, dict(x))
+    sampler = sampler_at(program, dict(x))
     if sampler is None:
         return (math.inf,) * len(program.objectives)
     values = (sampler.peak(o.row) if o.form == "peak" else abs(sampler.figures[o.row]) for o in program.objectives)

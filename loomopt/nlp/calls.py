@@ -1,0 +1,113 @@
+"""One program's NLP as it is called: parameters, bounds and scales in, a design out."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from loomopt.cycle import Floats
+from loomopt.jobs.program import Program
+from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.nlp.point import Settings
+from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
+
+FIRST_SLOTS = 6
+
+
+class Calls:
+    """How one program is put to its NLP; charges what had to be built on the way."""
+
+    def __init__(self, program: Program, settings: Settings, elastic: bool) -> None:
+        self.program, self.settings, self.elastic = program, settings, elastic
+        self.families = families(program, elastic)
+        count = len(program.objectives)
+        self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
+        self.built = 0.0
+
+    def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
+        """Return the local extremes of each family's quantity."""
+        return [sampler.extremes(family.row) for family in self.families]
+
+    def transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
+        """Return the NLP with room for that many nodes a family, its solver made; charges what had to be built."""
+        slots = FIRST_SLOTS
+        while slots < nodes:
+            slots *= 2
+        began = time.perf_counter()
+        nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
+        nlp.solver(warm, self.settings.callback)
+        self.built += time.perf_counter() - began if fresh else 0.0
+        return nlp
+
+    def arguments(
+        self,
+        nlp: Transcription,
+        sampler: Sampler,
+        x: Mapping[str, float],
+        extra: Floats,
+        nodes: Sequence[Sequence[Extreme]],
+    ) -> dict[str, Any]:
+        """Return what the NLP is called with: start, parameters and bounds, all scaled."""
+        variables = self.program.variables
+        lower = np.array([v.lower / v.scale for v in variables])
+        upper = np.array([v.upper / v.scale for v in variables])
+        if self.elastic:
+            bounded = {limit.row for limit in self.program.limits if limit.family == "variable"}
+            open_ended = np.array([v.name in bounded for v in variables])
+            lower = np.where(open_ended, np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
+            upper = np.where(open_ended, np.inf, upper)
+        equal = [limit.sign == 0 for limit in nlp.static] + [False] * (nlp.nlp["g"].numel() - len(nlp.static))
+        scaled = np.array([x[v.name] / v.scale for v in variables])
+        return {
+            "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
+            "p": nlp.vector(self.program, sampler, self.weights, nodes),
+            "lbx": np.concatenate([lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)]),
+            "ubx": np.concatenate([upper, np.full(len(extra), np.inf)]),
+            "lbg": np.where(equal, 0.0, -np.inf),
+            "ubg": np.where(self.idle_rows(nlp, nodes), 1.0, 0.0),
+        }
+
+    def overdetermined(self, arguments: Mapping[str, Any]) -> bool:
+        """Say whether more equalities than free variables leave nothing to solve for."""
+        return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
+
+    def design(self, flat: Floats) -> dict[str, float]:
+        """Return the variables, SI, of the NLP's scaled vector."""
+        found = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, flat, strict=False)}
+        if self.elastic:
+            return found
+        return {v.name: min(max(found[v.name], v.lower), v.upper) for v in self.program.variables}
+
+    def first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> Floats:
+        """Return epigraph variables just above the start's own values, or ones for an elastic start."""
+        if self.elastic:
+            return np.ones(nlp.extras)
+        first = []
+        for k in nlp.epigraphs:
+            objective = self.program.objectives[k]
+            if objective.form == "magnitude":
+                first.append(abs(sampler.static[objective.row]) / objective.scale)
+            else:
+                family = next(place for place, f in enumerate(self.families) if f.objective == k)
+                first.append(abs(peaks[family][0].value) / objective.scale)
+        return 1.01 * np.array(first) + 0.01
+
+    def idle_rows(self, nlp: Transcription, nodes: Sequence[Sequence[Extreme]]) -> list[bool]:
+        """Say which rows belong to unused slots."""
+        rows = [False] * (nlp.nlp["g"].numel() - len(self.families) * nlp.slots)
+        for chosen in nodes:
+            rows += [k >= len(chosen) for k in range(nlp.slots)]
+        return rows
+
+    def excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
+        """Return by how much an extreme exceeds its bound, relative to the row's size."""
+        if family.objective >= 0:
+            epigraphs = [k for k, o in enumerate(self.program.objectives) if o.form != "value"]
+            scale, bound = self.program.objectives[family.objective].scale, extra[epigraphs.index(family.objective)]
+        else:
+            limit = self.program.limits[family.limit]
+            soft = [k for k, other in enumerate(self.program.limits) if other.relaxable]
+            scale, bound = limit.scale, limit.value / limit.scale
+            bound += extra[2 * soft.index(family.limit)] if self.elastic and family.limit in soft else 0.0
+        return float(abs(extreme.value) / scale - bound)
