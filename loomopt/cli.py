@@ -245,7 +245,7 @@ def check(
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
-        status = int(app(arguments, standalone_mode=False) or 0)
+        status = int(app(arguments, standalone_mode=False, prog_name="loomopt") or 0)
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:

@@ -33,18 +33,20 @@ class Progress:
 
 
 def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> Scene:
-    """Return a scene with what the command line changes in it."""
-    scene, changes = load(problem), {}
+    """Return a scene with what the command line changes in it: effects' own values, effects on, the rest, effects off."""
+    scene = load(problem)
+    own: dict[str, object] = {}
+    rest: dict[str, object] = {}
     for item in sets or ():
         key, equals, value = item.partition("=")
         if not equals:
             remedy = 'Write --set operation.M0="800 N*m"'
             raise refusal("it is not KEY=VALUE", scene.origin, "--set", item, remedy=remedy)
-        changes[key.strip()] = value.strip()
-    if changes:
-        scene = scene.update(changes)
+        (own if key.strip().startswith("effects.") else rest)[key.strip()] = value.strip()
+    scene = scene.update(own) if own else scene
     for name in on or ():
         scene = scene.with_effect(name)
+    scene = scene.update(rest) if rest else scene
     for name in off or ():
         scene = scene.without_effect(name)
     return scene
