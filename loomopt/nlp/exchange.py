@@ -65,7 +65,7 @@ class _Run:
             peaks = calls.peaks(sampler)
             violation = self._extend(nodes, peaks, extra)
             reached = status in SUCCESS or self._stands(nlp, sampler, x, extra, nodes)
-            if not reached or violation <= self.settings.accuracy / 100:
+            if not reached or violation <= self.settings.excess:
                 break
         kept = tuple(map(tuple, nodes))
         point = Point(x, status, reached, self.iterations, kept, violation, raw, calls.built)
@@ -74,7 +74,8 @@ class _Run:
         if self.elastic:
             return replace(point, relaxed=self._relaxed(extra))
         x, touching = polish(calls, x, extra, point, peaks)
-        return replace(point, x=x, binding=tuple(map(tuple, touching)), built=calls.built)
+        binding = tuple(map(tuple, touching))
+        return replace(point, x=x, binding=binding, built=calls.built, structure=self.program.structure)
 
     def _stands(
         self,
@@ -132,7 +133,7 @@ class _Run:
             for extreme in found:
                 excess = self.calls.excess(family, extreme, extra)
                 worst = max(worst, excess)
-                if excess > self.settings.accuracy / 100:
+                if excess > self.settings.excess:
                     chosen.append(extreme)
         return worst
 

@@ -70,7 +70,7 @@ def follow(calls: Calls, sampler: Sampler, peaks: Nodes, warm: Point) -> Point |
             continue
         families = zip(calls.families, peaks, strict=True)
         worst = max((calls.excess(family, e, extra) for family, found in families for e in found), default=0.0)
-        if multipliers is None or worst > calls.settings.accuracy / 100:
+        if multipliers is None or worst > calls.settings.excess:
             return None
         raw = {
             **warm.raw,

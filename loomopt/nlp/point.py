@@ -1,7 +1,7 @@
 """Where a solve starts, stands and ends: plain records."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,8 @@ from loomopt.jobs.sampling import Extreme, Sampler
 
 PENALTY = 10.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
+ROUNDING = 1e-12
+"""A whole-cycle value cannot be told closer, relative to its size."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 
 
@@ -21,6 +23,11 @@ class Settings:
     accuracy: float = 1e-8
     penalty: float = PENALTY
     callback: Any = None
+
+    @property
+    def excess(self) -> float:
+        """Largest excess of a whole-cycle row, relative to its size, that is left alone: two decades tighter."""
+        return max(self.accuracy / 100, ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,8 @@ class Point:
     built: float = 0.0
     binding: tuple[tuple[Extreme, ...], ...] = ()
     """Per family, the extremes whose rows bind."""
+    structure: Hashable = None
+    """The structure of the program it answers."""
     relaxed: dict[int, float] = field(default_factory=dict)
     """Elastic solves only: limit's place → excess it needs, SI."""
 

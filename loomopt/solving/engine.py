@@ -53,7 +53,7 @@ def solve(
     """Return the certified optimum of a scene's target, or what stands in its way.
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
-    near: an answer of the same structure to start warm from; on_iteration: called with each iteration's number;
+    near: an answer to start warm from (one of another structure is no help and is left alone); on_iteration: called with each iteration's number;
     on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
@@ -64,7 +64,8 @@ def solve(
     imported = _import_solver()
     program = task.program(scene, target)
     search = _Search(scene, task, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
-    search.run(starts, near.point if near else None, on_start)
+    same = near is not None and near.point is not None and near.point.structure == program.structure
+    search.run(starts, near.point if near and same else None, on_start)
     answer = search.answer(target)
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
@@ -99,9 +100,8 @@ def _check_numbers(accuracy: float, starts: int) -> None:
         raise BadInput("the number of starts is out of range", key="--starts", value=str(starts), allowed="1 to 10000")
 
 
-@functools.cache
 def _import_solver() -> float:
-    """Import CasADi; returns the seconds it took, so that building is not charged with it."""
+    """Import CasADi where it is not yet; returns the seconds it took, so that building is not charged with it."""
     began = time.perf_counter()
     import casadi  # noqa: F401
 
