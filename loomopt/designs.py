@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from loomopt.errors import BadInput
+from loomopt.quantities import quantity_of
 from loomopt.scene_errors import refusal, unknown
 
 LARGEST_FILE = 1_000_000
@@ -49,6 +50,10 @@ def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < LARGEST:
             remedy = "Correct the number"
             raise refusal("no design can have it", origin, f"design.{name}", value, _ALLOWED, remedy)
+        if value == 0 and name in scene.job.mechanism.model_fields:
+            quantity = quantity_of(scene.job.mechanism, name)
+            if quantity and quantity.above == 0:
+                raise refusal("it is zero", origin, f"design.{name}", value, quantity.range, "Correct the number")
     design = {name: float(value) for name, value in data.items()}
     fault = scene.job.fault({**scene.mechanism, **design})
     if fault:

@@ -33,7 +33,7 @@ class Progress:
 
 
 def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> Scene:
-    """Return a scene with what the command line changes in it: effects' own values, effects on, the rest, effects off."""
+    """Return a scene with what the command line changes in it: effects on, then any number, then effects off."""
     scene = load(problem)
     own: dict[str, object] = {}
     rest: dict[str, object] = {}

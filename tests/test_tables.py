@@ -1,0 +1,84 @@
+"""Tables: units in the column names, provenance with every table, digits that come back from CSV."""
+
+import io
+import re
+
+import pandas as pd
+import pytest
+
+import loomopt as lo
+from loomopt import tables
+from loomopt.units import factor, parse_unit
+
+SCENE = lo.load("beatup")
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return lo.solve(SCENE)
+
+
+def read_back(text):
+    return pd.read_csv(io.StringIO(text), comment="#")
+
+
+@pytest.mark.parametrize("effects", [[], ["gravity", "bearing_friction"], ["rod_inertia", "centrifugal"]])
+def test_columns_carry_their_unit_in_ascii(effects):
+    scene = SCENE
+    for effect in effects:
+        scene = scene.with_effect(effect)
+    for name in lo.simulate(scene):
+        assert name.isascii()
+        match = re.fullmatch(r"\w+ \[(.+)\]", name)
+        assert match, name
+        parse_unit(match[1])
+
+
+def test_every_table_carries_its_provenance(answer):
+    for frame in (answer.table(), answer.curves(), lo.simulate(SCENE)):
+        assert frame.attrs["scene"] == "beatup"
+        assert frame.attrs["scene_hash"] == SCENE.hash
+        assert frame.attrs["loomopt"] == lo.__version__
+        assert {"casadi", "numpy"} <= set(frame.attrs)
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", frame.attrs["date"])
+        head = tables.csv(frame).splitlines()[: len(frame.attrs)]
+        assert head == [f"# {name}: {value}" for name, value in frame.attrs.items()]
+    assert answer.table().attrs["target"] == "balance"
+
+
+def test_the_hash_tells_scenes_apart_by_what_decides_the_answer():
+    scenes = [SCENE, SCENE.set("operation.M0", "0.745 kN*m"), SCENE.set("operation.M0", "800 N*m")]
+    hashes = [lo.simulate(scene).attrs["scene_hash"] for scene in scenes]
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_the_table_of_an_answer_is_in_the_scenes_own_units(answer):
+    table = answer.table()
+    assert list(table.columns) == ["unit", "today", "design", "min", "max", "ok"]
+    assert table.loc["l1", "unit"] == "mm"
+    assert table.loc["l1", "today"] == 31
+    for name, value in {**answer.design, **answer.figures}.items():
+        if value is not None and name != "change":
+            assert table.loc[name, "design"] * factor(table.loc[name, "unit"]) == pytest.approx(value, rel=1e-14)
+    assert "bearing_force" not in table.index
+    assert table["ok"].all()
+    assert (table.loc["mu_min", "min"], pd.isna(table.loc["mu_min", "max"])) == (pytest.approx(56.5), True)
+
+
+def test_a_scene_in_inches_gives_a_table_in_inches():
+    scene = SCENE.set("mechanism.l1", "1.25 in")
+    table = tables.answer(lo.evaluate(scene), scene)
+    assert (table.loc["l1", "unit"], table.loc["l1", "design"]) == ("in", pytest.approx(1.25, rel=1e-14))
+
+
+def test_csv_reads_back_to_the_last_digit(answer):
+    for frame in (lo.simulate(SCENE), answer.table()):
+        back = pd.read_csv(io.StringIO(tables.csv(frame)), comment="#", dtype=str)
+        for name in frame.select_dtypes(float):
+            assert [float(cell) for cell in back[name].dropna()] == list(frame[name].dropna())
+
+
+def test_the_same_scene_gives_the_same_digits(answer):
+    again = lo.solve(lo.load("beatup"))
+    pd.testing.assert_frame_equal(again.table(), answer.table(), check_exact=True)
+    assert tables.csv(lo.simulate(SCENE)) == tables.csv(lo.simulate(lo.load("beatup")))

@@ -1,0 +1,50 @@
+"""An answer in Jupyter: well-formed HTML with a table and a drawing, text from outside harmless."""
+
+import dataclasses
+from xml.etree import ElementTree
+
+import pytest
+
+import loomopt as lo
+from loomopt.views import notebook
+from loomopt.views.plain import Grid
+
+EVIL = 'A "loom" <script>alert(1)</script> & more'
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return lo.solve(lo.load("beatup-light"))
+
+
+def tree(html):
+    return ElementTree.fromstring(html.replace("&nbsp;", " "))
+
+
+def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
+    found = tree(answer._repr_html_())
+    words = "".join(found.itertext())
+    tables = found.findall("table")
+    assert [cell.text for cell in tables[0].iter("th")] == [None, "today", "design", "unit", "limits"]
+    cells = [[cell.text for cell in line] for line in tables[0].iter("tr")]
+    assert ["l1", "31", "30", "mm", "30 ... 35"] in [[(c or "").replace("\xa0", " ") for c in line] for line in cells]
+    assert tables[1].find("caption").text == "What binds, and what loosening it is worth"
+    assert all(price.reading in words for price in answer.binding)
+    assert "Certificate passed" in words
+    assert len(found.findall("{http://www.w3.org/2000/svg}svg")) == 1
+
+
+def test_text_from_outside_is_escaped(answer):
+    certificate = dataclasses.replace(answer.certificate, passed=False, reasons=(EVIL,))
+    evil = dataclasses.replace(answer, status="failed", message=EVIL, problem=EVIL, certificate=certificate)
+    html = evil._repr_html_()
+    assert "<script" not in html
+    assert EVIL in "".join(tree(html).itertext())
+    assert "<script" not in notebook.table(Grid(EVIL, (EVIL,), ((EVIL,),)))
+
+
+def test_an_infeasible_answer_shows_what_helps():
+    infeasible = lo.solve(lo.load("beatup-light"), "retrofit")
+    words = "".join(tree(infeasible._repr_html_()).itertext()).replace("\xa0", " ")
+    assert "No admissible design exists" in words
+    assert all(relaxation.text in words for relaxation in infeasible.relaxation)

@@ -1,0 +1,181 @@
+"""What a person reads: tables and sentences that fit the terminal and lose nothing."""
+
+import dataclasses
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from loomopt import api
+from loomopt.effects import BEATUP
+from loomopt.jobs import load
+from loomopt.views import plain, scene_view, terminal
+from loomopt.views.plain import Grid
+
+SCENE = load("beatup-light")
+WORDS = st.text(st.characters(codec="ascii", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
+CELLS = st.lists(WORDS, max_size=12).map(" ".join)
+GRID = Grid("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return api.solve(SCENE)
+
+
+@pytest.fixture(scope="module")
+def infeasible():
+    return api.solve(SCENE, "retrofit")
+
+
+def text(*parts, columns=80):
+    return plain.render(parts, columns)
+
+
+def row(shown, name):
+    """Return the words of the line that begins with a name."""
+    return next(line.split() for line in shown.splitlines() if line.startswith(f"{name} "))
+
+
+def test_a_table_aligns_and_wraps_text_but_no_numbers():
+    assert text(GRID, columns=None).splitlines() == [
+        "name      what",
+        "----  --  ------------------",
+        "a     12  one two three four",
+        "bb     3  five",
+    ]
+    assert text(GRID, columns=24).splitlines() == [
+        "name      what",
+        "----  --  --------------",
+        "a     12  one two three",
+        "          four",
+        "bb     3  five",
+    ]
+
+
+def test_headings_stand_in_two_lines_on_the_rule():
+    grid = Grid("Title", ("phi\n[deg]", "plain"), (("1", "2"),), right=(0, 1))
+    assert text(grid).splitlines() == ["Title", "  phi", "[deg]  plain", "-----  -----", "    1      2"]
+
+
+@given(st.lists(st.tuples(WORDS, CELLS, CELLS), max_size=5), st.integers(50, 120))
+@settings(deadline=None, derandomize=True)
+def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
+    shown = text(Grid("", ("name", "x", "y"), tuple(lines)), columns=columns)
+    assert all(len(line) <= columns for line in shown.splitlines())
+    assert sorted(shown.split()[6:]) == sorted(word for line in lines for cell in line for word in cell.split())
+
+
+@given(CELLS, st.integers(20, 90))
+@settings(deadline=None, derandomize=True)
+def test_a_paragraph_fits_the_width_and_keeps_every_word(sentence, columns):
+    shown = text(f"    {sentence}", columns=columns)
+    assert all(len(line) <= columns for line in shown.splitlines())
+    assert shown.split() == sentence.split()
+    assert plain.render([sentence], None) == sentence
+
+
+def test_a_joined_phrase_is_never_broken():
+    phrases = [f"l{k} >= {k}00 mm" for k in range(1, 9)]
+    lines = text("Limits: " + ", ".join(plain.joined(phrase) for phrase in phrases), columns=40).splitlines()
+    assert len(lines) > 2
+    assert all(any(phrase in line for line in lines) for phrase in phrases)
+
+
+def test_the_width_is_the_terminals_and_none_in_a_pipe(monkeypatch, capsys):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert plain.width() is None
+    for given_columns, width in (("123", 123), ("7", 40)):
+        monkeypatch.setenv("COLUMNS", given_columns)
+        assert plain.width() == width
+
+
+def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
+    shown = text(*terminal.solution(answer, SCENE))
+    assert row(shown, "l1") == ["l1", "31", "30", "mm", "30", "...", "35"]
+    assert row(shown, "mu_min") == ["mu_min", "57.0694", "63.8961", "deg", ">=", "56.5"]
+    for price in answer.binding:
+        assert price.text in shown
+        assert price.reading in shown
+    assert "bearing_force" not in shown, "a figure the scene does not have"
+    assert "Certificate passed: limits " in shown
+    assert all(choice in shown.replace("\n", " ") for choice in answer.certificate.settled)
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_rounding_is_shown_as_zero_but_a_small_number_is_not():
+    scene = load("beatup")
+    shown = text(*terminal.solution(api.solve(scene), scene))
+    assert row(shown, "M3_fdc")[1:3] == ["10.0152", "0"]
+    tiny = scene.set("effects.inertia.J4", "1e-10 kg*m^2")
+    table = text(terminal.comparison(api.evaluate(tiny), tiny, None, "today"))
+    assert row(table, "J4")[1] == "1e-10"
+
+
+def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
+    shown = text(*terminal.solution(infeasible, SCENE))
+    assert infeasible.status == "infeasible"
+    assert "No admissible design exists" in shown
+    assert all(limit in shown for limit in infeasible.clash)
+    assert all(relaxation.text in shown for relaxation in infeasible.relaxation)
+    assert "<- not held" in shown
+    assert "Certificate" not in shown
+
+
+def test_an_uncertified_answer_says_so_first_and_last(answer):
+    certificate = dataclasses.replace(answer.certificate, passed=False, reasons=("no minimum",))
+    doubtful = dataclasses.replace(answer, status="uncertified", message="Not sure.", certificate=certificate)
+    shown = text(*terminal.solution(doubtful, SCENE))
+    assert shown.startswith("beatup-light, balance: uncertified\nNot sure.")
+    assert "Certificate NOT passed: no minimum" in shown
+
+
+def test_starts_that_ended_elsewhere_are_told(answer):
+    better, worse = dict(answer.optima[0][0]), dict(answer.optima[0][0]) | {"peak_torque": 99.0}
+    told = dataclasses.replace(
+        answer, optima=((better, 3), (worse, 2)), solver={**answer.solver, "starts": 5, "starts_at_best": 3}
+    )
+    shown = text(*terminal.solution(told, SCENE), columns=None)
+    assert "Starts: 3 of 5 reached the best. Other optima: " in shown
+    assert "peak_torque 99 N*m (2)" in shown
+
+
+def test_an_evaluated_design_stands_beside_today_and_names_what_it_breaks(answer):
+    found = api.evaluate(SCENE, {**answer.design, "l1": 0.02})
+    shown = text(*terminal.evaluation(found, SCENE, api.evaluate(SCENE)))
+    assert shown.startswith("beatup-light: NOT admissible: l1")
+    assert row(shown, "l1")[:3] == ["l1", "31", "20"]
+    assert "all limits held" in text(*terminal.evaluation(api.evaluate(SCENE), SCENE, None))
+
+
+def test_a_scene_shows_every_number_with_its_unit():
+    shown = text(*scene_view.parts(SCENE))
+    assert row(shown, "operation.speed") == ["operation.speed", "600", "rpm", "62.8318531", "rad/s"]
+    assert row(shown, "limits.swing.min") == ["limits.swing.min", "22.9", "deg", "0.399680399", "rad"]
+    assert row(shown, "effects.resistance.pulse")[1:3] == ["29.8", "deg"]
+    assert all(effect in shown for effect in BEATUP)
+    assert all(figure in shown for figure in SCENE.job.figures)
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("effect", sorted(set(BEATUP) - set(SCENE.effects)))
+def test_equations_are_short_and_hold_only_what_is_on(effect):
+    off = text(*scene_view.equations(SCENE), columns=None)
+    on = text(*scene_view.equations(SCENE.with_effect(effect)), columns=None)
+    assert len(off) < 4000
+    assert effect not in off
+    assert f"\n{effect}\n" in f"\n{on}\n"
+    assert "Md = M3*q'" in off
+
+
+def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
+    scene = SCENE.with_effect("bearing_friction").with_effect("gravity").with_effect("rod_inertia")
+    for columns in (80, 120):
+        shown = text(*scene_view.curves(scene, {}, columns), columns=columns)
+        assert max(map(len, shown.splitlines())) <= columns
+        assert all(name in shown for name in ("psi_2", "bearing_friction", "M3", "Md"))
+    wide = text(*scene_view.curves(scene, {}, None), columns=None)
+    front = [line for line in wide.splitlines() if line.startswith(" 65.925 ")]
+    assert len(front) == 2
+    assert front[0] != front[1]
+    assert "-0.0 " not in wide
