@@ -53,7 +53,8 @@ def solve(
     """Return the certified optimum of a scene's target, or what stands in its way.
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
-    near: an answer to start warm from (one of another structure is no help and is left alone); on_iteration: called with each iteration's number;
+    near: an answer to start warm from (one of another structure is no help and is left alone);
+    on_iteration: called with each iteration's number;
     on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
