@@ -184,7 +184,7 @@ def test_such_a_line_would_be_found(line):
 def test_the_root_is_tidy():
     entries = {path.relative_to(ROOT).parts[0] for path in tracked()}
     assert entries <= EXPECTED
-    assert not [path for path in tracked() if path.suffix in (".pyc", ".log", ".orig", ".png", ".ipynb_checkpoints")]
+    assert not [path for path in tracked() if path.suffix in (".pyc", ".log", ".orig", ".rej", ".whl")]
 
 
 def test_no_tracked_file_is_large():
