@@ -288,3 +288,10 @@ def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
     one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, mirrored)
     signs = {"swing": 1}
     assert [getattr(two, name) for name in CENTRES] == [signs.get(n, -1) * getattr(one, n) for n in CENTRES]
+
+
+def test_curves_are_the_poses_whatever_the_shape_and_the_chunk():
+    phi = np.linspace(-7, 7, 60).reshape(3, 4, 5)
+    pose = Pose(maths.numpy(), PAPER, phi)
+    for found, whole in zip(crank_rocker.curves(PAPER, phi, chunk=7), (pose.psi, pose.psi_1, pose.psi_2), strict=True):
+        assert found == pytest.approx(whole, rel=1e-14)
