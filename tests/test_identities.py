@@ -184,7 +184,7 @@ def test_without_cloth_and_friction_the_crank_does_no_work_over_a_cycle(names, l
 
 def test_thirty_two_angles_suffice_for_the_papers_machine():
     """The trapezoid rule converges spectrally on a smooth cycle."""
-    found = cycle_of(CONSERVATIVE, LINKAGES[0], "exact", 48)
+    found = cycle_of(CONSERVATIVE, LINKAGES[0], "exact", 32)
     assert abs(np.mean(found)) <= 1e-12 * math.sqrt(np.mean(found**2))
 
 
