@@ -72,9 +72,9 @@ def start(
 @app.command("list")
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt.views import plain, scene_view
+    from loomopt.views import layout, scene_view
 
-    plain.show(scene_view.listing([load(name) for name in problem_names()]))
+    layout.show(scene_view.listing([load(name) for name in problem_names()]))
 
 
 @app.command()
@@ -107,16 +107,16 @@ def show(
     off: Without = None,
 ) -> None:
     """Show a scene as it was read; its equations; a drawing."""
-    from loomopt.views import outputs, plain, scene_view
+    from loomopt.views import layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)
     if figure:
         outputs.picture(figure, scene, {})
         remark(f"Wrote {figure}")
     if equations:
-        plain.show(*scene_view.equations(scene))
+        layout.show(*scene_view.equations(scene))
     elif not figure:
-        plain.show(*scene_view.parts(scene))
+        layout.show(*scene_view.parts(scene))
 
 
 @app.command()
@@ -133,7 +133,7 @@ def solve(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
     """Solve a problem and certify the answer."""
-    from loomopt.views import outputs, plain, terminal
+    from loomopt.views import layout, outputs, terminal
 
     scene = read_scene(problem, sets, on, off)
     if free:
@@ -150,7 +150,7 @@ def solve(
     if as_json:
         printed(answer)
     else:
-        plain.show(*terminal.solution(answer, scene))
+        layout.show(*terminal.solution(answer, scene))
     raise typer.Exit(EXIT[answer.status])
 
 
@@ -170,9 +170,9 @@ def evaluate(
     if as_json:
         printed(found)
         return
-    from loomopt.views import plain, terminal
+    from loomopt.views import layout, terminal
 
-    plain.show(*terminal.evaluation(found, scene, api.evaluate(scene) if given else None))
+    layout.show(*terminal.evaluation(found, scene, api.evaluate(scene) if given else None))
 
 
 @app.command()
@@ -188,7 +188,7 @@ def simulate(
     off: Without = None,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
-    from loomopt.views import outputs, plain, scene_view
+    from loomopt.views import layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)
     given = read_design(design, scene)
@@ -196,7 +196,7 @@ def simulate(
         outputs.curves(path, scene, given)
         remark(f"Wrote {path}")
     if not out:
-        plain.show(*scene_view.curves(scene, given, plain.width()))
+        layout.show(*scene_view.curves(scene, given, layout.width()))
 
 
 @app.command()
@@ -221,7 +221,7 @@ def check(
 ) -> None:
     """Solve the packaged problems again; compare with results/."""
     from loomopt.studies import check as study
-    from loomopt.views import plain
+    from loomopt.views import layout
 
     if write:
         remark(f"Wrote {len(study.write(write))} reference tables to {write}")
@@ -235,7 +235,7 @@ def check(
     finally:
         if outcomes:
             lines = tuple((o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes)
-            plain.show(plain.Grid("", ("problem", "target", "status", "against the reference"), lines))
+            layout.show(layout.Grid("", ("problem", "target", "status", "against the reference"), lines))
     differ = [outcome for outcome in outcomes if outcome.differences]
     if differ:
         remark(f"loomopt: {len(differ)} of {len(outcomes)} differ from the reference")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt import scene_tables as read
+from loomopt.frozen import freeze
 from loomopt.quantities import unit_of
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
@@ -37,6 +38,10 @@ class Scene:
     bounds: Mapping[str, Bound]
     limits: Mapping[str, Limit]
     targets: Mapping[str, Table] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "operation", "mechanism", "effects", "bounds", "limits", "targets")
 
     def given(self, key: str) -> str | None:
         """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""

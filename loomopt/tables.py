@@ -30,7 +30,9 @@ def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
     import pandas as pd
 
     frame = pd.DataFrame(rows(solution, scene))
-    more = {"target": solution.target} if isinstance(solution, Solution) else {}
+    more = {}
+    if isinstance(solution, Solution):
+        more = {"target": solution.target, "accuracy": solution.solver["accuracy"]}
     frame.attrs.update(provenance(scene, **more))
     return frame.set_index("name")
 

@@ -22,7 +22,7 @@ def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
     sampled = sampler(scene, design)
     pieces, u, phi = _rows(sampled)
     model: Any = sampled.model
-    pose = model.pose(maths.numpy(), sampled.given, phi)
+    pose = model.pose(maths.numpy(), sampled.given, sampled.cycle.angles(pieces, u))
     switches = list(sampled.cycle.switches[pieces].T)
     columns = {"phi [rad]": phi, "psi [rad]": -pose.q, "psi_1 [1]": -pose.q1, "psi_2 [1]": -pose.q2}
     if not model.loads:

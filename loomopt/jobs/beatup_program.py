@@ -92,6 +92,15 @@ def program(scene: Any, target: str) -> Program:
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
+    for name in scene.limits:
+        if not set(ROWS.get(name, (name,))) <= {*sizes.sampler.figures, *physics.quantities}:
+            raise BadInput(
+                f"nothing in the scene gives the figure {name}",
+                file=scene.origin,
+                key=f"limits.{name}",
+                allowed="figures whose numbers and effects the scene has",
+                remedy=f"Take the limit off, or add what {name} needs.",
+            )
     starts = _starts(tuple(variables), known, retrofit=target == "retrofit")
     return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes), starts)
 

@@ -229,6 +229,8 @@ def assembly_margins(lengths: Lengths) -> dict[str, Number]:
 
 def fault(l1: float, l2: float, l3: float, l4: float) -> str:
     """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one."""
+    if min(l1, l2, l3, l4) <= 0:
+        return "every length must be greater than 0"
     failed = [text for text, margin in assembly_margins(Lengths(l1, l2, l3, l4)).items() if not margin > 0]
     if not failed:
         return ""
@@ -281,7 +283,10 @@ def synthesise(theta: float, beta: float, swing: float, l4: float) -> Lengths:
 
     Raises ValueError where those angles belong to no crank-rocker.
     """
-    ratios = synthesis(FLOAT, theta, beta, swing)
+    try:
+        ratios = synthesis(FLOAT, theta, beta, swing)
+    except (ZeroDivisionError, ValueError) as error:
+        raise ValueError(f"no crank-rocker has these angles: {error}") from None
     lengths = Lengths(ratios[0] * l4, ratios[1] * l4, ratios[2] * l4, l4)
     problem = "a length is not positive" if min(ratios) <= 0 else fault(lengths.l1, lengths.l2, lengths.l3, l4)
     if problem:

@@ -96,9 +96,16 @@ def _check_numbers(accuracy: float, starts: int) -> None:
             key="--accuracy",
             value=f"{accuracy:g}",
             allowed=f"{TIGHTEST:g} to 0.1",
+            remedy="Write --accuracy 1e-8, or leave it out.",
         )
     if not 1 <= starts <= 10_000:
-        raise BadInput("the number of starts is out of range", key="--starts", value=str(starts), allowed="1 to 10000")
+        raise BadInput(
+            "the number of starts is out of range",
+            key="--starts",
+            value=str(starts),
+            allowed="1 to 10000",
+            remedy="Write --starts 20, or leave it out.",
+        )
 
 
 def _import_solver() -> float:
@@ -221,6 +228,7 @@ class _Search:
         """Return the solution, or the reason there is none."""
         scene, task, program = self.scene, self.task, self.program
         solver = {"status": "Not_Assembled", "iterations": 0, "starts": len(self.points), "starts_at_best": 0}
+        solver["accuracy"] = self.settings.accuracy
         before = report.evaluation(scene, task, program, task.today(scene))
         if self.best is None:
             tried = exchange.starts(program, MORE_STARTS, self.seed)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from loomopt.frozen import freeze
 from loomopt.solving.certificate import Certificate
 
 STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
@@ -81,6 +82,10 @@ class Evaluation:
     units: Mapping[str, str]
     limits: tuple[Finding, ...]
 
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "design", "figures", "units")
+
     @property
     def admissible(self) -> bool:
         """Whether every limit holds."""
@@ -116,8 +121,12 @@ class Solution(Evaluation):
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
     before: Evaluation | None = None
     """Today's machine."""
-    point: Any = None
+    point: Any = field(default=None, repr=False)
     """Where the solver stood: what a neighbour's solve can start from."""
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "design", "figures", "units", "solver", "time")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""

@@ -97,7 +97,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
     if not path.is_file():
         return [f"no reference table {path.name}"]
     text = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if not line.startswith("#"))
-    then = pd.read_csv(io.StringIO(text), keep_default_na=False, float_precision="round_trip")
+    then = pd.read_csv(io.StringIO(text), keep_default_na=False, dtype=str)
     found = [f"column {name} is new" for name in now.columns.difference(then.columns)]
     found += [f"column {name} is gone" for name in then.columns.difference(now.columns)]
     objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []

@@ -5,7 +5,7 @@ from typing import Any
 
 from loomopt.solving.solution import Solution
 from loomopt.views import drawing, svg, terminal
-from loomopt.views.plain import Grid
+from loomopt.views.layout import Grid
 
 
 def answer(solution: Solution, scene: Any) -> str:

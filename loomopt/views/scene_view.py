@@ -10,7 +10,7 @@ import numpy as np
 from loomopt.jobs import beatup_program
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.words import Words
-from loomopt.views.plain import GAP, Grid
+from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""

@@ -6,7 +6,7 @@ from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.units import factor
-from loomopt.views.plain import Grid, joined
+from loomopt.views.layout import Grid, joined
 
 NEGLIGIBLE = 1e-8
 """Shown as 0 when below this share of the largest number in the same unit."""

@@ -7,7 +7,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.views import notebook
-from loomopt.views.plain import Grid
+from loomopt.views.layout import Grid
 
 EVIL = 'A "loom" <script>alert(1)</script> & more'
 
