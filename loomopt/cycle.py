@@ -15,6 +15,8 @@ from loomopt.maths import Number
 from loomopt.schema import Load
 
 TURN = 2 * math.pi
+SAME_ANGLE = 1e-12
+"""rad; a piece that ends this close before an angle is taken to end at it."""
 Floats = NDArray[np.float64]
 
 
@@ -52,7 +54,7 @@ class Cycle:
 
     def piece_before(self, angle: float) -> int:
         """Return the piece that ends at, or holds, a crank angle in rad."""
-        ahead = (self.starts[1:] - angle + 1e-9) % TURN
+        ahead = (self.starts[1:] - angle + SAME_ANGLE) % TURN
         return int(np.argmin(ahead))
 
 

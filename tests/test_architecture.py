@@ -14,7 +14,7 @@ PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
 
 ROOMS = (
-    "maths errors",
+    "maths errors frozen",
     "units",
     "quantities",
     "schema store",

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-HEAVY = {"pandas", "scipy", "sympy", "matplotlib", "pint", "ezdxf", "pyarrow", "rich", "dask", "IPython"}
+HEAVY = {"pandas", "scipy", "sympy", "matplotlib", "pint", "ezdxf", "pyarrow", "dask", "IPython"}
 LISTED = """import sys
 from loomopt.cli import run
 code = run(sys.argv[1:])
@@ -33,6 +33,7 @@ def test_a_command_imports_nothing_heavy(arguments, status):
     loaded = {name.split(".")[0] for name in done.stderr.splitlines()[-1].split()}
     assert "loomopt" in loaded
     assert loaded & HEAVY == set()
+    assert ("rich" in loaded) == (status == 0 and "--json" not in arguments)
 
 
 def test_only_commands_that_solve_import_casadi():

@@ -95,8 +95,8 @@ def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
     static = sampled.figures
     found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
     found["mu_min"] = min(static["mu_near"], static["mu_far"])
-    for name in sampled.model.quantities if sampled.model.loads else ():
-        found[name] = sampled.peak(name)
+    for name in sampled.model.quantities:
+        found[name] = sampled.peak(name) if name != "peak_torque" or sampled.model.loads else None
     limited = bounds(scene)
     widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
     weights = scene.targets["retrofit"].weights

@@ -33,6 +33,11 @@ def joined(text: str) -> str:
     return text.replace(" ", JOINED)
 
 
+def spaced(text: str) -> str:
+    """Return text as it is printed."""
+    return text.replace(JOINED, " ")
+
+
 def width() -> int | None:
     """Return the terminal's width, or COLUMNS; None for a pipe or a file, where nothing is wrapped."""
     known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
@@ -55,7 +60,7 @@ def render(parts: Sequence[str | Grid], columns: int | None) -> str:
         else:
             for line in part.split("\n"):
                 console.print(_paragraph(line), crop=False)
-    text = console.file.getvalue().replace(JOINED, " ")  # type: ignore[attr-defined]
+    text = spaced(console.file.getvalue())  # type: ignore[attr-defined]
     lines = [line.rstrip() for line in text.split("\n")]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n")
 

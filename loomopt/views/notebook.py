@@ -5,24 +5,28 @@ from typing import Any
 
 from loomopt.solving.solution import Solution
 from loomopt.views import drawing, svg, terminal
-from loomopt.views.layout import Grid
+from loomopt.views.layout import Grid, spaced
 
 
 def answer(solution: Solution, scene: Any) -> str:
     """Return an answer as HTML: what was found, design beside today, what binds, certificate, the mechanism."""
     shown = terminal.solution(solution, scene)
-    parts = (table(part) if isinstance(part, Grid) else f"<p>{escape(part)}</p>" for part in shown)
+    parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
     return f"<div>{''.join(parts)}{svg.render(drawing.linkage(solution.design, solution.problem))}</div>"
 
 
 def table(grid: Grid) -> str:
     """Return a table as HTML, numbers to the right."""
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in grid.columns)
+    head = "".join(f"<th>{_escaped(heading)}</th>" for heading in grid.columns)
     rows = ("".join(_cell(cell, place in grid.right) for place, cell in enumerate(line)) for line in grid.lines)
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    caption = f"<caption>{escape(grid.title)}</caption>" if grid.title else ""
+    caption = f"<caption>{_escaped(grid.title)}</caption>" if grid.title else ""
     return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _cell(text: str, right: bool) -> str:
-    return f'<td style="text-align: {"right" if right else "left"}">{escape(text)}</td>'
+    return f'<td style="text-align: {"right" if right else "left"}">{_escaped(text)}</td>'
+
+
+def _escaped(text: str) -> str:
+    return escape(spaced(text))

@@ -46,7 +46,7 @@ def test_a_table_aligns_and_wraps_text_but_no_numbers():
     ]
     assert text(GRID, columns=24).splitlines() == [
         "name      what",
-        "-----------------------",
+        "------------------------",
         "a     12  one two three",
         "          four",
         "bb     3  five",
