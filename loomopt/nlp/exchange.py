@@ -43,13 +43,14 @@ class _Run:
         self.iterations = 0
 
     def go(self, x: dict[str, float], warm: Point | None) -> Point:
-        calls, sampler = self.calls, sampler_at(self.program, x)
+        calls = self.calls
+        followed = follow(calls, warm) if warm and warm.reached else None
+        if followed:
+            return followed
+        sampler = sampler_at(self.program, x)
         if sampler is None:
             return Point(x, "Not_Assembled", False)
         peaks = calls.peaks(sampler)
-        followed = follow(calls, sampler, peaks, warm) if warm else None
-        if followed:
-            return followed
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
         status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None

@@ -7,14 +7,17 @@ import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.jobs.sampling import Extreme, Sampler
-from loomopt.nlp.calls import Calls
+from loomopt.nlp.calls import FIRST_SLOTS, Calls
+from loomopt.nlp.pivot import bound_by, reach
 from loomopt.nlp.point import Point, sampler_at
-from loomopt.nlp.polish import binding, met, stationary
+from loomopt.nlp.polish import BINDING, binding, met
 
 TOUCHING, SETTLED, POLISHES, POLISH = 1e-8, 1e-8, 3, 1e-6
 """Rows this close to their bound are polished onto it, in steps up to POLISH; below SETTLED no extreme moves."""
-FOLLOW, FOLLOW_ROUNDS, FOLLOW_STEPS = 0.2, 5, 8
-"""Farthest that a neighbour's answer is followed along what binds, in the variables' own scales."""
+FOLLOW, FOLLOW_ROUNDS = 0.2, 5
+"""Farthest that a neighbour's answer is followed, in the variables' own scales."""
+ALIKE = 1e-3
+"""Nodes of one piece this close in u stand for one extreme."""
 
 Nodes = Sequence[Sequence[Extreme]]
 
@@ -38,7 +41,7 @@ def polish(
         reached = _newton(calls, sampler, x, extra, point, touching, POLISHES, POLISH)
         if reached is None:
             return x, touching
-        flat, step, _ = reached
+        flat, step = reached
         x, extra = calls.design(flat), flat[len(calls.program.variables) :]
         moved = sampler_at(calls.program, x)
         if moved is None or step <= SETTLED:
@@ -47,39 +50,53 @@ def polish(
     return x, touching
 
 
-def follow(calls: Calls, sampler: Sampler, peaks: Nodes, warm: Point) -> Point | None:
-    """Return the answer near a solved neighbour where the same rows bind, by Newton's method alone; else None.
+def follow(calls: Calls, warm: Point) -> Point | None:
+    """Return the answer near a solved neighbour by pivots alone, each whole-cycle row on its own extreme.
 
-    A row that would let go, a new one that would bind, or a whole-cycle value exceeded elsewhere ends it: then the
-    solver must choose again.
+    None where they lead nowhere: then the solver must choose what binds.
     """
-    x, extra = dict(warm.x), np.asarray(warm.raw["extra"])
-    tracked: Nodes = warm.binding
+    point: Point | None = warm
+    sampler, found = sampler_at(calls.program, warm.x), warm.nodes
     for _ in range(FOLLOW_ROUNDS):
-        tracked = [[_same(found, node) for node in old] for found, old in zip(peaks, tracked, strict=True)]
-        reached = _newton(calls, sampler, x, extra, warm, tracked, FOLLOW_STEPS, FOLLOW)
-        if reached is None:
+        point = _pivoted(calls, sampler, point, found) if sampler and point else None
+        sampler = sampler_at(calls.program, point.x) if point else None
+        if sampler is None or point is None:
             return None
-        flat, step, multipliers = reached
-        x, extra = calls.design(flat), flat[len(calls.program.variables) :]
-        moved = sampler_at(calls.program, x)
-        if moved is None:
-            return None
-        sampler, peaks = moved, calls.peaks(moved)
-        if step > SETTLED:
-            continue
-        families = zip(calls.families, peaks, strict=True)
-        worst = max((calls.excess(family, e, extra) for family, found in families for e in found), default=0.0)
-        if multipliers is None or worst > calls.settings.excess:
-            return None
-        raw = {
-            **warm.raw,
-            "lam_g": np.concatenate([multipliers, warm.raw["lam_g"][len(multipliers) :]]),
-            "extra": extra,
-        }
-        bound = tuple(map(tuple, tracked))
-        return replace(warm, x=x, iterations=0, violation=worst, raw=raw, built=calls.built, binding=bound)
+        found = tuple(map(tuple, calls.peaks(sampler)))
+        pairs = [(node, _same(of, node)) for of, old in zip(found, point.binding, strict=True) for node in old]
+        families = zip(calls.families, found, strict=True)
+        worst = max((calls.excess(family, e, point.raw["extra"]) for family, of in families for e in of), default=0.0)
+        if worst <= calls.settings.excess and all(abs(node.u - now.u) <= SETTLED for node, now in pairs):
+            return replace(point, iterations=0, violation=worst, built=calls.built)
     return None
+
+
+def _pivoted(calls: Calls, sampler: Sampler, point: Point, found: Nodes) -> Point | None:
+    """Return the point that pivots lead to from another, with nodes on the extremes `found`; None without one."""
+    variables = len(calls.program.variables)
+    nodes = [_chosen(of, old) for of, old in zip(found, point.binding, strict=True)]
+    nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
+    arguments = calls.arguments(nlp, sampler, point.x, np.asarray(point.raw["extra"]), nodes)
+    first = len(arguments["ubg"]) - len(calls.families) * nlp.slots
+    bound = [k < len(old) for old in point.binding for k in range(nlp.slots)]
+    lam_g = np.concatenate([point.raw["lam_g"][:first], np.array(bound, dtype=float)])
+    reached = reach(nlp, arguments, bound_by(point.raw["lam_x"], lam_g, BINDING), FOLLOW)
+    if reached is None:
+        return None
+    rows, above, below = np.split(reached.multipliers, [len(lam_g), len(lam_g) + len(reached.x)])
+    raw = {"lam_x": above - below, "lam_g": rows, "extra": reached.x[variables:]}
+    flags = reached.bound[first : len(lam_g)].reshape(len(nodes), nlp.slots)
+    binding = tuple(
+        tuple(e for e, binds in zip(of, on, strict=False) if binds) for of, on in zip(nodes, flags, strict=True)
+    )
+    return replace(point, x=calls.design(reached.x), nodes=tuple(map(tuple, nodes)), raw=raw, binding=binding)
+
+
+def _chosen(found: Sequence[Extreme], binding: Sequence[Extreme]) -> list[Extreme]:
+    """Return the extremes that the binding ones have become, then others, as many as there is room for."""
+    first = [_same(found, node) for node in binding]
+    others = [e for e in found if not any(e.piece == f.piece and abs(e.u - f.u) <= ALIKE for f in first)]
+    return first + others[: max(0, FIRST_SLOTS - len(first))]
 
 
 def _newton(
@@ -91,10 +108,10 @@ def _newton(
     nodes: Nodes,
     steps: int,
     largest: float,
-) -> tuple[Floats, float, Floats | None] | None:
-    """Return the scaled point where the binding rows and the nodes' rows are met, the step, and their multipliers.
+) -> tuple[Floats, float] | None:
+    """Return the scaled point where the binding rows and the nodes' rows are met, and the step there.
 
-    None where there is no such point nearby; the multipliers of the rows before the nodes', None with a wrong sign.
+    None where there is no such point nearby.
     """
     nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
@@ -104,9 +121,7 @@ def _newton(
     flat = met(nlp.jacobian, arguments, arguments["x0"], bound, steps=steps, largest=largest)
     if flat is None:
         return None
-    multipliers = stationary(nlp.gradient, nlp.jacobian, arguments, flat, bound)
-    step = float(np.abs(flat - arguments["x0"]).max())
-    return flat, step, None if multipliers is None else multipliers[:rows]
+    return flat, float(np.abs(flat - arguments["x0"]).max())
 
 
 def _same(found: Sequence[Extreme], node: Extreme) -> Extreme:

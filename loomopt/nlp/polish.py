@@ -1,8 +1,7 @@
-"""Newton's method on what binds: the last digits of an answer, and the way to a neighbour's.
+"""Newton's method on what binds: the last digits of an answer.
 
 IPOPT stops a hair inside its bounds. Where rows and bounds carry multipliers, Newton's method on just these rows
-(least change, so that flat directions stay put) leaves them met to rounding, whatever path led there. After a small
-change of the numbers the same rows usually bind again: then a few such steps are the whole solve.
+(least change, so that flat directions stay put) leaves them met to rounding, whatever path led there.
 """
 
 from collections.abc import Mapping
@@ -15,9 +14,7 @@ from loomopt.cycle import Floats
 
 BINDING = 1e-6
 """Multipliers above this bind, in natural sizes."""
-TIDY = 1e-12
-STATIONARY = 1e-9
-FOLLOW_STEPS, CONVERGED = 8, 1e-13
+TIDY, CONVERGED = 1e-12, 1e-13
 
 
 @dataclass(frozen=True)
@@ -61,25 +58,3 @@ def met(
     inside = np.all(trial >= lower - TIDY) and np.all(trial <= upper + TIDY)
     held = np.all(values <= arguments["ubg"] + TIDY) and np.all(values >= arguments["lbg"] - TIDY)
     return np.clip(trial, lower, upper) if small and inside and held else None
-
-
-def stationary(gradient: Any, jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding) -> Floats | None:
-    """Return the rows' multipliers where x is a KKT point of what binds, with the right signs; else None.
-
-    gradient: CasADi function (x, p) → (f, df/dx).
-    """
-    slope = np.asarray(gradient(x, arguments["p"])[1]).ravel()
-    slopes = np.asarray(jacobian(x, arguments["p"])[1])
-    rows = bound.rows & (arguments["ubg"] == 0.0)
-    free = ~(bound.at_lower | bound.at_upper) & (arguments["lbx"] < arguments["ubx"])
-    found = np.linalg.lstsq(slopes[np.ix_(rows, free)].T, -slope[free], rcond=1e-10)[0]
-    reduced = slope + slopes[rows].T @ found
-    inequality = arguments["lbg"][rows] < 0.0
-    signs = (
-        np.all(found[inequality] > 0) and np.all(reduced[bound.at_lower] > 0) and np.all(reduced[bound.at_upper] < 0)
-    )
-    if not signs or np.abs(reduced[free]).max(initial=0.0) > STATIONARY:
-        return None
-    multipliers = np.zeros(len(rows))
-    multipliers[rows] = found
-    return multipliers

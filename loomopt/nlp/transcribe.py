@@ -149,6 +149,11 @@ class Transcription:
         """The objective and its derivatives: (x, p) → (f, df/dx)."""
         return self._derivatives["grad_f"]
 
+    @property
+    def curvature(self) -> Any:
+        """Second derivatives of the Lagrangian: (x, p, weight of f, multipliers) → their upper triangle."""
+        return self._derivatives["hess_lag"]
+
     def _is_row(self, limit: Any) -> bool:
         return limit.family == "static" or (self.elastic and limit.family == "variable")
 
@@ -253,10 +258,12 @@ class Transcription:
     def node(self, sampler: Sampler, piece: int, u: float, weight: float = 0.0) -> list[float]:
         """Return a node's parameters: offset of its width, angle offset, corner coefficients, switches."""
         offset, coefficients = sampler.cycle.coefficients(piece, u, self.corners)
-        start, at_start = sampler.cycle.coefficients(piece, 0.0, self.corners)
-        end, at_end = sampler.cycle.coefficients(piece, 1.0, self.corners)
-        switches = sampler.cycle.switches[piece]
-        return [weight * (end - start), offset, *coefficients, *(weight * (at_end - at_start)), *switches]
+        width = [0.0] * (1 + self.corners)
+        if weight:
+            start, at_start = sampler.cycle.coefficients(piece, 0.0, self.corners)
+            end, at_end = sampler.cycle.coefficients(piece, 1.0, self.corners)
+            width = [weight * (end - start), *(weight * (at_end - at_start))]
+        return [width[0], offset, *coefficients, *width[1:], *sampler.cycle.switches[piece]]
 
     def vector(
         self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[Sequence[Extreme]]
