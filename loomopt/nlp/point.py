@@ -9,7 +9,7 @@ from loomopt.cycle import Floats
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Extreme, Sampler
 
-PENALTY = 10.0
+PENALTY = 1000.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
 ROUNDING = 1e-12
 """A whole-cycle value cannot be told closer, relative to its size."""

@@ -64,9 +64,9 @@ class Certificate:
     """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
 
     @property
-    def stationarity(self) -> float:
+    def residual(self) -> float:
         """The largest KKT residual of all levels."""
-        return max((level.stationarity for level in self.levels), default=0.0)
+        return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
 def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
@@ -229,13 +229,18 @@ class _Trial:
         jacobian = np.vstack([self.gradients[rows], self.gradients[shared[1:]] - self.gradients[shared[:1]]])
         _, sizes, basis = np.linalg.svd(jacobian)
         free = basis[int(np.sum(sizes > FLAT * max(1.0, sizes.max(initial=0.0)))) :].T
+        missed = np.array(
+            [self._missed(k) for k in rows] + [self._missed(k) - self._missed(shared[0]) for k in shared[1:]]
+        )
+        back = -np.linalg.lstsq(jacobian, missed, rcond=FLAT)[0]
         if free.shape[1] == 0:
             self.settled_alone = True
+            self._correct(back, free, np.zeros(0), multipliers)
             return
         curved = self.exact.curvatures(free)
         values, vectors = np.linalg.eigh(np.tensordot(multipliers, curved, axes=1))
         self.settled_alone = bool(values.min() > FLAT)
-        self._correct(free @ vectors[:, values > CURVED], values[values > CURVED], multipliers)
+        self._correct(back, free @ vectors[:, values > CURVED], values[values > CURVED], multipliers)
         weak = [k for k in range(len(self.limits)) if k not in rows]
         for value, vector in zip(values, vectors.T, strict=True):
             slopes = self.gradients[weak] @ (free @ vector) if weak else np.zeros(0)
@@ -245,12 +250,25 @@ class _Trial:
             if value < -FLAT and not blocked:
                 self.minimum = False
 
-    def _correct(self, directions: Floats, bends: Floats, multipliers: Floats) -> None:
-        """Keep Newton's step along curved directions (variables, k), unless an earlier level already asks for one."""
+    def _missed(self, k: int) -> float:
+        """Return by how much a binding row is missed, with its sign; 0 for an objective held where it stands."""
+        row = self.rows[k]
+        if row.node:
+            return (abs(row.node.value) - (row.limit.value if row.limit else 0.0)) / row.scale
+        if row.limit is None:
+            return 0.0
+        values = {**self.sampler.given.values, **self.sampler.figures}
+        return float(row.limit.residual(values, row.limit.value)) / row.scale
+
+    def _correct(self, back: Floats, directions: Floats, bends: Floats, multipliers: Floats) -> None:
+        """Keep Newton's step: back onto the binding rows, and along curved directions (variables, k) down the slope.
+
+        Unless an earlier level already asks for one, or there is nothing left to correct.
+        """
         pull = directions.T @ (multipliers @ self.gradients)
-        if self.correction or np.abs(pull).max(initial=0.0) <= CORRECTED:
+        if self.correction or max(np.abs(pull).max(initial=0.0), np.abs(back).max(initial=0.0)) <= CORRECTED:
             return
-        step = -directions @ (pull / bends)
+        step = back - directions @ (pull / bends)
         sizes = {v.name: v.scale for v in self.program.variables}
         self.correction = {name: float(part * sizes[name]) for name, part in zip(self.exact.names, step, strict=True)}
 

@@ -191,10 +191,10 @@ class _Search:
         began = time.perf_counter()
         self.x, self.certificate = self._judged(point.x)
         for _ in range(CORRECTIONS):
-            if not self.certificate.correction or self.certificate.stationarity <= PRECISE:
+            if not self.certificate.correction or self.certificate.residual <= PRECISE:
                 break
             x, better = self._judged(self._corrected(self.x, self.certificate.correction))
-            if better.stationarity >= self.certificate.stationarity or better.feasibility > FEASIBILITY:
+            if better.residual >= self.certificate.residual or better.feasibility > FEASIBILITY:
                 break
             self.x, self.certificate = x, better
         self.certified += time.perf_counter() - began
