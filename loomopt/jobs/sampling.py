@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +17,8 @@ CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
 SAMPLES = 720
 """Samples of one turn from which extremes are refined; no piece gets fewer than SAMPLES/8."""
-REFINEMENTS = (1 / 16, 1 / 16)
-"""Shrinking steps at which a sampled extreme is refined: its value is then right to rounding."""
+CLOSER = 1 / 8
+"""Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
 GAUSS_NODES = 32
 
 
@@ -38,12 +38,30 @@ class Extreme:
     value: float
 
 
-def _vertex(centre: Floats, step: Floats, around: Sequence[Floats]) -> Floats:
-    """Return where the parabola through three values, a step apart, is highest: within a step, and within [0, 1]."""
-    low, mid, high = around
-    bend = low - 2 * mid + high
-    shift = 0.5 * (low - high) / np.where(bend < 0, bend, -np.inf)
-    return np.clip(centre + step * np.clip(shift, -1, 1), 0, 1)
+@functools.cache
+def _grid(counts: tuple[int, ...]) -> tuple[NDArray[np.intp], Floats]:
+    """Return nodes with so many evenly spread over each piece."""
+    pieces = np.repeat(np.arange(len(counts)), counts)
+    return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
+
+
+def _inside(values: Floats, margin: Floats) -> Floats:
+    """Return values moved into [margin, 1 − margin]."""
+    return np.minimum(np.maximum(values, margin), 1 - margin)
+
+
+def _vertex(values: Floats) -> Floats:
+    """Return where a polynomial through three or five equidistant values is highest, in steps from the middle one."""
+    middle = len(values) // 2
+    low, mid, high = values[middle - 1 : middle + 2]
+    slope, bend, third = (high - low) / 2, low - 2 * mid + high, np.zeros_like(mid)
+    if middle == 2:
+        outer = values[4] - values[0]
+        third = outer / 2 - 2 * slope
+        slope, bend = (16 * slope - outer) / 12, bend - (values[4] - 4 * high + 6 * mid - 4 * low + values[0]) / 12
+    first = slope / np.where(bend < 0, -bend, np.inf)
+    shift = first + third * first**2 / np.where(bend < 0, -2 * bend, np.inf)
+    return np.asarray(np.minimum(np.maximum(shift, -middle), middle), dtype=np.float64)
 
 
 class Sampler:
@@ -95,8 +113,7 @@ class Sampler:
         """Return nodes spread evenly over the turn, both ends of every piece included."""
         widths = np.diff(self.cycle.starts)
         counts = [max(samples // 8, int(np.ceil(samples * width / TURN))) + 1 for width in widths]
-        pieces = np.repeat(np.arange(len(counts)), counts)
-        return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
+        return _grid(tuple(counts))
 
     def extremes(self, name: str) -> list[Extreme]:
         """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding."""
@@ -121,24 +138,21 @@ class Sampler:
     def _refine(
         self, name: str, pieces: NDArray[np.intp], u: Floats, values: Floats, peaks: NDArray[np.intp]
     ) -> list[Extreme]:
-        """Refine sampled peaks by parabolas over ever smaller steps; a peak at a piece's end may stay there."""
-        piece, sign = pieces[peaks], np.sign(values[peaks])
+        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak."""
+        piece, sign, sampled = pieces[peaks], np.sign(values[peaks]), np.abs(values[peaks])
         inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
         step = u[inner + 1] - u[inner]
-        best_u, best = u[peaks], np.abs(values[peaks])
-        vertex = _vertex(u[inner], step, sign * values[inner + np.array([[-1], [0], [1]])])
-        for shrink in REFINEMENTS:
-            step = step * shrink
-            centre = np.clip(vertex, step, 1 - step)
-            nodes = np.array([vertex, centre - step, centre, centre + step])
-            value, *around = sign * self.at(name, np.tile(piece, 4), nodes.ravel()).reshape(nodes.shape)
-            better = value >= best
-            best_u, best = np.where(better, vertex, best_u), np.where(better, value, best)
-            vertex = _vertex(centre, step, around)
-        value = sign * self.at(name, piece, vertex)
-        better = value >= best
-        best_u, best = np.where(better, vertex, best_u), np.where(better, value, best)
-        return [Extreme(int(p), float(w), float(s * b)) for p, w, s, b in zip(piece, best_u, sign, best, strict=True)]
+        centre = u[inner] + step * _vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
+        step = CLOSER * step
+        centre = _inside(centre, 2 * step)
+        nodes = centre + step * np.arange(-2, 3)[:, None]
+        around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
+        vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
+        refined = sign * self.at(name, piece, vertex)
+        better = refined >= sampled
+        best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
+        found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
+        return [Extreme(*extreme) for extreme in found]
 
     def peak(self, name: str) -> float:
         """Return the largest |quantity| over the cycle, SI."""

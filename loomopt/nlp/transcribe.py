@@ -4,6 +4,7 @@ Variables are scaled; every scene number, limit, natural size, weight and cycle 
 through a few slots, each a node that the exchange fills; an unused slot weighs nothing.
 """
 
+import math
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -62,17 +63,17 @@ class Layout:
     def add(self, name: str, *shape: int) -> None:
         """Reserve room for an array."""
         self.places[name] = (self.size, shape)
-        self.size += int(np.prod(shape))
+        self.size += math.prod(shape)
 
     def write(self, vector: Floats, name: str, values: Any) -> None:
         """Put an array in its place."""
         begin, shape = self.places[name]
-        vector[begin : begin + int(np.prod(shape))] = np.asarray(values, dtype=float).ravel()
+        vector[begin : begin + math.prod(shape)] = np.asarray(values, dtype=float).ravel()
 
     def read(self, vector: Any, name: str) -> list[Any]:
         """Return the entries of an array as a flat list."""
         begin, shape = self.places[name]
-        return [vector[begin + k] for k in range(int(np.prod(shape)))]
+        return [vector[begin + k] for k in range(math.prod(shape))]
 
     def rows(self, vector: Any, name: str) -> list[list[Any]]:
         """Return the entries of a two-dimensional array, row by row."""
