@@ -1,0 +1,60 @@
+"""What the benchmarks share: one thread, interleaved repeats, the least time of each, tables."""
+
+import importlib.util
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+def one_thread() -> None:
+    """Start this script again with single-threaded linear algebra: on problems this small, threads only cost time."""
+    if any(os.environ.get(name) != "1" for name in THREADS):
+        os.environ |= dict.fromkeys(THREADS, "1")
+        os.execv(sys.executable, [sys.executable, *sys.argv])
+
+
+def seconds(call: Callable[[], Any]) -> float:
+    """Return how long one call takes."""
+    began = time.perf_counter()
+    call()
+    return time.perf_counter() - began
+
+
+def least(calls: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
+    """Return the least time of each call, s; every repeat runs all of them in turn, so that noise hits all alike."""
+    times = [{name: seconds(call) for name, call in calls.items()} for _ in range(repeats)]
+    return {name: min(taken[name] for taken in times) for name in calls}
+
+
+def installed(module: str) -> bool:
+    """Say whether an optional peer can be imported."""
+    return importlib.util.find_spec(module) is not None
+
+
+def show(rows: Sequence[Mapping[str, Any]], as_json: bool, **facts: Any) -> None:
+    """Print rows as a table, then the facts; or both as one JSON object."""
+    if as_json:
+        print(json.dumps({"rows": rows, **facts}))
+        return
+    columns = list(rows[0])
+    cells = [columns, *([_text(row[name]) for name in columns] for row in rows)]
+    widths = [max(len(line[k]) for line in cells) for k in range(len(columns))]
+    for line in cells:
+        print(
+            "  ".join(
+                cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(line, widths, strict=True))
+            )
+        )
+    for name, value in facts.items():
+        print(f"{name.replace('_', ' ')}: {_text(value)}")
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
