@@ -1,0 +1,201 @@
+"""Exchange: what holds at a few angles ends up holding at all of them; levels, starts, relaxations, failures."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import loomopt as lo
+from loomopt.balance import Given
+from loomopt.jobs.program import Limit, Objective, Program, Variable
+from loomopt.jobs.sampling import Sampler
+from loomopt.jobs.tasks import TASKS
+from loomopt.nlp import exchange
+from loomopt.nlp.point import Settings, sampler_at
+from loomopt.solving.certificate import certify
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A model of two numbers whose whole-cycle quantity has peaks that are known in closed form."""
+
+    loads = integrals = ()
+    quantities = ("wave", "circle", "sharp")
+    key = "wave"
+
+    def given(self, maths, values):
+        return Given(dict(values), {})
+
+    def corners(self, maths, given):
+        return ()
+
+    def static(self, maths, given, front, names=None):
+        x, y = given.values["x"], given.values["y"]
+        found = {"x": x, "y": y, "sum": x + y, "bowl": (x - 3) ** 2 + (y - 2) ** 2}
+        return {name: value for name, value in found.items() if names is None or name in names}
+
+    def quantity(self, maths, given, name, phi, switches):
+        x, y = given.values["x"], given.values["y"]
+        if name == "wave":
+            return x + maths.cos(phi) + maths.cos(2 * phi) / 2
+        if name == "circle":
+            return x * maths.cos(phi) + y * maths.sin(phi)
+        return x / (1 + 400 * (1 - maths.cos(phi - y)))
+
+    def front_angle(self, given):
+        return 0.0
+
+
+def program(limits=(), objectives=(("bowl", "value"),), start=(0.5, 0.4), box=10.0):
+    """Return a program of x and y; limits: (row, sign, value)."""
+    variables = tuple(Variable(name, -box, box, 1.0, (-box, box)) for name in "xy")
+    rows = [Limit(row, s, row, v, 1.0, "cycle" if row in Wave.quantities else "static") for row, s, v in limits]
+    levels = tuple(Objective(row, row, form, 1.0) for row, form in objectives)
+    return Program(Wave(), variables, {}, tuple(rows), levels, (dict(zip("xy", start, strict=True)),))
+
+
+def solved(task, **changes):
+    return exchange.solve(task, task.starts[0], replace(Settings(), **changes))
+
+
+def highest(task, point, name):
+    """Return the largest |quantity| of a design on a dense grid."""
+    pieces = np.zeros(100_001, dtype=np.intp)
+    return np.abs(Sampler(task.model, point.x).at(name, pieces, np.linspace(0, 1, 100_001))).max()
+
+
+def test_the_least_peak_is_half_the_range():
+    """cos φ + cos 2φ / 2 runs from −3/4 to 3/2: the best shift is −3/8, the peak 9/8."""
+    task = program(objectives=(("wave", "peak"),))
+    point = solved(task)
+    assert point.reached
+    assert point.x["x"] == pytest.approx(-0.375, abs=1e-10)
+    assert highest(task, point, "wave") == pytest.approx(1.125, abs=1e-9)
+    assert point.violation <= 1e-10
+
+
+def test_a_whole_cycle_limit_holds_between_its_nodes():
+    """The nearest point to (3, 2) of the unit circle's disc: no node of the first round is where it touches."""
+    task = program(limits=(("circle", 1, 1.0),))
+    point = solved(task)
+    assert point.reached
+    value = Sampler(task.model, point.x).figures["bowl"]
+    assert value == pytest.approx((13**0.5 - 1) ** 2, abs=1e-8)
+    assert [point.x["x"], point.x["y"]] == pytest.approx([3 / 13**0.5, 2 / 13**0.5], abs=1e-4), "root of the violation"
+    assert highest(task, point, "circle") <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9, 1e-11])
+def test_violation_is_two_decades_below_the_accuracy(accuracy):
+    task = program(limits=(("circle", 1, 1.0),))
+    point = solved(task, accuracy=accuracy)
+    assert point.reached
+    assert point.violation <= max(accuracy / 100, 1e-11), "values are sums of rounded terms: no closer than that"
+    assert highest(task, point, "circle") <= 1 + accuracy + 1e-11
+
+
+def test_rounds_that_run_out_leave_a_violation_that_is_told():
+    """A peak as high wherever it stands slips between all nodes so far: what is exceeded is said, nothing certified."""
+    task = program(limits=(("sharp", 1, 0.7),))
+    point = solved(task)
+    assert point.violation == pytest.approx(highest(task, point, "sharp") - 0.7, abs=1e-5)
+    assert point.violation > 1e-3
+    certificate = certify(task, point.x, 1e-8)
+    assert not certificate.passed
+    assert any("limit sharp is exceeded" in reason for reason in certificate.reasons)
+
+
+def test_an_earlier_level_is_kept_when_its_weight_is_large_enough():
+    """|x − ...| first, then the bowl: its slope along x + y is 5 at the line, so a weight above 5 is exact."""
+    levels = (("sum", "magnitude"), ("bowl", "value"))
+    exact, weak = (solved(program(objectives=levels), penalty=weight) for weight in (10.0, 1.0))
+    assert exact.x == pytest.approx({"x": 0.5, "y": -0.5}, abs=1e-8)
+    assert weak.x["x"] + weak.x["y"] > 1.0, "a weight below the multiplier buys the bowl with the first level"
+
+
+def test_start_on_the_answer_and_start_far_away_agree():
+    task = program(limits=(("circle", 1, 1.0),))
+    near, far = (
+        exchange.solve(task, {"x": x, "y": y}, Settings()) for x, y in ((3 / 13**0.5, 2 / 13**0.5), (-9.0, 9.0))
+    )
+    assert near.x == pytest.approx(far.x, abs=1e-4)
+
+
+def test_a_program_without_admissible_design_is_not_reached():
+    point = solved(program(limits=(("x", -1, 2.0), ("x", 1, 1.0))))
+    assert not point.reached
+
+
+@pytest.mark.parametrize(
+    ("limits", "needed"),
+    [
+        ((("x", -1, 2.0), ("x", 1, 1.0)), 1.0),
+        ((("sum", -1, 4.0), ("circle", 1, 2.0)), 4.0 / 2**0.5 - 2.0),
+        ((("x", 0, 12.0),), 2.0),
+        ((("x", 0, 1.0), ("sum", 0, 3.0), ("y", 1, 1.5)), 0.5),
+    ],
+    ids=str,
+)
+def test_elastic_solves_give_the_least_sum_of_excesses(limits, needed):
+    task = program(limits=limits)
+    point = exchange.solve(task, task.starts[0], Settings(), elastic=True)
+    assert point.reached
+    assert sum(abs(need) for need in point.relaxed.values()) == pytest.approx(needed, abs=1e-6)
+
+
+def test_a_start_that_does_not_assemble_is_told():
+    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    folded = {**task.starts[0], "l1": 0.3}
+    point = exchange.solve(task, folded, Settings())
+    assert (point.status, point.reached) == ("Not_Assembled", False)
+
+
+def test_starts_are_the_jobs_own_then_random_ones_that_assemble():
+    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    drawn = exchange.starts(task, 40, seed=7)
+    assert len(drawn) == 40
+    assert drawn[0] == dict(task.starts[0])
+    assert drawn == exchange.starts(task, 40, seed=7)
+    assert drawn[1:] != exchange.starts(task, 40, seed=8)[1:]
+    assert drawn[:10] == exchange.starts(task, 10, seed=7)
+    for start in drawn:
+        assert sampler_at(task, start) is not None
+        for variable in task.variables:
+            low, high = variable.range
+            assert low <= start[variable.name] <= high
+
+
+@pytest.mark.parametrize("M0", [600, 745, 800, 900])
+def test_a_loom_s_peak_holds_between_all_nodes(M0):
+    task = TASKS["beatup"].program(lo.load("beatup").set("operation.M0", f"{M0} N*m"), "balance")
+    point = exchange.solve(task, task.starts[0], Settings())
+    assert point.reached
+    sampler = sampler_at(task, point.x)
+    pieces, u = sampler.grid(100_000)
+    dense = np.abs(sampler.at("peak_torque", pieces, u)).max()
+    assert dense == pytest.approx(sampler.peak("peak_torque"), rel=1e-8)
+    assert dense <= sampler.peak("peak_torque") * (1 + 1e-12)
+    assert sum(map(len, point.nodes)) <= 24, "a few nodes do, not a grid"
+
+
+def test_a_warm_start_from_the_answer_stays_there():
+    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    cold = exchange.solve(task, task.starts[0], Settings())
+    warm = exchange.solve(task, cold.x, Settings(), warm=cold)
+    assert warm.reached
+    assert warm.iterations < cold.iterations
+    for variable in task.variables:
+        assert warm.x[variable.name] == pytest.approx(cold.x[variable.name], abs=1e-9 * variable.scale)
+
+
+def test_a_warm_start_goes_where_a_cold_one_goes_even_from_afar():
+    near, far = (
+        TASKS["beatup"].program(lo.load("beatup").set("operation.M0", f"{M0} N*m"), "balance") for M0 in (900, 620)
+    )
+    from_afar = exchange.solve(near, near.starts[0], Settings())
+    warm, cold = (exchange.solve(far, far.starts[0], Settings(), warm=point) for point in (from_afar, None))
+    assert warm.reached
+    for name in ("l1", "l2", "l3", "l4", "s"):
+        assert warm.x[name] == pytest.approx(cold.x[name], abs=1e-8), name
+    assert math.isfinite(warm.violation)

@@ -1,0 +1,109 @@
+"""Ctrl-C in the middle of a solve: at once, cleanly, and with nothing half-written."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+import loomopt as lo
+
+HOOKED = """
+import os, signal, sys
+from loomopt import cli
+from loomopt.solving import engine
+
+genuine, hits = engine.solve, []
+
+def hook(number):
+    hits.append(number)
+    if len(hits) == {at}:
+        os.kill(os.getpid(), signal.SIGINT)
+
+def solve(*arguments, **options):
+    return genuine(*arguments, **{{**options, "on_iteration": hook}})
+
+engine.solve = solve
+sys.argv = ["loomopt", *sys.argv[1:]]
+cli.main()
+"""
+"""The command as the shell starts it; Ctrl-C arrives at one iteration, so that it hits the solver itself."""
+
+
+def interrupted(*arguments, at=3):
+    code = textwrap.dedent(HOOKED).format(at=at)
+    return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.parametrize("at", [1, 5, 20])
+@pytest.mark.parametrize("target", ["balance", "torque"])
+def test_a_solve_stops_with_keyboard_interrupt(at, target):
+    hits = []
+
+    def hook(number):
+        hits.append(number)
+        if len(hits) == at:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        lo.solve(lo.load("beatup"), target, starts=50, on_iteration=hook)
+    assert at <= len(hits) <= at + 2, "it stops where it is hit, not at the end of a start"
+
+
+def test_a_solve_after_an_interrupted_one_is_as_good_as_ever():
+    expected = lo.solve(lo.load("beatup"))
+    with pytest.raises(KeyboardInterrupt):
+        lo.solve(lo.load("beatup"), on_iteration=lambda _: os.kill(os.getpid(), signal.SIGINT))
+    again = lo.solve(lo.load("beatup"))
+    assert again.status == "optimal"
+    assert again.design == expected.design
+
+
+def test_a_hook_that_raises_stops_the_solve_too():
+    def hook(number):
+        raise RuntimeError("no more")
+
+    with pytest.raises((KeyboardInterrupt, RuntimeError)):
+        lo.solve(lo.load("beatup"), on_iteration=hook)
+
+
+def test_a_hook_that_only_watches_changes_nothing():
+    seen = []
+    watched = lo.solve(lo.load("beatup"), on_iteration=seen.append)
+    assert len(seen) >= 10
+    assert watched.design == lo.solve(lo.load("beatup")).design
+
+
+@pytest.mark.parametrize("options", [("--json",), ()], ids=["json", "table"])
+def test_the_command_exits_130_and_prints_nothing_half(options):
+    done = interrupted("solve", "beatup", *options)
+    assert done.returncode == 130
+    assert done.stdout == ""
+    assert "stopped" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_folder_asked_for_holds_no_partial_files(tmp_path):
+    folder = tmp_path / "answer"
+    done = interrupted("solve", "beatup", "--out", str(folder))
+    assert done.returncode == 130
+    assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_files_of_an_earlier_answer_stay_as_they_were(tmp_path):
+    code = "from loomopt.cli import main; main()"
+    command = [sys.executable, "-c", code, "solve", "beatup", "--out", str(tmp_path)]
+    subprocess.run(command, capture_output=True, check=True)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert before
+    assert interrupted("solve", "beatup", "--set", "operation.M0=800 N*m", "--out", str(tmp_path)).returncode == 130
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_certificate_is_not_spoilt_by_a_late_interrupt():
+    """Past the last iteration there is nothing to hit: the answer comes."""
+    done = interrupted("solve", "beatup", "--json", at=100_000)
+    assert done.returncode == 0
+    assert '"status": "optimal"' in done.stdout
