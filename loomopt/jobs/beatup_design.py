@@ -54,7 +54,7 @@ def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     values = {**program.parameters, **x}
     if "s" in x:
         masses = [limit.value for limit in program.limits if limit.name == "m4e"]
-        mass = x["s"] / x["r4e"] ** 2 if x["r4e"] else 0.0
+        mass = x["s"] / x["r4e"] ** 2 if x["r4e"] else min(masses)
         nearest = min(masses, key=lambda limit: abs(limit - mass))
         close = abs(nearest - mass) <= NEGLIGIBLE * max(masses)
         values["m4e"] = nearest if close else min(max(mass, min(masses)), max(masses))
@@ -69,18 +69,20 @@ def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:
     """
     found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
     for v in program.variables:
-        if v.name == "r4e" and found["s"] == 0.0 and "change" not in {o.row for o in program.objectives}:
+        if v.name == "r4e" and design["m4e"] == 0.0 and "change" not in {o.row for o in program.objectives}:
             found["r4e"] = v.upper
     return {v.name: found[v.name] for v in program.variables}
 
 
 def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
-    """Return NLP variables with a negligible counterweight taken for none, so that its radius is free to settle."""
+    """Return NLP variables with a negligible counterweight taken for none, so that its mass or radius can settle."""
     masses = [limit.value for limit in program.limits if limit.name == "m4e"]
-    if "s" not in x or min(masses) > 0.0:
+    radius = next((v for v in program.variables if v.name == "r4e"), None)
+    if "s" not in x or radius is None or x["s"] > NEGLIGIBLE * max(masses) * radius.upper**2:
         return dict(x)
-    most = max(masses) * next(v.upper for v in program.variables if v.name == "r4e") ** 2
-    return {**x, "s": 0.0 if x["s"] <= NEGLIGIBLE * most else x["s"]}
+    if min(masses) == 0.0:
+        return {**x, "s": 0.0}
+    return {**x, "s": min(masses) * radius.lower**2, "r4e": radius.lower}
 
 
 def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:

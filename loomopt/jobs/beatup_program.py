@@ -83,6 +83,7 @@ def program(scene: Any, target: str) -> Program:
     if not direct:
         most = limited["m4e"][1] * limited["r4e"][1] ** 2
         variables.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, most)))
+    _demand_figures(scene, physics, sizes.sampler)
     limits = [limit for variable in variables for limit in _bound_limits(scene, variable)]
     limits += [] if direct else _mass_limits(limited["m4e"], sizes)
     limits += [limit for name, limit in scene.limits.items() for limit in _figure_limits(name, limit, sizes)]
@@ -92,15 +93,6 @@ def program(scene: Any, target: str) -> Program:
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
-    for name in scene.limits:
-        if not set(ROWS.get(name, (name,))) <= {*sizes.sampler.figures, *physics.quantities}:
-            raise BadInput(
-                f"nothing in the scene gives the figure {name}",
-                file=scene.origin,
-                key=f"limits.{name}",
-                allowed="figures whose numbers and effects the scene has",
-                remedy=f"Take the limit off, or add what {name} needs.",
-            )
     starts = _starts(tuple(variables), known, retrofit=target == "retrofit")
     return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes), starts)
 
@@ -156,12 +148,13 @@ def demand(scene: Any, target: str) -> None:
                 key=f"effects.{name}",
                 remedy=f"Add the table [effects.{name}], or choose another target.",
             )
-    if target == "torque" and scene.targets["torque"].M3_tolerance is None and "M0" not in scene.operation:
+    resisted = "M0" in scene.operation and "resistance" in scene.effects
+    if target == "torque" and scene.targets["torque"].M3_tolerance is None and not resisted:
         raise BadInput(
             "target torque needs a tolerance for the reed torque",
             file=scene.origin,
             key="targets.torque.M3_tolerance",
-            remedy='Set it, as in M3_tolerance = "8 N*m", or give operation.M0: the default is 1 % of it.',
+            remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of M0.',
         )
     for name in scene.targets["retrofit"].weights if target == "retrofit" else ():
         if name not in VARIABLES:
@@ -171,6 +164,19 @@ def demand(scene: Any, target: str) -> None:
                 key=f"targets.retrofit.weights.{name}",
                 allowed=", ".join(VARIABLES),
                 remedy="Name a design variable.",
+            )
+
+
+def _demand_figures(scene: Any, physics: Beatup, sampler: Sampler) -> None:
+    """Raise BadInput for a limit on a figure that nothing in the scene gives."""
+    for name in scene.limits:
+        if not set(ROWS.get(name, (name,))) <= {*sampler.figures, *physics.quantities}:
+            raise BadInput(
+                f"nothing in the scene gives the figure {name}",
+                file=scene.origin,
+                key=f"limits.{name}",
+                allowed="figures whose numbers and effects the scene has",
+                remedy=f"Take the limit off, or add what {name} needs.",
             )
 
 

@@ -108,17 +108,18 @@ def check(scene: Any) -> None:
 def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
     """Say in one sentence what an optimum of the target reached; figures in SI."""
     front, peak, rms = figures["M3_fdc"] or 0.0, figures["peak_torque"] or 0.0, figures["pulse_rms"] or 0.0
+    where = "just before front dead centre" if "bearing_friction" in scene.effects else "at front dead centre"
     peak_text = f"the least peak crank torque over the whole cycle is {peak:.6g} N*m"
-    if target == "balance" and abs(front) <= BALANCED * max(1.0, peak):
-        return f"Balanced: the reed torque at front dead centre is zero, and then {peak_text}."
+    if target == "balance" and abs(front) <= BALANCED * peak:
+        return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
     if target == "balance":
         return (
-            f"Balance is out of reach: the reed torque nearest to zero at front dead centre is {front:.6g} N*m, "
+            f"Balance is out of reach: the reed torque nearest to zero {where} is {front:.6g} N*m, "
             f"and then {peak_text}."
         )
     return {
-        "pulse": f"The least reed torque over the pulse is {rms:.6g} N*m rms ({front:.6g} N*m at front dead centre).",
-        "torque": f"With the reed torque at {front:.6g} N*m at front dead centre, {peak_text}.",
+        "pulse": f"The least reed torque over the pulse is {rms:.6g} N*m rms ({front:.6g} N*m {where}).",
+        "torque": f"With the reed torque at {front:.6g} N*m {where}, {peak_text}.",
         "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
     }[target]
 

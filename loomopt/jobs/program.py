@@ -160,6 +160,13 @@ class Program:
         )
 
     @property
+    def soft(self) -> dict[int, int]:
+        """Relaxable limits by place → their group: the rows of one limit's side give way together."""
+        groups: dict[tuple[str, str, int], int] = {}
+        keys = {k: (limit.name, limit.family, limit.sign) for k, limit in enumerate(self.limits) if limit.relaxable}
+        return {k: groups.setdefault(key, len(groups)) for k, key in keys.items()}
+
+    @property
     def held(self) -> frozenset[str]:
         """Variables that are held without being limited: their value is today's, not a choice."""
         limited = {limit.row for limit in self.limits if limit.family == "variable"}

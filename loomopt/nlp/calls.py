@@ -107,7 +107,7 @@ class Calls:
             scale, bound = self.program.objectives[family.objective].scale, extra[epigraphs.index(family.objective)]
         else:
             limit = self.program.limits[family.limit]
-            soft = [k for k, other in enumerate(self.program.limits) if other.relaxable]
+            soft = self.program.soft
             scale, bound = limit.scale, limit.value / limit.scale
-            bound += extra[2 * soft.index(family.limit)] if self.elastic and family.limit in soft else 0.0
+            bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
         return float(abs(extreme.value) / scale - bound)

@@ -140,12 +140,9 @@ class _Run:
 
     def _relaxed(self, extra: Floats) -> dict[int, float]:
         """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
-        soft = [k for k, limit in enumerate(self.program.limits) if limit.relaxable]
-        needs = {
-            k: extra[2 * place] - extra[2 * place + 1] * (self.program.limits[k].sign == 0)
-            for place, k in enumerate(soft)
-        }
-        return {k: float(need * self.program.limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
+        limits = self.program.limits
+        needs = {k: extra[2 * g] - extra[2 * g + 1] * (limits[k].sign == 0) for k, g in self.program.soft.items()}
+        return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:
@@ -154,7 +151,7 @@ def _padded(multipliers: Floats, size: int) -> Floats:
 
 
 def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
-    """Return the job's own starts, then random ones within each variable's range, up to `count`; all assemble."""
+    """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
     own = [dict(start) for start in program.starts if sampler_at(program, start)]
     generator = np.random.default_rng(seed)
     drawn: list[dict[str, float]] = []

@@ -95,14 +95,15 @@ class Transcription:
         self.loads = len(program.model.loads)
         self.families = families(program, elastic)
         self.static = [limit for limit in program.limits if self._is_row(limit)]
-        self.soft = [k for k, limit in enumerate(program.limits) if elastic and limit.relaxable]
+        self.soft = program.soft if elastic else {}
+        self.groups = len(set(self.soft.values()))
         self.epigraphs = [] if elastic else [k for k, o in enumerate(program.objectives) if o.form != "value"]
         self.integrals = _wanted_integrals(program)
         self.quadrature = {i.name: len(sampler.quadrature(i)[0]) for i in self.integrals}
         self.layout = self._layout()
         self._quantities: dict[str, tuple[Any, list[str]]] = {}
         scaled = ca.SX.sym("x", len(program.variables))
-        extra = ca.SX.sym("t", len(self.soft) * 2 if elastic else len(self.epigraphs))
+        extra = ca.SX.sym("t", 2 * self.groups if elastic else len(self.epigraphs))
         self.parameters = ca.SX.sym("p", self.layout.size)
         objective, rows = self._expressions(ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(self.parameters))
         self.nlp = {
@@ -191,19 +192,20 @@ class Transcription:
         for integral in self.integrals:
             static[integral.name] = self._mean(given, corners, integral, vector)
             static[integral.root] = m.sqrt(static[integral.name])
-        static = {**values, **static}
+        reading = {"variable": values, "static": {**values, **static}}
+        static = reading["static"]
         limit_values, limit_scales = read(vector, "limit"), read(vector, "limit scale")
         excess = dict.fromkeys(range(len(program.limits)), 0)
-        for place, k in enumerate(self.soft):
+        for k, place in self.soft.items():
             excess[k] = extra[2 * place] - extra[2 * place + 1] if program.limits[k].sign == 0 else extra[2 * place]
         rows = [
-            limit.residual(static, limit_values[k]) / limit_scales[k] - excess[k]
+            limit.residual(reading[limit.family], limit_values[k]) / limit_scales[k] - excess[k]
             for k, limit in enumerate(program.limits)
             if self._is_row(limit)
         ]
         epigraph = dict(zip(self.epigraphs, extra, strict=False)) if not self.elastic else {}
         weights, scales = read(vector, "objective weight"), read(vector, "objective scale")
-        terms = [extra[k] for k in range(2 * len(self.soft))]
+        terms = [extra[k] for k in range(2 * self.groups)]
         for k, objective in enumerate(program.objectives if not self.elastic else ()):
             reached = epigraph[k] if k in epigraph else static[objective.row] / scales[k]
             terms.append(weights[k] * reached)

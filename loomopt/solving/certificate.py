@@ -5,7 +5,7 @@ least squares). A limit with a positive multiplier at one level is an equality o
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -77,7 +77,8 @@ def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
         if limit.family == "cycle":
             found[k] = (sampler.peak(limit.row) - limit.value) / limit.scale
         else:
-            residual = limit.residual(static, limit.value) / limit.scale
+            values = sampler.given.values if limit.family == "variable" else static
+            residual = limit.residual(values, limit.value) / limit.scale
             found[k] = abs(residual) if limit.sign == 0 else residual
     return found
 
@@ -109,6 +110,10 @@ class _Trial:
         """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
         if limit.sign != 0 and self.excess[k] < -ACTIVE:
             return []
+        if limit.weight and self.sampler.static[limit.weight] == 0.0:
+            # Where the weight vanishes it can still grow, to second order: the limit keeps the row from below only.
+            limit = replace(limit, sign=-1)
+            return [Row(limit.name, limit.scale, 1.0, limit=limit)] if self.program.limits[k].sign <= 0 else []
         if limit.family != "cycle":
             return [Row(limit.name, limit.scale, 1.0, limit=limit)]
         touching = [e for e in self.sampler.extremes(limit.row) if abs(e.value) >= limit.value - ACTIVE * limit.scale]
@@ -257,7 +262,8 @@ class _Trial:
             return (abs(row.node.value) - (row.limit.value if row.limit else 0.0)) / row.scale
         if row.limit is None:
             return 0.0
-        values = {**self.sampler.given.values, **self.sampler.figures}
+        values = self.sampler.given.values
+        values = values if row.limit.family == "variable" else {**values, **self.sampler.figures}
         return float(row.limit.residual(values, row.limit.value)) / row.scale
 
     def _correct(self, back: Floats, directions: Floats, bends: Floats, multipliers: Floats) -> None:

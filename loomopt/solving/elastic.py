@@ -26,10 +26,10 @@ def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Set
         return Clash()
     point, needs = together
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
-    names = dict.fromkeys(limit.name for limit in program.limits if limit.relaxable)
-    for name in names if len(needs) > 1 else ():
-        single = _least(_only(program, name), starts[:2], settings)
-        if single and single[1] and len({program.limits[k].name for k in single[1]}) == 1:
+    groups = dict.fromkeys((limit.name, limit.sign) for limit in program.limits if limit.relaxable)
+    for group in groups if len(needs) > 1 else ():
+        single = _least(_only(program, *group), starts[:2], settings)
+        if single and len(single[1]) == 1:
             found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single[1].items()]
     return Clash(_priced(program, point, words) if found else (), tuple(found), point.x)
 
@@ -69,10 +69,10 @@ def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float
     return {k: relaxed[k] for k in worst.values()}
 
 
-def _only(program: Program, name: str) -> Program:
-    """Return the program with one limit relaxable and all others firm."""
+def _only(program: Program, name: str, sign: int) -> Program:
+    """Return the program with one side of a limit relaxable and all else firm."""
 
     def firm(limit: Limit) -> Limit:
-        return replace(limit, relaxable=limit.relaxable and limit.name == name)
+        return replace(limit, relaxable=limit.relaxable and (limit.name, limit.sign) == (name, sign))
 
     return replace(program, limits=tuple(map(firm, program.limits)))

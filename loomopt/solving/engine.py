@@ -142,9 +142,10 @@ class _Search:
             return
         tried = 0
         for wanted in dict.fromkeys((count, max(count, MORE_STARTS))):
-            for start in exchange.starts(self.program, wanted, self.seed)[tried:]:
+            chosen = exchange.starts(self.program, wanted, self.seed)
+            for start in chosen[tried:]:
                 if on_start:
-                    on_start(tried + 1, wanted)
+                    on_start(tried + 1, len(chosen))
                 self._try(start, None)
                 tried += 1
             if self._judge():
@@ -234,7 +235,9 @@ class _Search:
             tried = exchange.starts(program, MORE_STARTS, self.seed)
             from loomopt.solving.elastic import clash
 
+            began = time.perf_counter()
             found = clash(program, tried, self.settings, Words(scene))
+            self.spent += time.perf_counter() - began
             if self.points:
                 solver["status"] = self.points[0].status
                 solver["iterations"] = sum(point.iterations for point in self.points)
@@ -260,19 +263,17 @@ class _Search:
                 groups[-1] = (groups[-1][0], groups[-1][1] + 1)
             else:
                 groups.append((point, 1))
-        named = [objective.figure for objective in self.program.objectives]
-        sizes = [objective.scale for objective in self.program.objectives]
-        powers = [objective.power for objective in self.program.objectives]
-        return tuple(
-            (
-                {
-                    name: (value * size) ** (1 / power)
-                    for name, value, size, power in zip(named, self.objectives(point), sizes, powers, strict=True)
-                },
-                count,
-            )
-            for point, count in groups
-        )
+        return tuple((self._reached(point), count) for point, count in groups)
+
+    def _reached(self, point: Point) -> dict[str, float | None]:
+        """Return the figures of the objectives at a point, SI."""
+        sampler = sampler_at(self.program, point.x)
+        if sampler is None:
+            return {}
+        return {
+            o.figure: sampler.peak(o.row) if o.form == "peak" else sampler.figures[o.figure]
+            for o in self.program.objectives
+        }
 
 
 def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[float, ...]:

@@ -121,7 +121,8 @@ class Exact:
             bound = self.number(row.limit.value) if row.limit else 0
             return (self.number(row.sign) * value - bound) / self.number(row.scale)
         if row.limit:
-            return row.limit.residual(static, self.number(row.limit.value)) / self.number(row.scale)
+            values = given.values if row.limit.family == "variable" else static
+            return row.limit.residual(values, self.number(row.limit.value)) / self.number(row.scale)
         return self.number(row.sign) * static[row.quantity] / self.number(row.scale)
 
     def _at(self, given: Given, name: str, piece: int, u: Any) -> Any:

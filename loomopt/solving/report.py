@@ -28,17 +28,20 @@ def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, fl
 
 
 def _findings(program: Program, values: Mapping[str, float | None], design: Mapping[str, float]) -> tuple[Finding, ...]:
-    """Return every limit beside its value; held to 1e-9 of its natural size."""
-    sides: dict[str, dict[int, float]] = {}
-    sizes: dict[str, float] = {}
+    """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
+    sides: dict[tuple[str, bool], dict[int, float]] = {}
+    sizes: dict[tuple[str, bool], float] = {}
     for limit in program.limits:
+        chosen = limit.family == "variable" or bool(limit.weight)
+        key = limit.name, chosen
         for sign in (limit.sign,) if limit.sign else (-1, 1):
-            sides.setdefault(limit.name, {})[sign] = limit.value
-        own = abs(limit.value) if limit.name in design else limit.scale
-        sizes[limit.name] = max(sizes.get(limit.name, 0.0), own)
+            other = sides.setdefault(key, {}).setdefault(sign, limit.value)
+            sides[key][sign] = min(other, limit.value) if sign > 0 else max(other, limit.value)
+        size = abs(limit.value) if chosen and limit.value else 1.0 if limit.weight else limit.scale
+        sizes[key] = max(sizes.get(key, 0.0), size)
     found = []
-    for name, ends in sides.items():
-        value, slack = values[name], FEASIBILITY * sizes[name]
+    for (name, chosen), ends in sides.items():
+        value, slack = (design if chosen else values)[name], FEASIBILITY * sizes[name, chosen]
         low, high = ends.get(-1), ends.get(1)
         ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
         found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))

@@ -13,7 +13,8 @@ from loomopt.jobs.sampling import Sampler
 from loomopt.solving.certificate import excesses
 
 UNCHANGED = 1e-10
-SLACK = 1e-12
+SLACK, NOTICED = 1e-12, 1e-9
+"""What a limit may give way, in its natural size; the least move, in the variable's scale, that is a choice."""
 BISECTIONS = 60
 NODES = 64
 
@@ -31,9 +32,11 @@ def settle(
         if wanted is None or not _flat(program, x, wanted.goal):
             continue
         share = _reach(program, x, wanted.goal)
-        if share > 0.0 and any(abs(wanted.goal[name] - x[name]) > SLACK for name in wanted.goal):
-            x = _part_way(x, wanted.goal, share)
+        if share > 0.0 and any(
+            abs(wanted.goal[v.name] - x[v.name]) > NOTICED * v.scale for v in program.variables if v.name in wanted.goal
+        ):
             settled.append(f"{move.name}: {wanted.reason}")
+        x = _part_way(x, wanted.goal, share)
     return dict(x), tuple(settled)
 
 

@@ -1,5 +1,6 @@
 """Limits, prices and relaxations in the designer's own words and units."""
 
+import math
 from typing import Any
 
 from loomopt.jobs.program import Limit
@@ -9,6 +10,14 @@ from loomopt.solving.solution import Price, Relaxation
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
 SIDES = {-1: "min", 0: "equal", 1: "max"}
+
+
+def outward(value: float, side: int) -> float:
+    """Return a value rounded to six significant digits so that it gives no less room: up for a maximum."""
+    if value == 0.0:
+        return value
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - 5)
+    return float(f"{(math.ceil if side > 0 else math.floor)(value / step) * step:.6g}")
 
 
 class Words:
@@ -71,5 +80,6 @@ class Words:
         side = limit.sign or (1 if need > 0 else -1)
         needed = limit.value + side * abs(need)
         change = self.shown(limit.name, abs(need), 3)
-        text = f"{self.limit(limit)} -> {self.shown(limit.name, needed)} (by {change})"
+        unit = self.unit(limit.name)
+        text = f"{self.limit(limit)} -> {show(outward(needed / factor(unit), side) * factor(unit), unit)} (by {change})"
         return Relaxation(limit.name, SIDES[side], limit.value, needed, alone, text)
