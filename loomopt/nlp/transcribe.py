@@ -27,6 +27,7 @@ IPOPT = {
     "bound_relax_factor": 0.0,
     "acceptable_iter": 0,
     "max_iter": 300,
+    "mu_strategy": "adaptive",
     "nlp_scaling_method": "none",
     "mumps_permuting_scaling": 0,
     "mumps_pivot_order": 2,

@@ -113,9 +113,9 @@ class _Trial:
         if limit.weight and self.sampler.static[limit.weight] == 0.0:
             # Where the weight vanishes it can still grow, to second order: the limit keeps the row from below only.
             limit = replace(limit, sign=-1)
-            return [Row(limit.name, limit.scale, 1.0, limit=limit)] if self.program.limits[k].sign <= 0 else []
+            return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)] if self.program.limits[k].sign <= 0 else []
         if limit.family != "cycle":
-            return [Row(limit.name, limit.scale, 1.0, limit=limit)]
+            return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)]
         touching = [e for e in self.sampler.extremes(limit.row) if abs(e.value) >= limit.value - ACTIVE * limit.scale]
         return [Row(limit.name, limit.scale, float(np.sign(e.value)), limit=limit, node=e) for e in touching]
 
@@ -220,7 +220,7 @@ class _Trial:
         assert row.limit is not None
         if row.node:
             return (abs(row.node.value) - row.limit.value) / row.limit.scale
-        return self.excess[self.program.limits.index(row.limit)]
+        return self.excess[row.place]
 
     def _curve(self, pieces: list[int], equal: list[int], multipliers: Floats) -> None:
         """Judge the Lagrangian's curvature along the directions that no binding row forbids.

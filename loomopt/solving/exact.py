@@ -34,6 +34,8 @@ class Row:
     limit: Limit | None = None
     objective: Objective | None = None
     node: Extreme | None = None
+    place: int = -1
+    """The limit's place in the program."""
 
     @property
     def quantity(self) -> str:

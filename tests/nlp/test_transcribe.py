@@ -154,7 +154,7 @@ def test_unused_slots_weigh_nothing():
 def test_an_elastic_program_has_room_for_every_limit_and_no_objective():
     program = program_of((), "torque")
     nlp, arguments, *_ = put(program, elastic=True)
-    soft = [limit for limit in program.limits if limit.relaxable]
+    soft = {(limit.name, limit.sign) for limit in program.limits if limit.relaxable}
     value = ca.Function("f", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])
     assert nlp.extras == 2 * len(soft)
     assert float(value(arguments["x0"], arguments["p"])) >= 0
