@@ -16,6 +16,7 @@ from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.follow import follow, polish
 from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
+from loomopt.nlp.polish import BINDING
 from loomopt.nlp.transcribe import Transcription
 
 ROUNDS, LEADING = 16, 4
@@ -68,6 +69,9 @@ class _Run:
             reached = status in SUCCESS or self._stands(nlp, sampler, x, extra, nodes)
             if not reached or violation <= self.settings.excess:
                 break
+            followed = self._followed(nlp, Point(x, status, True, raw=raw), nodes, peaks)
+            if followed:
+                return followed
         kept = tuple(map(tuple, nodes))
         point = Point(x, status, reached, self.iterations, kept, violation, raw, calls.built)
         if extra is None or not reached:
@@ -77,6 +81,23 @@ class _Run:
         x, touching = polish(calls, x, extra, point, peaks)
         binding = tuple(map(tuple, touching))
         return replace(point, x=x, binding=binding, built=calls.built, structure=self.program.structure)
+
+    def _followed(
+        self, nlp: Transcription, point: Point, nodes: Sequence[list[Extreme]], peaks: Sequence[list[Extreme]]
+    ) -> Point | None:
+        """Return the answer that pivots lead to from what binds where IPOPT stopped; None where they do not.
+
+        They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
+        extremes it creeps.
+        """
+        if self.elastic or point.status not in SUCCESS:
+            return None
+        prices = point.raw["lam_g"][-len(nodes) * nlp.slots :].reshape(len(nodes), nlp.slots)
+        pairs = zip(nodes, prices, strict=True)
+        binding = tuple(tuple(e for e, p in zip(of, own, strict=False) if p > BINDING) for of, own in pairs)
+        kept = tuple(map(tuple, peaks))
+        found = follow(self.calls, replace(point, nodes=kept, binding=binding, structure=self.program.structure))
+        return replace(found, iterations=self.iterations) if found else None
 
     def _stands(
         self,

@@ -118,3 +118,10 @@ def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():
         assert near.design == pytest.approx(fresh.design, rel=1e-8, abs=1e-12)
         limits.add(frozenset((price.limit, price.side) for price in near.binding))
     assert len(limits) >= 5
+
+
+def test_the_exchange_does_not_creep_along_a_flat_direction_that_moves_its_nodes():
+    answer = lo.solve(lo.load("beatup").set("bounds.pulse", {"min": "25 deg", "max": "35 deg"}))
+    assert answer.status == "optimal"
+    assert answer.figures["peak_torque"] == pytest.approx(88.6894134918, rel=1e-9)
+    assert answer.solver["iterations"] < 60
