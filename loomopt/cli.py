@@ -205,11 +205,13 @@ def export(
     out: Annotated[Path, typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for the joints.")],
     design: Design = None,
     sets: Set = None,
+    on: With = None,
+    off: Without = None,
 ) -> None:
     """Export the linkage at true scale, for the workshop."""
     from loomopt.views import outputs
 
-    scene = read_scene(problem, sets, None, None)
+    scene = read_scene(problem, sets, on, off)
     outputs.linkage(out, scene, read_design(design, scene))
     remark(f"Wrote {out}")
 

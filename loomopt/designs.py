@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from loomopt.errors import BadInput
-from loomopt.quantities import quantity_of
+from loomopt.quantities import Quantity, quantity_of
 from loomopt.scene_errors import refusal, unknown
 
 LARGEST_FILE = 1_000_000
@@ -41,21 +41,32 @@ def read(path: Path, scene: Any) -> dict[str, float]:
 
 def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]:
     """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput."""
-    known = [*scene.job.variables, *(name for name in scene.bounds if name not in scene.job.variables)]
+    kinds = _numbers(scene)
     if not isinstance(data, Mapping) or not data:
-        raise refusal("there is no design", origin, allowed=f"an object of {', '.join(known)}, SI", remedy=_GIVE)
+        known = ", ".join(scene.job.variables)
+        raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
     for name, value in data.items():
-        if name not in known:
-            raise unknown("design variable", str(name), known, origin, f"design.{name}")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < LARGEST:
-            remedy = "Correct the number"
-            raise refusal("no design can have it", origin, f"design.{name}", value, _ALLOWED, remedy)
-        if value == 0 and name in scene.job.mechanism.model_fields:
-            quantity = quantity_of(scene.job.mechanism, name)
-            if quantity and quantity.above == 0:
-                raise refusal("it is zero", origin, f"design.{name}", value, quantity.range, "Correct the number")
+        if name not in kinds:
+            raise unknown("design variable", str(name), list(kinds), origin, f"design.{name}")
+        number = not isinstance(value, bool) and isinstance(value, int | float) and abs(value) < LARGEST
+        if not number or not _fits(kinds[name], value):
+            allowed = f"{_ALLOWED}; {kinds[name].range}" if number else _ALLOWED
+            raise refusal("no design can have it", origin, f"design.{name}", value, allowed, "Correct the number")
     design = {name: float(value) for name, value in data.items()}
     fault = scene.job.fault({**scene.mechanism, **design})
     if fault:
         raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy="Correct its lengths")
     return design
+
+
+def _numbers(scene: Any) -> dict[str, Quantity]:
+    """Return what kind of quantity each number of a scene is that a design may hold."""
+    models = [scene.job.mechanism, scene.job.operation, *(type(own) for own in scene.effects.values())]
+    found = {name: quantity_of(model, name) for model in models for name in model.model_fields}
+    first = {name: found[name] for name in scene.job.variables}
+    return {name: quantity for name, quantity in {**first, **found}.items() if quantity}
+
+
+def _fits(quantity: Quantity, value: float) -> bool:
+    """Say whether a number in SI lies in its quantity's range."""
+    return value >= quantity.least and quantity.above < value < quantity.below

@@ -217,7 +217,6 @@ def kind_of(model: type[BaseModel], field: str) -> str:
 
 Length = Annotated[float, Quantity("length", least=0)]
 PositiveLength = Annotated[float, Quantity("length", above=0)]
-SignedLength = Annotated[float, Quantity("length")]
 Angle = Annotated[float, Quantity("angle")]
 PulseAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]

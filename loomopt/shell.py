@@ -42,7 +42,10 @@ def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: 
         if not equals:
             remedy = 'Write --set operation.M0="800 N*m"'
             raise refusal("it is not KEY=VALUE", scene.origin, "--set", item, remedy=remedy)
-        (own if key.strip().startswith("effects.") else rest)[key.strip()] = value.strip()
+        value = value.strip()
+        if len(value) > 1 and value[0] == value[-1] and value[0] in "\"'":  # quotes that the shell has kept
+            value = value[1:-1]
+        (own if key.strip().startswith("effects.") else rest)[key.strip()] = value
     scene = scene.update(own) if own else scene
     for name in on or ():
         scene = scene.with_effect(name)

@@ -79,7 +79,8 @@ def test_every_packaged_number_says_where_it_comes_from(name):
 
 def test_the_template_loads_with_and_without_its_optional_tables():
     assert scene(tomllib.loads(BEATUP_TEMPLATE)).hash == BEATUP.hash
-    everything = re.sub(r"^# (\[(?:effects|targets)|\w+ = )", r"\1", BEATUP_TEMPLATE, flags=re.MULTILINE)
+    everything = re.sub(r"^# (\[targets|\w+ = )", r"\1", BEATUP_TEMPLATE, flags=re.MULTILINE)
+    everything = everything.replace("[available.", "[effects.")
     assert list(scene(tomllib.loads(everything)).effects) == list(BEATUP.job.effects)
 
 

@@ -38,29 +38,29 @@ J4 = "0.62 kg*m^2"              # reed system about the rocking shaft, without t
 [effects.resistance]
 pulse = "29.8 deg"              # crank angle through which the cloth resists, centred on front dead centre
 
-# More effects: take off the # to put one on; or call it [available.NAME] and put it on by --with NAME.
-#
-# [effects.rocker_inertia]
-# J3 = "0.05 kg*m^2"            # rocker about the rocking shaft
-#
-# [effects.counterweight_inertia]
-# JS = "0.01 kg*m^2"            # counterweight about its own centre of mass
-#
-# [effects.rod_inertia]
-# m2 = "1.5 kg"                 # connecting rod
-# s2 = "32.5 mm"                # its centre of mass from the crank pin
-# JS2 = "0.0005 kg*m^2"         # about its centre of mass; needed for the exact model only
-# model = "lumped"              # or "exact"
-#
-# [effects.gravity]
-# tilt = "-67 deg"              # angle of the line A to D from the horizontal; negative: D lies below A
-# offset = "0 deg"              # angle of the reed's centre of mass from the rocker's line
-#
-# [effects.bearing_friction]
-# coulomb = "2 N*m"             # constant friction torque of the rocking shaft
-# viscous = "0.05 N*m*s/rad"    # friction torque per angular speed
-#
-# [effects.centrifugal]         # bearing load and shaking force as figures; no values of its own
+# More effects, off: --with NAME puts one on; to keep it on, write effects instead of available. All values assumed.
+
+[available.rocker_inertia]
+J3 = "0.05 kg*m^2"            # rocker about the rocking shaft
+
+[available.counterweight_inertia]
+JS = "0.01 kg*m^2"            # counterweight about its own centre of mass
+
+[available.rod_inertia]
+m2 = "1.5 kg"                 # connecting rod
+s2 = "32.5 mm"                # its centre of mass from the crank pin
+JS2 = "0.0005 kg*m^2"         # about its centre of mass; needed for the exact model only
+model = "lumped"              # or "exact"
+
+[available.gravity]
+tilt = "-67 deg"              # angle of the line A to D from the horizontal; negative: D lies below A
+offset = "0 deg"              # angle of the reed's centre of mass from the rocker's line
+
+[available.bearing_friction]
+coulomb = "2 N*m"             # constant friction torque of the rocking shaft
+viscous = "0.05 N*m*s/rad"    # friction torque per angular speed
+
+[available.centrifugal]         # bearing load and shaking force as figures; no values of its own
 
 # Bounds: what may change, and how far. Without a bound, or with one value, a dimension stays; with
 # `free = false` it stays until --free NAME. Any other number above can be bounded by its name as well:

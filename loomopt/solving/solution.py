@@ -8,8 +8,6 @@ from typing import Any
 from loomopt.frozen import freeze
 from loomopt.solving.certificate import Certificate
 
-STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
-
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",
     "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts (--starts 20).",
@@ -18,9 +16,9 @@ ADVICE = {
     "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts (--starts 20).",
     "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts (--starts 20).",
     "Diverging_Iterates": "The objective falls without end; bound every variable.",
-    "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of l1 to l4.",
+    "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of the lengths.",
     "Not_Enough_Degrees_Of_Freedom": "More is fixed than the design can follow; free a dimension.",
-    "Not_Assembled": "The start does not assemble; narrow the bounds of l1 to l4.",
+    "Not_Assembled": "The start does not assemble; narrow the bounds of the lengths.",
 }
 """What each of IPOPT's statuses means to a designer."""
 
