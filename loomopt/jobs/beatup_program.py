@@ -16,7 +16,8 @@ COUNTERWEIGHT = ("m4e", "r4e")
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
-"""Share of the counterweight's room that a solve starts from."""
+MUCH = {"m4e": 0.98, "r4e": 0.9}
+"""Shares of the counterweight's room that a solve starts from."""
 MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
@@ -93,7 +94,7 @@ def program(scene: Any, target: str) -> Program:
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
-    starts = _starts(tuple(variables), known, retrofit=target == "retrofit")
+    starts = _starts(variables, known, direct, target == "retrofit")
     return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes), starts)
 
 
@@ -203,23 +204,25 @@ def _bound_limits(scene: Any, variable: Variable) -> list[Limit]:
     ]
 
 
-def _starts(variables: Sequence[Variable], known: Mapping[str, float], retrofit: bool) -> tuple[dict[str, float], ...]:
+def _starts(
+    variables: Sequence[Variable], known: Mapping[str, float], direct: bool, retrofit: bool
+) -> tuple[dict[str, float], ...]:
     """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
 
-    Never today's own m4e = r4e = 0, where a gradient sees no way to use a counterweight; but a retrofit may well leave
-    it there, so it starts from there too.
+    Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and radius
+    matter by themselves, little and much of it are optima of their own: then there is a second start.
     """
     first = {}
     for v in variables:
         room = 0.01 * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
         first[v.name] = min(max(known.get(v.name, 0.0), v.lower + room), v.upper - room)
-    used = {
-        v.name: v.range[0] + share * (v.range[1] - v.range[0])
-        for v in variables
-        for share in (USED.get(v.name),)
-        if share
-    }
-    return ({**first, **used}, first) if retrofit else ({**first, **used},)
+
+    def using(shares: Mapping[str, float]) -> dict[str, float]:
+        given = {v.name: v.range for v in variables if v.name in shares}
+        return first | {name: low + shares[name] * (high - low) for name, (low, high) in given.items()}
+
+    found = [using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])]
+    return tuple(start for place, start in enumerate(found) if start not in found[:place])
 
 
 def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
