@@ -23,9 +23,6 @@ from loomopt.scene_errors import refusal, unknown  # noqa: E402
 from loomopt.shell import Progress, mistake, read_design, read_number, read_scene, remark  # noqa: E402
 from loomopt.solving.solution import Evaluation  # noqa: E402
 
-if _COLLECTING:
-    gc.enable()
-
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
 BAD_INPUT, DIFFERS, INTERRUPTED = 2, 1, 130
 CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
@@ -286,3 +283,8 @@ def main() -> None:
         remark(f"loomopt: the output cannot be written: {error.strerror}")
         status = BAD_INPUT
     os._exit(status)
+
+
+if _COLLECTING:
+    gc.freeze()  # what is imported by now stays: looking through it once more would cost what was saved
+    gc.enable()
