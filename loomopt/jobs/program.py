@@ -12,9 +12,6 @@ from loomopt.balance import Given
 from loomopt.maths import Maths, Number
 from loomopt.schema import Load, Values
 
-Static = Mapping[str, Number]
-"""Values that do not depend on the crank angle, by name, SI."""
-
 
 @dataclass(frozen=True)
 class Integral:

@@ -243,7 +243,7 @@ class _Search:
                 solver["iterations"] = sum(point.iterations for point in self.points)
             design = task.design(program, found.x) if found.x else task.today(scene)
             here = report.evaluation(scene, task, program, design)
-            return report.without_optimum(scene, target, here, found, solver, before)
+            return report.without_optimum(target, here, found, solver, before)
         same = [p for p in self.points if p.reached and self._compare(p, self.best) == 0]
         solver |= {
             "status": self.best.status,
@@ -252,7 +252,7 @@ class _Search:
         }
         here = report.evaluation(scene, task, program, task.design(program, self.x))
         assert self.certificate is not None
-        answer = report.with_optimum(scene, program, target, here, self.certificate, solver, before)
+        answer = report.with_optimum(scene, target, here, self.certificate, solver, before)
         return replace(answer, point=self.best, optima=self._optima())
 
     def _optima(self) -> tuple[tuple[Mapping[str, float | None], int], ...]:

@@ -50,7 +50,6 @@ def _findings(program: Program, values: Mapping[str, float | None], design: Mapp
 
 def with_optimum(
     scene: Any,
-    program: Program,
     target: str,
     here: Evaluation,
     certificate: Certificate,
@@ -97,7 +96,6 @@ def _stops(prices: tuple[Price, ...]) -> str:
 
 
 def without_optimum(
-    scene: Any,
     target: str,
     here: Evaluation,
     found: Clash,

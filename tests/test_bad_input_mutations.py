@@ -1,0 +1,113 @@
+"""Whatever is changed in a scene at random, it is read or refused: never another error."""
+
+import copy
+import math
+from pathlib import Path
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from loomopt import packaged
+from loomopt.errors import BadInput
+from loomopt.jobs import load, scene
+from loomopt.scenes import Scene
+
+BEATUP = load("beatup")
+TEXT = packaged.problem_path("beatup").read_text(encoding="utf-8")
+
+
+SCALARS = st.one_of(
+    st.text(max_size=12),
+    st.sampled_from(["1e60 m", "1e-59 m", "1 mm", "5 deg", "0 kg", "inf m", "1e999 kg", "60 mm", "exact", "true"]),
+    st.builds("{} {}".format, st.floats(width=32), st.sampled_from(["mm", "deg", "kg", "N*m", "rpm", "kg*m^2"])),
+    st.integers(),
+    st.floats(),
+    st.booleans(),
+    st.none(),
+    st.dates(),
+)
+JUNK = st.recursive(
+    SCALARS,
+    lambda inner: (
+        st.lists(inner, max_size=2)
+        | st.dictionaries(st.sampled_from(["min", "max", "free", "J4"]) | st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=4,
+)
+KEYS = st.sampled_from(["l1", "l2", "J4", "pulse", "swing", "balance", "gravity", "effects", "M0", "min"])
+
+
+def paths(table, start=()):
+    """Return the path of everything in nested tables."""
+    inner = [path for name, value in table.items() if isinstance(value, dict) for path in paths(value, (*start, name))]
+    return [(*start, name) for name in table] + inner
+
+
+@st.composite
+def mutated(draw):
+    """Return the packaged tables with a few values removed, replaced or added at random."""
+    document = copy.deepcopy(dict(BEATUP.document))
+    if draw(st.booleans()):
+        document["effects"] |= document["available"]
+    for _ in range(draw(st.integers(1, 3))):
+        *path, last = draw(st.sampled_from([path for path in paths(document) if path[0] != "problem"]))
+        table = document
+        for name in path:
+            table = table[name]
+        what = draw(st.sampled_from(["remove", "replace", "add", "rescale", "rescale"]))
+        if what == "remove":
+            table.pop(last, None)
+        elif what == "rescale":
+            _, _, unit = str(table.get(last, "")).partition(" ")
+            table[last] = f"{draw(st.floats(1e-70, 1e70) | st.floats(0, 1000))} {unit}"
+        else:
+            table[last if what == "replace" else draw(KEYS)] = draw(JUNK)
+    return document
+
+
+def read_or_refused(call, *arguments):
+    """Check that a call gives a scene that works, or one plain line."""
+    try:
+        found = call(*arguments)
+    except BadInput as error:
+        assert str(error).isprintable()  # noqa: PT017 (both outcomes are right)
+        return
+    assert isinstance(found, Scene)
+    assert len(found.hash) == 12
+    for name, kind in found.job.variables.items():
+        assert found.unit(name, kind)
+    assert all(math.isfinite(value) for value in found.mechanism.values())
+
+
+@given(mutated())
+@settings(deadline=None, derandomize=True, max_examples=400)
+def test_mutated_tables_are_read_or_refused(document):
+    read_or_refused(scene, document)
+
+
+@given(st.lists(st.sampled_from(paths(BEATUP.document)).map(".".join) | st.text(max_size=20), max_size=3), JUNK)
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_any_key_set_is_read_or_refused(keys, value):
+    read_or_refused(BEATUP.update, dict.fromkeys(keys, value))
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(TEXT) - 1), st.integers(0, 9), st.binary(max_size=6)),
+        min_size=1,
+        max_size=3,
+    )
+)
+@settings(
+    deadline=None,
+    derandomize=True,
+    max_examples=300,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+def test_mutated_bytes_are_read_or_refused(tmp_path, cuts):
+    content = TEXT.encode()
+    for at, length, inserted in cuts:
+        content = content[:at] + inserted + content[at + length :]
+    path = Path(tmp_path / "scene.toml")
+    path.write_bytes(content)
+    read_or_refused(load, path)
