@@ -69,6 +69,12 @@ class Pose:
         """ψ'' = d²ψ/dφ²."""
         return dyad.second_rate_2(self.dyad, self.crank, *self._rates, self.lengths.l2)
 
+    @functools.cached_property
+    def psi_3(self) -> Number:
+        """Third derivative of ψ with respect to φ."""
+        jerk, seconds = Vector(-self.crank.y, self.crank.x), (self.rod_2, self.psi_2)
+        return dyad.third_rate_2(self.dyad, jerk, self._rates, seconds, self.lengths.l2)
+
     @property
     def rod_1(self) -> Number:
         """First derivative of the rod's angle."""

@@ -47,28 +47,39 @@ def polar(maths: Maths, radius: Number, angle: Number) -> Vector:
     return Vector(radius * maths.cos(angle), radius * maths.sin(angle))
 
 
-def turned(vector: Vector) -> Vector:
-    """Return the vector turned by a right angle, counter-clockwise."""
-    return Vector(-vector.y, vector.x)
-
-
 def between(first: Vector, second: Vector) -> Vector:
     """Return (dot, cross): the second vector as seen from the first, scaled by both lengths."""
     return Vector(dot(first, second), first.x * second.y - first.y * second.x)
 
 
 @dataclass(frozen=True)
+class Stand:
+    """How the drive stands and turns: what every position shares.
+
+    beta: crank angle of front dead centre from A0→B0; frame_angle: of A0→B0 from x; rad.
+    mirror: +1 as in the paper, −1 for the machine seen in a mirror; sense: +1 where the main crank turns
+    counter-clockwise, −1 clockwise. The second crank turns against the main crank.
+    """
+
+    beta: Number
+    frame_angle: Number
+    mirror: int = 1
+    sense: int = 1
+
+
+@dataclass(frozen=True)
 class Sley:
-    """The sley four-bar: what does not depend on the crank angle."""
+    """The sley four-bar: what does not depend on the crank angle; mirror, sense: as in `Stand`."""
 
     maths: Maths
     dimensions: Dimensions
+    mirror: int = 1
+    sense: int = 1
 
     @functools.cached_property
     def lengths(self) -> Lengths:
-        """The four-bar as a crank-rocker on its other side."""
-        d = self.dimensions
-        return Lengths(d.l1, d.l2, d.l3, d.l71, -1)
+        """The four-bar as a crank-rocker on its own side."""
+        return sley_lengths(self.dimensions, self.mirror)
 
     @functools.cached_property
     def centres(self) -> crank_rocker.DeadCentres:
@@ -76,54 +87,80 @@ class Sley:
         return crank_rocker.dead_centres(self.maths, self.lengths)
 
     @functools.cached_property
-    def frame_angle(self) -> Number:
-        """Angle of A0→B0 from x: at front dead centre the sley stands at φ30."""
-        return self.dimensions.phi30 - self.centres.psi_front
+    def stand(self) -> Stand:
+        """How it stands: at front dead centre the sley is at φ30."""
+        frame_angle = self.dimensions.phi30 - self.centres.psi_front
+        return Stand(self.centres.beta, frame_angle, self.mirror, self.sense)
 
-    def pose(self, phi1: Number) -> crank_rocker.Pose:
-        """Return the four-bar at crank angles φ1 from front dead centre."""
-        return crank_rocker.Pose(self.maths, self.lengths, phi1 + self.centres.beta)
+
+def sley_lengths(dimensions: Dimensions, mirror: int = 1) -> Lengths:
+    """Return the sley four-bar as a crank-rocker; the sley lies counter-clockwise of A0 seen from B0 [Hong17]."""
+    d = dimensions
+    return Lengths(d.l1, d.l2, d.l3, d.l71, -mirror)
 
 
 @dataclass(frozen=True)
 class Pose:
-    """The drive at crank angles φ1, any shape; each figure is computed when it is first read.
+    """The drive at crank angles φ1, any shape; derivatives with respect to φ1; each figure computed when first read.
 
-    side: −1 where D lies to the right of C→B2 (the paper's assembly), +1 for the other.
+    D lies to the right of C→B2, as the paper assembles it (to the left in a mirrored drive).
     """
 
-    sley: Sley
+    maths: Maths
+    dimensions: Dimensions
+    stand: Stand
     phi1: Number
-    side: Number = -1
 
     @functools.cached_property
     def four_bar(self) -> crank_rocker.Pose:
-        """The sley four-bar's own pose."""
-        return self.sley.pose(self.phi1)
+        """The sley four-bar, its derivatives with respect to its own crank angle."""
+        stand = self.stand
+        lengths = sley_lengths(self.dimensions, stand.mirror)
+        return crank_rocker.Pose(self.maths, lengths, stand.sense * self.phi1 + stand.beta)
 
     @functools.cached_property
     def phi3(self) -> Number:
         """Angle of the sley B0B1 from x."""
-        return self.sley.frame_angle + self.four_bar.psi
+        return self.stand.frame_angle + self.four_bar.psi
+
+    @property
+    def phi3_1(self) -> Number:
+        """First derivative of φ3."""
+        return self.stand.sense * self.four_bar.psi_1
+
+    @property
+    def phi3_2(self) -> Number:
+        """Second derivative of φ3."""
+        return self.four_bar.psi_2
+
+    @property
+    def phi3_3(self) -> Number:
+        """Third derivative of φ3."""
+        return self.stand.sense * self.four_bar.psi_3
 
     @functools.cached_property
     def carrier(self) -> Vector:
         """Vector B0→B2, m."""
-        d = self.sley.dimensions
-        return polar(self.sley.maths, d.l3p, self.phi3 + d.alpha)
+        d = self.dimensions
+        return polar(self.maths, d.l3p, self.phi3 + d.alpha)
 
     @functools.cached_property
     def second_crank(self) -> Vector:
         """Vector C0→C, m."""
-        d = self.sley.dimensions
-        return polar(self.sley.maths, d.l4, d.phi40 - 2 * self.phi1)
+        d = self.dimensions
+        return polar(self.maths, d.l4, d.phi40 - 2 * self.stand.sense * self.phi1)
+
+    @functools.cached_property
+    def base(self) -> Vector:
+        """Vector C→B2, m: what links l5 and l6 have to span."""
+        d, carrier, crank = self.dimensions, self.carrier, self.second_crank
+        return Vector(carrier.x - d.C0x - crank.x, carrier.y - d.C0y - crank.y)
 
     @functools.cached_property
     def dyad(self) -> dyad.Dyad:
         """Links l5 (C→D) and l6 (B2→D)."""
-        d, carrier, crank = self.sley.dimensions, self.carrier, self.second_crank
-        base = Vector(carrier.x - d.C0x - crank.x, carrier.y - d.C0y - crank.y)
-        return dyad.close(self.sley.maths, base, d.l5, d.l6, self.side)
+        d = self.dimensions
+        return dyad.close(self.maths, self.base, d.l5, d.l6, -self.stand.mirror)
 
     @functools.cached_property
     def relative(self) -> Vector:
@@ -132,12 +169,13 @@ class Pose:
 
     @functools.cached_property
     def _base_1(self) -> Vector:
-        rate, carrier, crank = self.four_bar.psi_1, self.carrier, self.second_crank
-        return Vector(-rate * carrier.y - 2 * crank.y, rate * carrier.x + 2 * crank.x)
+        rate, turn = self.phi3_1, 2 * self.stand.sense
+        carrier, crank = self.carrier, self.second_crank
+        return Vector(-rate * carrier.y - turn * crank.y, rate * carrier.x + turn * crank.x)
 
     @functools.cached_property
     def _base_2(self) -> Vector:
-        rate, second = self.four_bar.psi_1, self.four_bar.psi_2
+        rate, second = self.phi3_1, self.phi3_2
         carrier, crank = self.carrier, self.second_crank
         return Vector(
             -second * carrier.y - rate * rate * carrier.x + 4 * crank.x,
@@ -145,30 +183,72 @@ class Pose:
         )
 
     @functools.cached_property
-    def _rates(self) -> tuple[Number, Number]:
+    def _base_3(self) -> Vector:
+        rate, turn = self.phi3_1, 8 * self.stand.sense
+        along, across = -3 * rate * self.phi3_2, self.phi3_3 - rate**3
+        carrier, crank = self.carrier, self.second_crank
+        return Vector(
+            along * carrier.x - across * carrier.y + turn * crank.y,
+            along * carrier.y + across * carrier.x - turn * crank.x,
+        )
+
+    @functools.cached_property
+    def rates(self) -> tuple[Number, Number]:
+        """First derivatives of the angles of links l5 and l6."""
         return dyad.rates(self.dyad, self._base_1)
 
     @functools.cached_property
+    def phi6_2(self) -> Number:
+        """Second derivative of φ6."""
+        return dyad.second_rate_2(self.dyad, self._base_2, *self.rates, self.dimensions.l5)
+
+    @functools.cached_property
+    def _seconds(self) -> tuple[Number, Number]:
+        return dyad.second_rate_1(self.dyad, self._base_2, *self.rates, self.dimensions.l6), self.phi6_2
+
+    @functools.cached_property
     def phi63_1(self) -> Number:
-        """First derivative of φ6 − φ3."""
-        return self._rates[1] - self.four_bar.psi_1
+        """First derivative of φ63 = φ6 − φ3."""
+        return self.rates[1] - self.phi3_1
 
     @functools.cached_property
     def phi63_2(self) -> Number:
-        """Second derivative of φ6 − φ3."""
-        d = self.sley.dimensions
-        second = dyad.second_rates(self.dyad, self._base_2, *self._rates, d.l5, d.l6)[1]
-        return second - self.four_bar.psi_2
+        """Second derivative of φ63."""
+        return self.phi6_2 - self.phi3_2
 
-    def phi63(self, front: "Pose") -> Number:
-        """Return φ6 − φ3 less its value at front dead centre, as one angle."""
-        change = between(front.relative, self.relative)
-        return self.sley.maths.atan2(change.y, change.x)
+    @functools.cached_property
+    def phi63_3(self) -> Number:
+        """Third derivative of φ63."""
+        third = dyad.third_rate_2(self.dyad, self._base_3, self.rates, self._seconds, self.dimensions.l5)
+        return third - self.phi3_3
 
-    def cos_transmission(self) -> Number:
-        """Return the cosine of the angle at D between l5 and l6."""
-        d = self.sley.dimensions
-        return dot(self.dyad.link1, self.dyad.link2) / (d.l5 * d.l6)
+    def phi63(self, front: Vector) -> Number:
+        """Return φ6 − φ3 less its value at front dead centre, as one angle; front: `relative` there."""
+        change = between(front, self.relative)
+        return self.maths.atan2(change.y, change.x)
+
+    @functools.cached_property
+    def obliquity(self) -> Number:
+        """By how much the angle at D between l5 and l6 falls short of a right angle, rad; negative where it exceeds."""
+        angle = between(self.dyad.link1, self.dyad.link2)
+        return self.maths.atan2(angle.x, -self.stand.mirror * angle.y)
+
+    @functools.cached_property
+    def joints(self) -> dict[str, Vector]:
+        """Every joint by the paper's name, m, from B0."""
+        d, along = self.dimensions, polar(self.maths, 1, self.stand.frame_angle)
+        A0, crank = Vector(-d.l71 * along.x, -d.l71 * along.y), self.four_bar.crank
+        pin = Vector(crank.x * along.x - crank.y * along.y, crank.x * along.y + crank.y * along.x)
+        return {
+            "A0": A0,
+            "A": Vector(A0.x + pin.x, A0.y + pin.y),
+            "B1": polar(self.maths, d.l3, self.phi3),
+            "B0": Vector(0 * d.l3, 0 * d.l3),
+            "B2": self.carrier,
+            "C0": Vector(d.C0x, d.C0y),
+            "C": Vector(d.C0x + self.second_crank.x, d.C0y + self.second_crank.y),
+            "D": Vector(self.carrier.x + self.dyad.link2.x, self.carrier.y + self.dyad.link2.y),
+        }
 
 
 @dataclass(frozen=True)
@@ -188,7 +268,7 @@ def construct(maths: Maths, dimensions: Dimensions, phi3M: Number, phi63: Number
     stands at φ3M and the driving link at φ3M + φ63; rad. C0, l4, l5 and φ40 of `dimensions` are not read.
     """
     d, sley = dimensions, Sley(maths, dimensions)
-    A0x = -polar(maths, d.l71, sley.frame_angle).x
+    A0x = -polar(maths, d.l71, sley.stand.frame_angle).x
 
     def joint(phi3: Number, phi6: Number) -> Vector:
         carrier, link = polar(maths, d.l3p, phi3 + d.alpha), polar(maths, d.l6, phi6)
