@@ -112,6 +112,7 @@ def _curve(axes: Any, angle: Any, values: Any, column: str, colour: str) -> None
 def _mark(axes: Any, marks: Mapping[str, float], named: bool) -> None:
     """Shade stretches and mark angles wherever they fall on the axis; `named`: write their names above it."""
     low, high = axes.get_xlim()
+    marks = {name: angle for name, angle in marks.items() if math.isfinite(angle)}
     names: list[tuple[float, str]] = []
     stretches = [name.removesuffix(" begins") for name in marks if name.endswith(" begins")]
     stretches = [name for name in stretches if f"{name} ends" in marks]

@@ -4,7 +4,7 @@ from html import escape
 from typing import Any
 
 from loomopt.solving.solution import Solution
-from loomopt.views import drawing, svg, terminal
+from loomopt.views import job_views, svg, terminal
 from loomopt.views.layout import Grid, spaced
 
 
@@ -12,7 +12,8 @@ def answer(solution: Solution, scene: Any) -> str:
     """Return an answer as HTML: what was found, design beside today, what binds, certificate, the mechanism."""
     shown = terminal.solution(solution, scene)
     parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
-    return f"<div>{''.join(parts)}{svg.render(drawing.linkage(solution.design, solution.problem))}</div>"
+    drawn = svg.render(job_views.view(scene).linkage(scene, solution.design))
+    return f"<div>{''.join(parts)}{drawn}</div>"
 
 
 def table(grid: Grid) -> str:

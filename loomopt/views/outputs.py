@@ -12,6 +12,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.store import atomically, suffix
+from loomopt.views import job_views
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
@@ -43,13 +44,13 @@ def _put(content: str, place: Path) -> None:
 
 def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
     """Write an answer into a folder: answer.json, table.csv, curves.csv, linkage.svg; returns the files."""
-    from loomopt.views import drawing, svg
+    from loomopt.views import svg
 
     contents = {
         "answer.json": document(solution) + "\n",
         "table.csv": tables.csv(tables.answer(solution, scene)),
         "curves.csv": tables.csv(tables.curves(scene, solution.design)),
-        "linkage.svg": svg.render(drawing.linkage(solution.design, scene.name)),
+        "linkage.svg": svg.render(job_views.view(scene).linkage(scene, solution.design)),
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -91,23 +92,21 @@ def _figure(figure: Any, frame: Any, title: str, marks: Mapping[str, float], pla
 
 
 def linkage(path: Path, scene: Any, design: Mapping[str, float]) -> None:
-    """Write a design's linkage in both dead centres: SVG or DXF at true scale, or its joints as CSV."""
-    from loomopt.views import drawing, dxf, svg
+    """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
+    from loomopt.views import dxf, svg
 
-    ending = suffix(path, DRAWINGS)
-    full = {**TASKS[scene.job.name].today(scene), **design}
+    ending, view = suffix(path, DRAWINGS), job_views.view(scene)
     if ending == ".csv":
-        text(path, drawing.joints_csv(full))
+        text(path, view.joints_csv(scene, design))
     elif ending == ".svg":
-        text(path, svg.render(drawing.linkage(full, scene.name)))
+        text(path, svg.render(view.linkage(scene, design)))
     else:
-        atomically(path, functools.partial(dxf.write, drawing.linkage(full, scene.name)))
+        atomically(path, functools.partial(dxf.write, view.linkage(scene, design)))
 
 
 def picture(path: Path, scene: Any, design: Mapping[str, float]) -> None:
-    """Draw a design's linkage in both dead centres as a picture."""
-    from loomopt.views import drawing, figure
+    """Draw a design's linkage in the positions that matter as a picture."""
+    from loomopt.views import figure
 
     suffix(path, PICTURES)
-    full = {**TASKS[scene.job.name].today(scene), **design}
-    atomically(path, functools.partial(figure.draw, drawing.linkage(full, scene.name)))
+    atomically(path, functools.partial(figure.draw, job_views.view(scene).linkage(scene, design)))

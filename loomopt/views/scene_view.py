@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.jobs import beatup_program
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.words import Words
+from loomopt.views import job_views
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15
@@ -83,26 +83,25 @@ def _ended(scene: Any, key: str, end: str) -> str:
 
 def equations(scene: Any) -> list[str]:
     """Return the equations a scene really uses, as text, those of one name together."""
-    from loomopt.views import equations as printer
-
-    found = printer.equations(beatup_program.model(scene))
+    found = job_views.view(scene).equations(scene)
     groups = itertools.groupby(found, key=lambda equation: equation.name)
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
 def curves(scene: Any, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
-    """Return the curves every 15 degrees and at the dead centres, both sides of a jump; more tables where too wide."""
+    """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
     task = TASKS[scene.job.name]
     full = {**task.today(scene), **design}
     columns = dict(task.curves(scene, full))
     angle = np.degrees(columns.pop("phi [rad]"))
-    centres = {name: math.degrees(value) for name, value in task.marks(scene, full).items() if "dead" in name}
+    places = {name: math.degrees(value) for name, value in _single(task.marks(scene, full)).items()}
     rows = [
         k
         for k, a in enumerate(angle)
-        if abs(a / STEP - round(a / STEP)) < 1e-9 or min(abs(a - mark) for mark in centres.values()) < 1e-9
+        if abs(a / STEP - round(a / STEP)) < 1e-9
+        or any(abs(math.remainder(a - place, 360)) < 1e-9 for place in places.values())
     ]
-    marks = ", ".join(f"{name} at {value:.3f} deg" for name, value in centres.items())
+    marks = ", ".join(f"{name} at {place:.3f} deg" for name, place in places.items())
     first = ("phi\n[deg]", [f"{degrees:.3f}" for degrees in angle])
     groups: list[list[tuple[str, list[str]]]] = [[]]
     for curve in (_curve(name, values) for name, values in columns.items()):
@@ -111,6 +110,14 @@ def curves(scene: Any, design: Mapping[str, float], width: int | None) -> list[s
         groups[-1].append(curve)
     tables = [_table([first, *group], rows) for group in groups]
     return [f"{scene.title}: {marks}", *tables]
+
+
+def _single(marks: Mapping[str, float]) -> dict[str, float]:
+    """Return the marks that are one crank angle, not an end of a stretch such as "pulse begins", "pulse ends"."""
+    ends = {"begins": "ends", "ends": "begins"}
+    parts = {name: name.rpartition(" ") for name in marks}
+    paired = {name for name, (what, _, end) in parts.items() if f"{what} {ends.get(end, end)}" in marks.keys() - {name}}
+    return {name: angle for name, angle in marks.items() if name not in paired and math.isfinite(angle)}
 
 
 def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> Grid:

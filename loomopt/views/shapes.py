@@ -36,6 +36,7 @@ LAYERS: Mapping[str, Layer] = {
     "paths": Layer("#6b7280", 8, 0.18, dashed=True),
     "frame": Layer("#1f2937", 7, 0.35),
     "front dead centre": Layer("#c2410c", 30, 0.5),
+    "hand-over": Layer("#7c3aed", 200, 0.35),
     "rear dead centre": Layer("#1d4ed8", 150, 0.35, dashed=True),
     "joints": Layer("#1f2937", 7, 0.35),
     "dimensions": Layer("#047857", 92, 0.18),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from loomopt.errors import BadInput
 from loomopt.mechanisms import crank_rocker
-from loomopt.views import drawing, shapes
+from loomopt.views import crank_rocker_drawing, shapes
 from loomopt.views.shapes import LAYERS, Arc, Circle, Line, Text
 
 few = settings(max_examples=30, deadline=None, database=None)
@@ -44,7 +44,7 @@ def designs(draw):
 @few
 @given(design=designs())
 def test_links_are_drawn_at_full_scale_and_meet(layer, design):
-    crank, rod, rocker = links(drawing.linkage(design, ""), layer)
+    crank, rod, rocker = links(crank_rocker_drawing.linkage(design, ""), layer)
     scale = 1e3 * design["l4"]
     lengths = [math.dist(*link) for link in (crank, rod, rocker)]
     assert lengths == pytest.approx([1e3 * design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * scale)
@@ -55,7 +55,7 @@ def test_links_are_drawn_at_full_scale_and_meet(layer, design):
 
 
 def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
-    drawn = drawing.linkage(PAPER, "")
+    drawn = crank_rocker_drawing.linkage(PAPER, "")
     for layer, length in (("front dead centre", 96.0), ("rear dead centre", 34.0)):
         (b, a), (_, c), _ = links(drawn, layer)
         assert math.dist(a, c) == pytest.approx(length, rel=1e-12)
@@ -63,7 +63,7 @@ def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
 
 
 def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle():
-    drawn = drawing.linkage(PAPER, "")
+    drawn = crank_rocker_drawing.linkage(PAPER, "")
     path = next(p for p in drawn.primitives if isinstance(p, Arc) and p.layer == "paths")
     assert path.radius == pytest.approx(155.0, rel=1e-14)
     assert math.degrees(path.end - path.begin) == pytest.approx(23.0875, abs=1e-3)
@@ -74,13 +74,13 @@ def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle()
 
 
 def test_the_arrow_to_the_fell_points_toward_decreasing_psi():
-    (start, tip), _ = links(drawing.linkage(PAPER, ""), "notes")
+    (start, tip), _ = links(crank_rocker_drawing.linkage(PAPER, ""), "notes")
     angles = [math.atan2(point.y, point.x - 167.0) for point in (start, tip)]
     assert angles[1] < angles[0]
 
 
 def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
-    shown = " | ".join(text.text for text in texts(drawing.linkage(PAPER, "Reed")))
+    shown = " | ".join(text.text for text in texts(crank_rocker_drawing.linkage(PAPER, "Reed")))
     for part in (
         "Reed",
         "l1 = 31",
@@ -93,13 +93,15 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
         "θ",
     ):
         assert part in shown
-    assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(drawing.linkage(PAPER, ""))}
+    assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(crank_rocker_drawing.linkage(PAPER, ""))}
 
 
 @few
 @given(design=designs())
 def test_no_two_texts_overlap(design):
-    drawn = drawing.linkage(design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines")
+    drawn = crank_rocker_drawing.linkage(
+        design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
+    )
     boxes = [shapes.text_box(text, drawn.height) for text in texts(drawn)]
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
 
@@ -107,7 +109,7 @@ def test_no_two_texts_overlap(design):
 @few
 @given(design=designs())
 def test_the_extent_holds_every_joint_and_every_text(design):
-    drawn = drawing.linkage(design, "title")
+    drawn = crank_rocker_drawing.linkage(design, "title")
     box = shapes.extent(drawn)
     points = [point for p in drawn.primitives if isinstance(p, Line) for point in p.points]
     for text in texts(drawn):
@@ -118,7 +120,7 @@ def test_the_extent_holds_every_joint_and_every_text(design):
 
 def test_a_drawing_scales_with_its_machine():
     large = {name: 1000 * value for name, value in PAPER.items()}
-    small, big = (drawing.linkage(design, "t") for design in (PAPER, large))
+    small, big = (crank_rocker_drawing.linkage(design, "t") for design in (PAPER, large))
     assert big.height == pytest.approx(1000 * small.height)
     for layer in ("frame", "front dead centre", "rear dead centre", "dimensions", "notes"):
         for one, other in zip(links(small, layer), links(big, layer), strict=True):
@@ -126,17 +128,17 @@ def test_a_drawing_scales_with_its_machine():
 
 
 def test_every_layer_drawn_on_has_a_style():
-    assert {primitive.layer for primitive in drawing.linkage(PAPER, "t").primitives} <= LAYERS.keys()
+    assert {primitive.layer for primitive in crank_rocker_drawing.linkage(PAPER, "t").primitives} <= LAYERS.keys()
 
 
 def test_lengths_that_are_no_crank_rocker_are_refused():
-    for draw in (drawing.joints_csv, lambda design: drawing.linkage(design, "t")):
+    for draw in (crank_rocker_drawing.joints_csv, lambda design: crank_rocker_drawing.linkage(design, "t")):
         with pytest.raises(BadInput, match=r"l1 \+ l4 < l2 \+ l3 fails"):
             draw({"l1": 0.1, "l2": 0.02, "l3": 0.02, "l4": 0.1})
 
 
 def test_joints_are_written_in_mm_with_every_digit():
-    rows = list(csv.DictReader(io.StringIO(drawing.joints_csv(PAPER))))
+    rows = list(csv.DictReader(io.StringIO(crank_rocker_drawing.joints_csv(PAPER))))
     at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
     assert list(at) == ["A", "D", "B", "C", "B'", "C'"]
     for b, c in (("B", "C"), ("B'", "C'")):

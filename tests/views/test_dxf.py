@@ -5,22 +5,22 @@ import sys
 import ezdxf
 import pytest
 
-from loomopt.views import drawing, dxf
+from loomopt.views import crank_rocker_drawing, dxf
 from loomopt.views.shapes import LAYERS, Drawing, Line, Point
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 WRITE = """
 import sys
 from pathlib import Path
-from loomopt.views import drawing, dxf
-dxf.write(drawing.linkage(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167), "t"), Path(sys.argv[1]))
+from loomopt.views import crank_rocker_drawing, dxf
+dxf.write(crank_rocker_drawing.linkage(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167), "t"), Path(sys.argv[1]))
 """
 
 
 @pytest.fixture(scope="module")
 def document(tmp_path_factory):
     path = tmp_path_factory.mktemp("dxf") / "linkage.dxf"
-    dxf.write(drawing.linkage(PAPER, "Reed\n β\x00"), path)
+    dxf.write(crank_rocker_drawing.linkage(PAPER, "Reed\n β\x00"), path)
     return ezdxf.readfile(path)
 
 
@@ -33,10 +33,11 @@ def test_it_is_r2010_in_mm_and_sound(document):
     assert not auditor.fixes
 
 
-def test_each_layer_has_its_colour(document):
-    for name, style in LAYERS.items():
-        assert document.layers.get(name).color == style.aci
-    assert {entity.dxf.layer for entity in document.modelspace()} <= LAYERS.keys()
+def test_each_layer_drawn_on_has_its_colour_and_no_other_layer_is_there(document):
+    drawn_on = {entity.dxf.layer for entity in document.modelspace()}
+    for name in drawn_on:
+        assert document.layers.get(name).color == LAYERS[name].aci
+    assert {layer.dxf.name for layer in document.layers} - {"0", "Defpoints"} == drawn_on
 
 
 @pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])
@@ -89,5 +90,5 @@ def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):
 
 def test_ezdxf_is_left_as_it_was(tmp_path):
     before = ezdxf.options.write_fixed_meta_data_for_testing
-    dxf.write(drawing.linkage(PAPER, "t"), tmp_path / "a.dxf")
+    dxf.write(crank_rocker_drawing.linkage(PAPER, "t"), tmp_path / "a.dxf")
     assert ezdxf.options.write_fixed_meta_data_for_testing is before

@@ -11,7 +11,7 @@ from loomopt.effects import BEATUP
 from loomopt.jobs.beatup import Beatup
 from loomopt.maths import FLOAT
 from loomopt.schema import Load
-from loomopt.views import equations
+from loomopt.views import beatup_equations
 
 SPEED = 62.83185307179586
 NUMBERS = {"l1": 0.031, "l2": 0.066, "l3": 0.155, "l4": 0.167, "today.l2": 0.065, "speed": SPEED, "M0": 745.0}
@@ -83,7 +83,7 @@ def setting(found, phi):
 def test_printed_terms_are_the_balance(rod, phi):
     found = model(*OWN, rod=rod)
     given, pose, switches = setting(found, phi)
-    named, symbolic = numbers(given, pose, phi), equations.terms(found)
+    named, symbolic = numbers(given, pose, phi), beatup_equations.terms(found)
     for load, term in balance.terms(FLOAT, found.loads, pose, given, switches):
         assert value(symbolic[load.name], named) == pytest.approx(term, rel=1e-12, abs=1e-12)
     output = sum(symbolic[load.name] for load in found.loads if load.acts == "output")
@@ -111,7 +111,7 @@ def test_printed_geometry_holds_for_the_mechanism(name, phi):
     found = model("inertia")
     given, pose, _ = setting(found, phi)
     named = {plain(k): v for k, v in numbers(given, pose, phi).items()}
-    chosen = [equation.text for equation in equations.equations(found) if equation.name == name]
+    chosen = [equation.text for equation in beatup_equations.equations(found) if equation.name == name]
     assert len(chosen) == 2
     for text in chosen:
         left, right = (read(side) for side in text.split(" = "))
@@ -125,7 +125,7 @@ def test_printed_dead_centres_are_the_mechanisms():
     named = numbers(given, pose, 1.0)
     expected = {"beta": given.values["beta"], "beta_r": given.values["beta_r"]}
     expected["psi''_FDC"] = given.values["centres"].psi_2_front
-    shown = dict(equation.text.split(" = ") for equation in equations.equations(found))
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
     for name, number in expected.items():
         assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-13)
 
@@ -133,7 +133,7 @@ def test_printed_dead_centres_are_the_mechanisms():
 def test_the_output_is_minus_psi():
     found = model("inertia")
     _, pose, _ = setting(found, 1.0)
-    assert "q = -psi" in [equation.text for equation in equations.equations(found)]
+    assert "q = -psi" in [equation.text for equation in beatup_equations.equations(found)]
     assert pose.q == -pose.joints.psi
 
 
@@ -141,7 +141,7 @@ def test_printed_checks_are_the_effects():
     found = model("inertia", "centrifugal")
     given, pose, _ = setting(found, 2.0)
     named = {plain(k): v for k, v in numbers(given, pose, 2.0).items()}
-    shown = dict(equation.text.split(" = ") for equation in equations.equations(found))
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
     for check in found.checks:
         for name, quantity in check.quantities.items():
             number = quantity(FLOAT, pose, given.values, given.own[check.name])
@@ -151,7 +151,7 @@ def test_printed_checks_are_the_effects():
 @pytest.mark.parametrize("absent", [set(pair) for n in (1, 2) for pair in itertools.combinations(SYMBOLS, n)])
 def test_an_absent_effect_leaves_no_symbol_and_a_present_one_its_term(absent):
     present = [name for name in SYMBOLS if name not in absent]
-    found = equations.equations(model(*present))
+    found = beatup_equations.equations(model(*present))
     kept = {"beta", "r4e", "m4e"}.union(*(SYMBOLS[name] for name in present))
     forbidden = set().union(*(SYMBOLS[name] | {f"M_{name}"} for name in absent)) - kept
     assert not words(found) & forbidden
@@ -161,7 +161,7 @@ def test_an_absent_effect_leaves_no_symbol_and_a_present_one_its_term(absent):
 
 
 def test_a_scene_without_counterweight_terms_does_not_print_them():
-    assert not words(equations.equations(model("resistance"))) & {"m4e", "r4e", "omega", "J4"}
+    assert not words(beatup_equations.equations(model("resistance"))) & {"m4e", "r4e", "omega", "J4"}
 
 
 @pytest.mark.parametrize(
@@ -174,13 +174,15 @@ def test_a_scene_without_counterweight_terms_does_not_print_them():
     ],
 )
 def test_balance_and_crank_torque_list_what_is_on(names, lines):
-    found = equations.equations(model(*names))
+    found = beatup_equations.equations(model(*names))
     shown = {equation.text for equation in found if equation.name in ("balance", "crank torque")}
     assert shown == lines
 
 
 def test_a_term_with_corners_says_where_each_formula_holds():
-    shown = {equation.name: equation for equation in equations.equations(model("resistance", "bearing_friction"))}
+    shown = {
+        equation.name: equation for equation in beatup_equations.equations(model("resistance", "bearing_friction"))
+    }
     pulse = "M_resistance = M0*cos(pi*(-beta + phi)/delta) for beta - delta/2 <= phi <= beta + delta/2, else 0"
     assert shown["resistance"].text == pulse
     assert r"\begin{cases}" in shown["resistance"].latex
@@ -188,14 +190,14 @@ def test_a_term_with_corners_says_where_each_formula_holds():
 
 
 def test_all_effects_together_stay_short_and_their_symbols_apart():
-    found = equations.equations(model(*BEATUP))
+    found = beatup_equations.equations(model(*BEATUP))
     assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 4000
     keys = [key for effect in BEATUP.values() for key in effect.own.model_fields]
     assert len(keys) == len(set(keys))
 
 
 def test_latex_names_symbols_the_way_papers_do():
-    latex = " ".join(equation.latex for equation in equations.equations(model(*BEATUP)))
+    latex = " ".join(equation.latex for equation in beatup_equations.equations(model(*BEATUP)))
     for name in (
         r"M_{3} ",
         r"J_{4} ",

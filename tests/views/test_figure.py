@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from loomopt.errors import BadInput
-from loomopt.views import drawing, figure, svg
+from loomopt.views import crank_rocker_drawing, figure, svg
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 MARKS = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse begins": 0.89, "pulse ends": 1.41}
@@ -26,7 +26,7 @@ def frame():
 @pytest.mark.parametrize("ending", figure.SUFFIXES)
 def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame, ending):
     for name, write in (
-        ("d", lambda path: figure.draw(drawing.linkage(PAPER, "A $title_ <&"), path)),
+        ("d", lambda path: figure.draw(crank_rocker_drawing.linkage(PAPER, "A $title_ <&"), path)),
         ("c", lambda path: figure.curves(frame, path, "A $title_ <&", MARKS)),
     ):
         path, again = tmp_path / f"{name}{ending}", tmp_path / f"{name}2{ending}"
@@ -37,14 +37,16 @@ def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame,
 
 
 def test_a_drawing_as_svg_is_the_one_at_full_scale(tmp_path):
-    drawn = drawing.linkage(PAPER, "t")
+    drawn = crank_rocker_drawing.linkage(PAPER, "t")
     figure.draw(drawn, tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_text(encoding="utf-8") == svg.render(drawn)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
-    figure.draw(drawing.linkage({name: size * value for name, value in PAPER.items()}, "t"), tmp_path / "a.png")
+    figure.draw(
+        crank_rocker_drawing.linkage({name: size * value for name, value in PAPER.items()}, "t"), tmp_path / "a.png"
+    )
     image = matplotlib.image.imread(tmp_path / "a.png")
     assert max(image.shape[:2]) == pytest.approx(1417, abs=2)
     assert image[..., :3].min() < 0.3
@@ -54,7 +56,7 @@ def test_a_picture_has_the_same_size_for_any_machine(tmp_path, size):
 
 def test_another_ending_is_bad_input(tmp_path, frame):
     with pytest.raises(BadInput, match=r"\.png, \.pdf, \.svg"):
-        figure.draw(drawing.linkage(PAPER, "t"), tmp_path / "a.jpg")
+        figure.draw(crank_rocker_drawing.linkage(PAPER, "t"), tmp_path / "a.jpg")
     with pytest.raises(BadInput, match=r"\.png, \.pdf, \.svg"):
         figure.curves(frame, tmp_path / "a.jpg", "t")
     assert not list(tmp_path.iterdir())

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from loomopt.views import drawing, svg
+from loomopt.views import crank_rocker_drawing, svg
 from loomopt.views.shapes import LAYERS, Arc, Circle, Drawing, Line, Point, Text
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
@@ -17,7 +17,7 @@ def numbers(text):
 
 @pytest.fixture(scope="module")
 def root():
-    return ElementTree.fromstring(svg.render(drawing.linkage(PAPER, "Reed <& 'co'>")))
+    return ElementTree.fromstring(svg.render(crank_rocker_drawing.linkage(PAPER, "Reed <& 'co'>")))
 
 
 def layer(root, name):
@@ -65,7 +65,7 @@ def test_every_primitive_is_written_once_on_its_layer():
 
 def test_titles_are_escaped_and_control_characters_do_not_break_the_file(root):
     assert root.find(f"{SPACE}title").text == "Reed <& 'co'>"
-    ElementTree.fromstring(svg.render(drawing.linkage(PAPER, "a\x00\x1b]</svg>")))
+    ElementTree.fromstring(svg.render(crank_rocker_drawing.linkage(PAPER, "a\x00\x1b]</svg>")))
 
 
 def test_a_sheet_lies_under_the_drawing_and_every_colour_is_legible_on_it(root):
@@ -78,4 +78,4 @@ def test_a_sheet_lies_under_the_drawing_and_every_colour_is_legible_on_it(root):
 
 
 def test_the_same_drawing_gives_the_same_text():
-    assert svg.render(drawing.linkage(PAPER, "t")) == svg.render(drawing.linkage(PAPER, "t"))
+    assert svg.render(crank_rocker_drawing.linkage(PAPER, "t")) == svg.render(crank_rocker_drawing.linkage(PAPER, "t"))
