@@ -103,6 +103,22 @@ def test_marks_and_pulse_are_found_a_turn_later_on_an_axis_that_starts_late(monk
     assert spans == [pytest.approx((low, np.degrees(1.41))), pytest.approx((np.degrees(0.89) + 360, high))]
 
 
+def test_a_stretch_through_zero_is_shaded_on_both_sides_and_undefined_marks_are_left_out(monkeypatch, frame):
+    marks = {"front dead centre": 0.0, "hand-over": np.radians(182.5), "lost": float("nan")}
+    marks |= {"dwell begins": np.radians(323.4), "dwell ends": np.radians(35.9), "pause before begins": 5.0}
+    panel = panels(monkeypatch, frame, marks)[0]
+    spans = sorted((patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches)
+    assert spans == [pytest.approx((0, 35.9)), pytest.approx((323.4, 360))]
+    upright = sorted(line.get_xdata()[0] for line in panel.lines if np.ptp(line.get_xdata()) == 0)
+    assert upright == pytest.approx([0, 182.5, np.degrees(5.0), 360])
+    assert {text.get_text() for text in panel.texts} == {
+        "front dead centre",
+        "hand-over",
+        "dwell",
+        "pause before begins",
+    }
+
+
 def test_a_table_without_curves_is_refused(tmp_path, frame):
     for empty in (frame[["phi [rad]"]], frame[["psi [rad]"]]):
         with pytest.raises(ValueError, match="phi"):

@@ -1,0 +1,69 @@
+"""Every job's views through one record; the curves' marks in tables and figures."""
+
+import math
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+
+import loomopt as lo
+from loomopt.jobs import JOBS
+from loomopt.jobs.tasks import TASKS
+from loomopt.views import crank_rocker_drawing, job_views, scene_view
+from loomopt.views.layout import Grid
+
+
+def test_every_job_has_its_views():
+    assert set(JOBS) <= set(job_views.VIEWS)
+
+
+def test_numbers_a_design_leaves_out_are_todays():
+    scene = lo.load("beatup")
+    view = job_views.view(scene)
+    assert view.linkage(scene, {}) == crank_rocker_drawing.linkage(scene.mechanism, scene.name)
+    changed = crank_rocker_drawing.linkage({**scene.mechanism, "l2": 0.07}, scene.name)
+    assert view.linkage(scene, {"l2": 0.07}) == changed
+    assert view.joints_csv(scene, {"l2": 0.07}) != view.joints_csv(scene, {})
+
+
+def test_a_beatup_drawn_imports_neither_the_rapiers_views_nor_sympy():
+    script = (
+        "import sys, loomopt as lo; from loomopt.views import job_views; s = lo.load('beatup');"
+        "job_views.view(s).linkage(s, {});"
+        "print([m for m in sys.modules if 'sympy' in m or 'views.rapier' in m or 'matplotlib' in m])"
+    )
+    run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert run.stdout == "[]\n"
+
+
+def shown(monkeypatch, marks):
+    """Return the first line and the crank angles, deg, of a table of curves with these marks, deg."""
+    angles = np.unique(np.radians([*np.arange(0, 361, 0.5), *marks.values()]))
+    task = SimpleNamespace(
+        today=lambda scene: {},
+        curves=lambda scene, design: {"phi [rad]": angles, "S [m]": np.sin(angles)},
+        marks=lambda scene, design: {name: math.radians(value) for name, value in marks.items()},
+    )
+    monkeypatch.setitem(TASKS, "drive", task)
+    scene = SimpleNamespace(job=SimpleNamespace(name="drive"), title="Drive")
+    head, table = scene_view.curves(scene, {}, None)
+    assert isinstance(table, Grid)
+    return head, [float(line[0]) for line in table.lines]
+
+
+def test_single_marks_have_rows_and_stretches_none(monkeypatch):
+    marks = {"front dead centre": 0.0, "hand-over": 182.53, "pulse begins": 20.2, "pulse ends": 40.4}
+    head, rows = shown(monkeypatch, marks)
+    assert head == "Drive: front dead centre at 0.000 deg, hand-over at 182.530 deg"
+    assert set(rows) == {*range(0, 361, 15), 182.53}
+
+
+def test_an_end_without_its_beginning_is_a_mark_of_its_own(monkeypatch):
+    head, rows = shown(monkeypatch, {"dwell after ends": 35.87, "dwell before begins": 323.36})
+    assert head == "Drive: dwell after ends at 35.870 deg, dwell before begins at 323.360 deg"
+    assert {35.87, 323.36} <= set(rows)
+
+
+def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
+    assert set(shown(monkeypatch, {})[1]) == set(range(0, 361, 15))
