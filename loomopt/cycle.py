@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.maths import Number
-from loomopt.schema import Load
+from loomopt.schema import Switched
 
 TURN = 2 * math.pi
 SAME_ANGLE = 1e-12
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 class Cycle:
     """The pieces of one turn at one design.
 
-    starts: (pieces + 1,) crank angles, rad, the last one turn after the first; switches: (pieces, loads);
+    starts: (pieces + 1,) crank angles, rad, the last one turn after the first; switches: (pieces, switched);
     order: for each start, its corner's place in the declared list and the turns added to it (empty without corners).
     """
 
@@ -58,25 +58,25 @@ class Cycle:
         return int(np.argmin(ahead))
 
 
-def split(loads: Sequence[Load], corners: Sequence[Sequence[float]]) -> Cycle:
-    """Return the cycle's pieces from each load's corners, rad (an empty sequence for a load without corners)."""
+def split(switched: Sequence[Switched], corners: Sequence[Sequence[float]]) -> Cycle:
+    """Return the cycle's pieces from each one's corners, rad (an empty sequence for one without corners)."""
     flat = [angle for of_load in corners for angle in of_load]
     if not flat:
         starts = np.array([0.0, TURN])
-        return Cycle(starts, _switches(loads, corners, starts), ())
+        return Cycle(starts, _switches(switched, corners, starts), ())
     base = flat[0]
     turns = [-math.floor((angle - base) / TURN) for angle in flat]
     placed = sorted(
         (angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(flat, turns, strict=True))
     )
     starts = np.array([angle for angle, _, _ in placed] + [placed[0][0] + TURN])
-    return Cycle(starts, _switches(loads, corners, starts), tuple((index, turn) for _, index, turn in placed))
+    return Cycle(starts, _switches(switched, corners, starts), tuple((index, turn) for _, index, turn in placed))
 
 
-def _switches(loads: Sequence[Load], corners: Sequence[Sequence[float]], starts: Floats) -> Floats:
-    """Return each load's switch on each piece, read at the piece's middle."""
+def _switches(switched: Sequence[Switched], corners: Sequence[Sequence[float]], starts: Floats) -> Floats:
+    """Return each switch on each piece, read at the piece's middle."""
     middles = (starts[:-1] + starts[1:]) / 2
-    return np.array([[load.switch(m, tuple(c)) for load, c in zip(loads, corners, strict=True)] for m in middles])
+    return np.array([[each.switch(m, tuple(c)) for each, c in zip(switched, corners, strict=True)] for m in middles])
 
 
 def node_angle(offset: Number, coefficients: Sequence[Number], corners: Sequence[Number]) -> Number:

@@ -34,6 +34,11 @@ def problem_path(name: str) -> Path:
     )
 
 
+def problems_path() -> Path:
+    """Return the folder of the packaged scenes."""
+    return _folder("problems")
+
+
 def results_path() -> Path:
     """Return the folder of the reference results."""
     return _folder("results")

@@ -216,9 +216,11 @@ def kind_of(model: type[BaseModel], field: str) -> str:
 
 
 Length = Annotated[float, Quantity("length", least=0)]
+Coordinate = Annotated[float, Quantity("length")]
 PositiveLength = Annotated[float, Quantity("length", above=0)]
 Angle = Annotated[float, Quantity("angle")]
 PulseAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
+DwellAngle = Annotated[float, Quantity("angle", above=0, below=math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]
 PositiveMass = Annotated[float, Quantity("mass", above=0)]
 Inertia = Annotated[float, Quantity("inertia", least=0)]
@@ -228,3 +230,4 @@ Force = Annotated[float, Quantity("force", least=0)]
 Speed = Annotated[float, Quantity("angular speed", above=0)]
 RotaryDamping = Annotated[float, Quantity("rotary damping", least=0)]
 PureNumber = Annotated[float, Quantity("number", least=0)]
+PositiveNumber = Annotated[float, Quantity("number", above=0)]

@@ -108,11 +108,14 @@ class Scene:
 
     def free(self, names: Iterable[str] | str) -> "Scene":
         """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
-        asked = names.replace(",", " ").split() if isinstance(names, str) else list(names)
+        named = names.replace(",", " ").split() if isinstance(names, str) else list(names)
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
+        groups = {group: [n for n in of if n in ranges] for group, of in self.job.groups.items()}
+        asked = [each for name in named for each in groups.get(name) or [name]]
         for name in asked:
             if name not in ranges:
-                held = ", ".join(bound for bound in ranges if not self.bounds[bound].free)
+                single = [bound for bound in ranges if not self.bounds[bound].free]
+                held = ", ".join([*(group for group, of in groups.items() if of), *single])
                 allowed = held or "nothing: no bound has free = false"
                 remedy = "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
@@ -48,6 +48,22 @@ class Load:
     needs: tuple[str, ...] = ()
     corners: Callable[[Maths, Values, Values], tuple[Number, ...]] | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
+
+
+class Switched(Protocol):
+    """What has corners in the cycle: a load, or stretches of it that a limit speaks of."""
+
+    @property
+    def switch(self) -> Callable[[float, tuple[float, ...]], float]:
+        """switch(angle, corners): which formula, or stretch, holds at a crank angle inside a piece."""
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Stretches of the cycle that limits speak of; switch: as a load's."""
+
+    name: str
+    switch: Callable[[float, tuple[float, ...]], float]
 
 
 @dataclass(frozen=True)
@@ -98,6 +114,8 @@ class Job:
     check(scene): raises BadInput when today's machine is not one this job can work on.
     fault(design): why a design, SI, cannot work as this mechanism; "" when it can.
     headline(scene, target, figures): one sentence that says what an optimum of the target is worth.
+    margins: limits that every design keeps → kind of quantity; their names are whole phrases.
+    groups: name → bounds that --free frees together.
     """
 
     name: str
@@ -114,3 +132,5 @@ class Job:
     headline: Callable[[Any, str, Mapping[str, float | None]], str]
     template: str
     needs: tuple[str, ...] = field(default=())
+    margins: Mapping[str, str] = field(default_factory=dict)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

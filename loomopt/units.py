@@ -61,6 +61,8 @@ SI_UNIT: dict[str, str] = {
     "number": "1",
     "pressure": "Pa",
     "density": "kg/m^3",
+    "travel acceleration": "m/rad^2",
+    "travel jerk": "m/rad^3",
 }
 """Kind of quantity → the SI unit its numbers have inside the program."""
 

@@ -5,10 +5,12 @@ from loomopt.effects import (
     centrifugal,
     counterweight_inertia,
     gravity,
+    head_inertia,
     reed_inertia,
     resistance,
     rocker_inertia,
     rod_inertia,
+    tape_friction,
 )
 from loomopt.schema import Effect
 
@@ -26,3 +28,6 @@ BEATUP: dict[str, Effect] = {
     )
 }
 """Effects of the beat-up mechanism, in the order its balance lists them."""
+
+RAPIER: dict[str, Effect] = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
+"""Effects of the rapier drive."""

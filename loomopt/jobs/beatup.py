@@ -4,7 +4,7 @@ q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md 
 """
 
 import functools
-from collections.abc import Callable, Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,6 +47,19 @@ class Beatup:
             if "resistance" in names
             else ()
         )
+
+    @property
+    def switched(self) -> tuple[Load, ...]:
+        """What has corners: the loads."""
+        return self.loads
+
+    def hints(self, given: Given) -> dict[str, float]:
+        """Return nothing: every corner has a formula."""
+        return {}
+
+    def implied(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return nothing: no variable follows from the others."""
+        return {}
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from loomopt.jobs.beatup_program import COUNTERWEIGHT, LENGTHS, bounds, full_name, numbers, today
+from loomopt.jobs.beatup_program import COUNTERWEIGHT, LENGTHS, bounds, numbers, today
 from loomopt.jobs.beatup_program import model as model_of
 from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
+from loomopt.jobs.numbers import full_name, nearest_scale
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
 
@@ -26,16 +27,7 @@ def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
     limited = bounds(scene)
     old = today(scene)
     if move.kind == "scale":
-        widths = {name: limited[name][1] - limited[name][0] for name in move.along}
-        if min(widths.values()) <= 0.0:
-            return None
-        pull = math.fsum(x[n] * old[n] / widths[n] ** 2 for n in move.along)
-        factor = pull / math.fsum((x[n] / widths[n]) ** 2 for n in move.along)
-        low = max(limited[n][0] / x[n] for n in move.along)
-        high = min(limited[n][1] / x[n] for n in move.along)
-        factor = min(max(factor, low), high)
-        goal = {n: min(max(x[n] * factor, limited[n][0]), limited[n][1]) for n in move.along}
-        return Wish(goal, "least change from today")
+        return nearest_scale(x, old, limited, move.along)
     name = move.along[0]
     if limited[name][0] == limited[name][1]:
         return None

@@ -7,6 +7,9 @@ from typing import Any, Literal
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup import ASSEMBLY, Beatup
 from loomopt.jobs.beatup_tables import FIGURES, VARIABLES
+from loomopt.jobs.numbers import bounds as bounds_of
+from loomopt.jobs.numbers import full_name, words
+from loomopt.jobs.numbers import numbers as numbers_of
 from loomopt.jobs.program import Limit, Objective, Program, Variable
 from loomopt.jobs.sampling import Sampler
 from loomopt.schema import Check, Load
@@ -26,34 +29,17 @@ CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
 def model(scene: Any) -> Beatup:
     """Return the mechanism with the effects the scene calls for."""
     effects = [scene.job.effects[name] for name in scene.effects]
-    options = tuple(
-        (name, key, value)
-        for name, own in scene.effects.items()
-        for key, value in own.model_dump().items()
-        if isinstance(value, str)
-    )
     return Beatup(
         tuple(effect for effect in effects if isinstance(effect, Load)),
         tuple(effect for effect in effects if isinstance(effect, Check)),
-        options,
+        words(scene),
         frozenset(numbers(scene)),
     )
 
 
 def numbers(scene: Any) -> dict[str, float]:
-    """Return every number of the scene by name, SI; an effect's as `effect.key`, today's lengths also as today.*."""
-    found: dict[str, float] = {**scene.mechanism, **scene.operation}
-    found |= {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
-    for effect, own in scene.effects.items():
-        for key, value in own.model_dump().items():
-            if isinstance(value, float | int):
-                found[f"{effect}.{key}"] = float(value)
-    return found
-
-
-def full_name(known: Mapping[str, float], name: str) -> str:
-    """Return a number's name among all numbers: an effect's own is `effect.key`."""
-    return name if name in known else next(key for key in known if key.endswith(f".{name}") and key[:6] != "today.")
+    """Return every number of the scene by name, SI, today's lengths also as today.*."""
+    return numbers_of(scene) | {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
 
 
 def today(scene: Any) -> dict[str, float]:
@@ -65,12 +51,7 @@ def today(scene: Any) -> dict[str, float]:
 
 def bounds(scene: Any) -> dict[str, tuple[float, float]]:
     """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
-    known = numbers(scene)
-    found = {name: (known[name], known[name]) for name in VARIABLES}
-    for name, bound in scene.bounds.items():
-        full = full_name(known, name)
-        found[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
-    return found
+    return bounds_of(scene, numbers(scene), VARIABLES)
 
 
 def program(scene: Any, target: str) -> Program:

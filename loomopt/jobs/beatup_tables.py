@@ -5,6 +5,7 @@ from typing import Any
 
 from loomopt.effects import BEATUP
 from loomopt.errors import BadInput
+from loomopt.jobs.beatup import ASSEMBLY
 from loomopt.jobs.template import BEATUP_TEMPLATE
 from loomopt.mechanisms import crank_rocker
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
@@ -138,4 +139,5 @@ SCHEMA = Job(
     fault=fault,
     headline=headline,
     template=BEATUP_TEMPLATE,
+    margins=dict.fromkeys(ASSEMBLY, "length"),
 )

@@ -10,17 +10,23 @@ from typing import Literal, Protocol
 
 from loomopt.balance import Given
 from loomopt.maths import Maths, Number
-from loomopt.schema import Load, Values
+from loomopt.schema import Load, Switched, Values
 
 
 @dataclass(frozen=True)
 class Integral:
-    """A mean over the pieces where a load's switch is 1: of `quantity`, over the crank angle; root: its square root."""
+    """A mean of `quantity` over the crank angle; root: its square root.
+
+    Over the pieces where switch number `load` is 1; or, with `angles` (rad), over these alone, each with one number
+    of `data` in place of the last switch.
+    """
 
     name: str
     root: str
     quantity: str
-    load: int
+    load: int = -1
+    angles: tuple[float, ...] = ()
+    data: tuple[float, ...] = ()
 
 
 class Model(Protocol):
@@ -35,6 +41,10 @@ class Model(Protocol):
         """The loads of the balance, in order."""
 
     @property
+    def switched(self) -> tuple[Switched, ...]:
+        """What has corners in the cycle: the loads first."""
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         """Whole-cycle quantities whose largest |value| is a figure."""
 
@@ -46,7 +56,13 @@ class Model(Protocol):
         """Return the scene's numbers and what follows from them at once, SI."""
 
     def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
-        """Return each load's corner angles, rad."""
+        """Return the corner angles, rad, of each thing that has any."""
+
+    def hints(self, given: Given) -> Mapping[str, float]:
+        """Return where corners that no formula gives lie, by name of value: what `corners` starts from."""
+
+    def implied(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Return the variables that follow from the others at a start; raises ValueError where it cannot move."""
 
     def static(
         self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
@@ -77,6 +93,8 @@ class Limit:
 
     name: as the scene calls it; row, weight: names of values, static figures or whole-cycle quantities (weight "" = 1);
     family: where the row lives; scale: natural size of the row; relaxable: whether a designer could give way.
+    A whole-cycle row is |quantity| ≤ bound: the value itself or, for a minimum, what it leaves of the complement.
+    where: (switch, its value) on the pieces it holds for; hidden: it states what a named one means.
     """
 
     name: str
@@ -87,11 +105,19 @@ class Limit:
     family: Literal["variable", "static", "cycle"]
     weight: str = ""
     relaxable: bool = True
+    complement: float = 0.0
+    where: tuple[int, float] | None = None
+    hidden: bool = False
+
+    @property
+    def bound(self) -> float:
+        """The largest |quantity| that a whole-cycle row allows, SI."""
+        return self.complement + self.sign * self.value
 
     @property
     def structure(self) -> Hashable:
         """What the built NLP depends on: everything but the numbers."""
-        return self.name, self.sign, self.row, self.family, self.weight, self.relaxable
+        return self.name, self.sign, self.row, self.family, self.weight, self.relaxable, self.where
 
     def residual(self, values: Values, limit: Number) -> Number:
         """Return how far the limit is exceeded, SI; for an equality the signed difference."""
@@ -168,6 +194,17 @@ class Program:
         """Variables that are held without being limited: their value is today's, not a choice."""
         limited = {limit.row for limit in self.limits if limit.family == "variable"}
         return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Variables without room."""
+        return frozenset(v.name for v in self.variables if v.lower == v.upper)
+
+    def completed(self, x: Mapping[str, float]) -> dict[str, float]:
+        """Return x (SI) with the variables that follow from the others; raises ValueError where it cannot move."""
+        given = {v.name: x.get(v.name, v.lower) for v in self.variables}
+        implied = self.model.implied({**self.parameters, **given})
+        return {name: implied.get(name, value) for name, value in given.items()}
 
     def values(self, design: Mapping[str, Number], maths: Maths) -> dict[str, Number]:
         """Return all values of one number system, with `design` for the variables."""

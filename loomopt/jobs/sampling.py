@@ -70,9 +70,12 @@ class Sampler:
     def __init__(self, model: Model, values: Mapping[str, float]) -> None:
         self.model = model
         self.given: Given = model.given(maths.FLOAT, values)
+        self.hints = dict(model.hints(self.given))
+        if self.hints:
+            self.given = model.given(maths.FLOAT, {**values, **self.hints})
         self.corners = model.corners(maths.FLOAT, self.given)
         self._extremes: dict[str, list[Extreme]] = {}
-        self.cycle: Cycle = cycle.split(model.loads, self.corners)
+        self.cycle: Cycle = cycle.split(model.switched, self.corners)
 
     @property
     def corner_count(self) -> int:
@@ -115,11 +118,15 @@ class Sampler:
         counts = [max(samples // 8, int(np.ceil(samples * width / TURN))) + 1 for width in widths]
         return _grid(tuple(counts))
 
-    def extremes(self, name: str) -> list[Extreme]:
-        """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding."""
+    def extremes(self, name: str, where: tuple[int, float] | None = None) -> list[Extreme]:
+        """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding.
+
+        where: (switch, its value) on the pieces they are asked for; every piece without it.
+        """
         if name not in self._extremes:
             self._extremes[name] = self._find_extremes(name)
-        return self._extremes[name]
+        found = self._extremes[name]
+        return found if where is None else [e for e in found if self.cycle.switches[e.piece, where[0]] == where[1]]
 
     def _find_extremes(self, name: str) -> list[Extreme]:
         pieces, u = self.grid()
@@ -154,9 +161,9 @@ class Sampler:
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme) for extreme in found]
 
-    def peak(self, name: str) -> float:
-        """Return the largest |quantity| over the cycle, SI."""
-        return abs(self.extremes(name)[0].value)
+    def peak(self, name: str, where: tuple[int, float] | None = None) -> float:
+        """Return the largest |quantity| over the cycle, or over the pieces `where` (0 without any), SI."""
+        return max((abs(extreme.value) for extreme in self.extremes(name, where)), default=0.0)
 
     def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
         """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""
@@ -165,7 +172,12 @@ class Sampler:
         return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
 
     def mean(self, integral: Integral) -> float:
-        """Return the mean of an integral's quantity over its pieces, SI."""
+        """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
+        if integral.angles:
+            data = [np.asarray(integral.data)]
+            angles = np.asarray(integral.angles)
+            values = self.model.quantity(maths.numpy(), self.given, integral.quantity, angles, data)
+            return float(np.mean(values))
         pieces, u, weights = self.quadrature(integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
         return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))

@@ -5,7 +5,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from loomopt.cycle import Floats
-from loomopt.jobs import beatup_curves, beatup_design, beatup_program
+from loomopt.jobs import (
+    beatup_curves,
+    beatup_design,
+    beatup_program,
+    rapier_curves,
+    rapier_design,
+    rapier_program,
+)
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
 
@@ -52,6 +59,20 @@ TASKS = {
         sampler=beatup_design.sampler,
         curves=beatup_curves.curves,
         marks=beatup_curves.marks,
+    ),
+    "rapier": Task(
+        demand=rapier_program.demand,
+        program=rapier_program.program,
+        today=rapier_program.today,
+        design=rapier_design.design,
+        values=rapier_design.values,
+        tidy=rapier_design.tidy,
+        moves=rapier_design.moves,
+        wish=rapier_design.wish,
+        figures=rapier_design.figures,
+        sampler=rapier_design.sampler,
+        curves=rapier_curves.curves,
+        marks=rapier_curves.marks,
     ),
 }
 """Job name → its functions."""

@@ -93,3 +93,84 @@ mu_min = { min = "56.5 deg" }
 # [targets.retrofit]
 # weights = { l1 = 1, l3 = 5 }  # a larger weight: that dimension changes less
 """
+
+RAPIER_TEMPLATE = """\
+# A rapier scene: sley four-bar l1 l2 l3 l71, five-bar on the sley l3p l4 l5 l6, second shaft C0, one 2:1 gear.
+# Origin is the rocking shaft B0; y points from the second shaft to the main shaft; angles counter-clockwise from x.
+# Crank angles count from front dead centre. Change the numbers to those of your loom, then:
+#     loomopt show FILE            the scene as it was read
+#     loomopt solve FILE           the best dimensions within the limits below
+#
+# Every number is text with its unit: "31 mm", "1.22 in", "23 deg", "600 rpm", "0.35 kg".
+# Decimal point, no comma; units are joined by * and /, powers are written ^2; a pure number may be a ratio "300/18".
+
+[problem]
+name = "my-rapier"
+job = "rapier"
+title = "My rapier drive"
+source = ""
+
+[operation]
+speed = "60 rpm"  # main shaft
+stroke = "850 mm"  # largest travel of the head from front dead centre
+s_dwell = "6 mm"  # travel up to which the head counts as out of the shed
+dwell_after = "30 deg"  # crank angle after front dead centre that it must stay out
+dwell_before = "30 deg"  # and before it
+
+[mechanism]
+l1 = "76.385 mm"  # main crank
+l2 = "275.705 mm"  # connecting rod
+l3 = "684 mm"  # sley
+l71 = "773 mm"  # main shaft A0 to rocking shaft B0
+phi30 = "80.48 deg"  # sley at front dead centre
+l3p = "180 mm"  # B0 to the pivot B2 on the sley
+alpha = "30 deg"  # angle from the sley to B0 B2
+l4 = "12 mm"  # second crank C0 C
+l5 = "495.0647 mm"  # link C D
+l6 = "185 mm"  # driving link B2 D, carries the gear sector
+C0x = "461.0345 mm"  # second shaft
+C0y = "234.2173 mm"
+phi40 = "166.67588 deg"  # second crank at front dead centre
+i1 = "300/18"  # gear sector to pinion
+i2 = "1"  # pinion to tape wheel
+wheel = "240 mm"  # tape wheel diameter
+
+# Effects: none is on. --with NAME puts one on; to keep it on, write effects instead of available.
+
+[available.head_inertia]
+mass = "0.35 kg"  # head and moving tape; assumed
+
+[available.tape_friction]
+force = "15 N"  # tape in its guides; assumed
+
+# Bounds: what may change, and how far. With `free = false` it stays until --free NAME; --free sley frees l1 l2 l3 l71.
+
+[bounds]
+l4 = { min = "5 mm", max = "40 mm" }
+l5 = { min = "300 mm", max = "700 mm" }
+l6 = { min = "120 mm", max = "260 mm" }
+l3p = { min = "120 mm", max = "260 mm" }
+alpha = { min = "0 deg", max = "60 deg" }
+C0x = { min = "401.0345 mm", max = "521.0345 mm" }
+C0y = { min = "174.2173 mm", max = "294.2173 mm" }
+phi40 = { min = "146.67588 deg", max = "186.67588 deg" }
+l1 = { min = "70 mm", max = "85 mm", free = false }
+l2 = { min = "250 mm", max = "300 mm", free = false }
+l3 = { min = "650 mm", max = "720 mm", free = false }
+l71 = { min = "740 mm", max = "800 mm", free = false }
+
+# Limits: figures to keep, at least (min), at most (max) or both:
+#     mu_min, phi_stroke, peak_acceleration, peak_jerk; of the sley: swing, theta, sley_mu_min;
+#     and with an effect: tape_force, peak_torque.
+
+[limits]
+mu_min = { min = "30 deg" }  # least transmission angle at D
+swing = { min = "12.9 deg", max = "13.1 deg" }
+theta = { min = "-6 deg", max = "-5 deg" }
+sley_mu_min = { min = "60 deg" }
+
+# Targets: stroke-dwell (the default), dwell, smooth, match. Only match has a value of its own.
+#
+# [targets.match]
+# table = "travel.csv"          # beside this file; columns: phi1 [deg],S [mm]
+"""

@@ -27,7 +27,7 @@ class Calls:
 
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
         """Return the local extremes of each family's quantity."""
-        return [sampler.extremes(family.row) for family in self.families]
+        return [sampler.extremes(family.row, family.where) for family in self.families]
 
     def transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
         """Return the NLP with room for that many nodes a family, its solver made; charges what had to be built."""
@@ -108,6 +108,6 @@ class Calls:
         else:
             limit = self.program.limits[family.limit]
             soft = self.program.soft
-            scale, bound = limit.scale, limit.value / limit.scale
+            scale, bound = limit.scale, limit.bound / limit.scale
             bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
         return float(abs(extreme.value) / scale - bound)

@@ -32,6 +32,9 @@ def solve(
     elastic: bool = False,
 ) -> Point:
     """Solve a program from a start (SI) or warm from a solved neighbour of the same structure."""
+    if warm:
+        within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
+        warm = replace(warm, x=within)
     return _Run(program, settings, elastic).go(dict(warm.x if warm else start), warm)
 
 
@@ -173,13 +176,22 @@ def _padded(multipliers: Floats, size: int) -> Floats:
 
 def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
     """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
-    own = [dict(start) for start in program.starts if sampler_at(program, start)]
+    own = [start for start in (_started(program, x) for x in program.starts) if start]
     generator = np.random.default_rng(seed)
     drawn: list[dict[str, float]] = []
     for _ in range(200 * count):
         if len(own) + len(drawn) >= count:
             break
-        trial = {v.name: float(generator.uniform(*v.range)) for v in program.variables}
-        if sampler_at(program, trial):
+        trial = _started(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
+        if trial:
             drawn.append(trial)
     return own + drawn
+
+
+def _started(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
+    """Return a start with the variables that follow from the others; None where the linkage has no real cycle."""
+    try:
+        full = program.completed(x)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return full if sampler_at(program, full) else None

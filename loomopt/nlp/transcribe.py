@@ -4,7 +4,6 @@ Variables are scaled; every scene number, limit, natural size, weight and cycle 
 through a few slots, each a node that the exchange fills; an unused slot weighs nothing.
 """
 
-import math
 from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -15,8 +14,9 @@ import numpy as np
 from loomopt import maths
 from loomopt.balance import Given, total
 from loomopt.cycle import Floats, node_angle
-from loomopt.jobs.program import Program
+from loomopt.jobs.program import Integral, Program
 from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.nlp.layout import Layout
 
 CACHE_SIZE = 32
 IPOPT = {
@@ -52,34 +52,7 @@ class Family:
     row: str
     objective: int = -1
     limit: int = -1
-
-
-class Layout:
-    """Where each parameter stands in the NLP's parameter vector."""
-
-    def __init__(self) -> None:
-        self.places: dict[str, tuple[int, tuple[int, ...]]] = {}
-        self.size = 0
-
-    def add(self, name: str, *shape: int) -> None:
-        """Reserve room for an array."""
-        self.places[name] = (self.size, shape)
-        self.size += math.prod(shape)
-
-    def write(self, vector: Floats, name: str, values: Any) -> None:
-        """Put an array in its place."""
-        begin, shape = self.places[name]
-        vector[begin : begin + math.prod(shape)] = np.asarray(values, dtype=float).ravel()
-
-    def read(self, vector: Any, name: str) -> list[Any]:
-        """Return the entries of an array as a flat list."""
-        begin, shape = self.places[name]
-        return [vector[begin + k] for k in range(math.prod(shape))]
-
-    def rows(self, vector: Any, name: str) -> list[list[Any]]:
-        """Return the entries of a two-dimensional array, row by row."""
-        flat, width = self.read(vector, name), self.places[name][1][1]
-        return [flat[k : k + width] for k in range(0, len(flat), width)]
+    where: tuple[int, float] | None = None
 
 
 class Transcription:
@@ -93,14 +66,15 @@ class Transcription:
 
         self.program, self.slots, self.elastic = program, slots, elastic
         self.corners = sampler.corner_count
-        self.loads = len(program.model.loads)
+        self.loads = len(program.model.switched)
+        self.hints = tuple(sampler.hints)
         self.families = families(program, elastic)
         self.static = [limit for limit in program.limits if self._is_row(limit)]
         self.soft = program.soft if elastic else {}
         self.groups = len(set(self.soft.values()))
         self.epigraphs = [] if elastic else [k for k, o in enumerate(program.objectives) if o.form != "value"]
         self.integrals = _wanted_integrals(program)
-        self.quadrature = {i.name: len(sampler.quadrature(i)[0]) for i in self.integrals}
+        self.quadrature = {i.name: _nodes(sampler, i) for i in self.integrals}
         self.layout = self._layout()
         self._quantities: dict[str, tuple[Any, list[str]]] = {}
         scaled = ca.SX.sym("x", len(program.variables))
@@ -163,6 +137,7 @@ class Transcription:
     def _layout(self) -> Layout:
         program, layout = self.program, Layout()
         layout.add("values", len(program.parameters))
+        layout.add("hints", len(self.hints))
         layout.add("variable scale", len(program.variables))
         layout.add("limit", len(program.limits))
         layout.add("limit scale", len(program.limits))
@@ -186,6 +161,7 @@ class Transcription:
         m, model = maths.casadi(), program.model
         sizes = read(vector, "variable scale")
         values = dict(zip(program.parameters, read(vector, "values"), strict=True))
+        values |= dict(zip(self.hints, read(vector, "hints"), strict=True))
         values |= {v.name: x * size for v, x, size in zip(program.variables, scaled, sizes, strict=True)}
         given = model.given(m, values)
         corners = [angle for of_load in model.corners(m, given) for angle in of_load]
@@ -240,7 +216,7 @@ class Transcription:
         """
         import casadi as ca
 
-        names = [*self.program.parameters, *(v.name for v in self.program.variables)]
+        names = [*self.program.parameters, *self.hints, *(v.name for v in self.program.variables)]
         symbols = {key: ca.SX.sym(key) for key in names}
         given = self.program.model.given(maths.casadi(), symbols)
         derived = {key: ca.SX.sym(key) for key, value in given.values.items() if isinstance(value, ca.SX)}
@@ -269,21 +245,29 @@ class Transcription:
             width = [weight * (end - start), *(weight * (at_end - at_start))]
         return [width[0], offset, *coefficients, *width[1:], *sampler.cycle.switches[piece]]
 
+    def _rule(self, sampler: Sampler, integral: Integral) -> list[list[float]]:
+        """Return the parameters of a mean's nodes."""
+        if not integral.angles:
+            return [self.node(sampler, int(i), u, w) for i, u, w in zip(*sampler.quadrature(integral), strict=True)]
+        idle = [0.0] * self.corners
+        fixed = zip(integral.angles, integral.data, strict=True)
+        return [[1.0, angle, *idle, *idle, *[0.0] * (self.loads - 1), datum] for angle, datum in fixed]
+
     def vector(
         self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[Sequence[Extreme]]
     ) -> Floats:
         """Return the parameter vector for a program's numbers and the nodes of each family."""
         p, write = np.zeros(self.layout.size), self.layout.write
         write(p, "values", list(program.parameters.values()))
+        write(p, "hints", list(sampler.hints.values()))
         write(p, "variable scale", [variable.scale for variable in program.variables])
-        write(p, "limit", [limit.value for limit in program.limits])
+        write(p, "limit", [x.bound if x.family == "cycle" else x.value for x in program.limits])
         write(p, "limit scale", [limit.scale for limit in program.limits])
         write(p, "objective weight", weights)
         write(p, "objective scale", [objective.scale for objective in program.objectives])
         write(p, "front", sampler.front)
         for integral in self.integrals:
-            rule = zip(*sampler.quadrature(integral), strict=True)
-            write(p, f"{integral.name} nodes", [self.node(sampler, int(i), u, w) for i, u, w in rule])
+            write(p, f"{integral.name} nodes", self._rule(sampler, integral))
         for k, chosen in enumerate(nodes):
             used = [[1.0, np.sign(e.value) or 1.0, *self.node(sampler, e.piece, e.u)] for e in chosen]
             idle = [[0.0, 1.0, *self.node(sampler, 0, 0.5)]] * (self.slots - len(used))
@@ -294,8 +278,17 @@ class Transcription:
 def families(program: Program, elastic: bool = False) -> list[Family]:
     """Return the whole-cycle rows a program needs; an elastic one has no objectives."""
     peaks = [Family(o.row, objective=k) for k, o in enumerate(program.objectives) if o.form == "peak"]
-    limits = [Family(limit.row, limit=k) for k, limit in enumerate(program.limits) if limit.family == "cycle"]
+    limits = [
+        Family(limit.row, limit=k, where=limit.where)
+        for k, limit in enumerate(program.limits)
+        if limit.family == "cycle"
+    ]
     return limits if elastic else peaks + limits
+
+
+def _nodes(sampler: Sampler, integral: Integral) -> int:
+    """Return how many nodes a mean has."""
+    return len(integral.angles) or len(sampler.quadrature(integral)[0])
 
 
 def _wanted_integrals(program: Program) -> list[Any]:
@@ -309,8 +302,8 @@ _cache: OrderedDict[Hashable, Transcription] = OrderedDict()
 
 def transcribe(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> tuple[Transcription, bool]:
     """Return the NLP of a program's structure, and whether it had to be built."""
-    nodes = tuple(len(sampler.quadrature(integral)[0]) for integral in _wanted_integrals(program))
-    key = (program.structure, slots, elastic, nodes)
+    nodes = tuple(_nodes(sampler, integral) for integral in _wanted_integrals(program))
+    key = (program.structure, slots, elastic, nodes, sampler.corner_count)
     if key in _cache:
         _cache.move_to_end(key)
         return _cache[key], False

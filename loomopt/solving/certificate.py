@@ -75,7 +75,7 @@ def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
     found = {}
     for k, limit in enumerate(program.limits):
         if limit.family == "cycle":
-            found[k] = (sampler.peak(limit.row) - limit.value) / limit.scale
+            found[k] = (sampler.peak(limit.row, limit.where) - limit.bound) / limit.scale
         else:
             values = sampler.given.values if limit.family == "variable" else static
             residual = limit.residual(values, limit.value) / limit.scale
@@ -116,7 +116,8 @@ class _Trial:
             return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)] if self.program.limits[k].sign <= 0 else []
         if limit.family != "cycle":
             return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)]
-        touching = [e for e in self.sampler.extremes(limit.row) if abs(e.value) >= limit.value - ACTIVE * limit.scale]
+        found = self.sampler.extremes(limit.row, limit.where)
+        touching = [e for e in found if abs(e.value) >= limit.bound - ACTIVE * limit.scale]
         return [Row(limit.name, limit.scale, float(np.sign(e.value)), limit=limit, node=e) for e in touching]
 
     def _pieces(self, objective: Objective) -> list[Row]:
@@ -173,13 +174,17 @@ class _Trial:
 
     def _between_points(self) -> float:
         """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
-        rows = [(o.row, o.scale) for o in self.program.objectives if o.form == "peak"]
-        rows += [(limit.row, limit.scale) for limit in self.program.limits if limit.family == "cycle"]
+        rows: list[tuple[str, float, tuple[int, float] | None]]
+        rows = [(o.row, o.scale, None) for o in self.program.objectives if o.form == "peak"]
+        rows += [(limit.row, limit.scale, limit.where) for limit in self.program.limits if limit.family == "cycle"]
         pieces, u = self.sampler.grid(DENSE)
         worst = 0.0
-        for name, scale in dict.fromkeys(rows):
-            highest = float(np.abs(self.sampler.at(name, pieces, u)).max())
-            worst = max(worst, (highest - self.sampler.peak(name)) / scale)
+        for name, scale, where in dict.fromkeys(rows):
+            on = np.ones(len(u), dtype=bool)
+            if where:
+                on = self.sampler.cycle.switches[pieces, where[0]] == where[1]
+            highest = float(np.abs(self.sampler.at(name, pieces[on], u[on])).max(initial=0.0))
+            worst = max(worst, (highest - self.sampler.peak(name, where)) / scale)
         return worst
 
     def _columns(self, place: int) -> tuple[list[int], list[int], list[int]]:
@@ -219,7 +224,7 @@ class _Trial:
         row = self.rows[k]
         assert row.limit is not None
         if row.node:
-            return (abs(row.node.value) - row.limit.value) / row.limit.scale
+            return (abs(row.node.value) - row.limit.bound) / row.limit.scale
         return self.excess[row.place]
 
     def _curve(self, pieces: list[int], equal: list[int], multipliers: Floats) -> None:
@@ -229,7 +234,8 @@ class _Trial:
         """
         self.unique = True
         bound = np.abs(multipliers) > POSITIVE
-        rows = sorted({*equal, *(k for k in range(len(self.limits)) if bound[k])})
+        fixed = {k for k, row in enumerate(self.limits) if row.limit and row.limit.row in self.program.fixed}
+        rows = sorted({*equal, *fixed, *(k for k in range(len(self.limits)) if bound[k])})
         shared = [k for k in pieces if bound[k]]
         jacobian = np.vstack([self.gradients[rows], self.gradients[shared[1:]] - self.gradients[shared[:1]]])
         _, sizes, basis = np.linalg.svd(jacobian)
@@ -259,7 +265,7 @@ class _Trial:
         """Return by how much a binding row is missed, with its sign; 0 for an objective held where it stands."""
         row = self.rows[k]
         if row.node:
-            return (abs(row.node.value) - (row.limit.value if row.limit else 0.0)) / row.scale
+            return (abs(row.node.value) - (row.limit.bound if row.limit else 0.0)) / row.scale
         if row.limit is None:
             return 0.0
         values = self.sampler.given.values
@@ -283,7 +289,7 @@ class _Trial:
         found = []
         for k, row in enumerate(self.limits):
             for objective, multipliers in zip(self.program.objectives, self.multipliers, strict=True):
-                if abs(multipliers[k]) > POSITIVE and row.limit:
+                if abs(multipliers[k]) > POSITIVE and row.limit and not row.limit.hidden:
                     found.append(self._priced(row.limit, objective, float(multipliers[k])))
                     break
         return tuple(found)

@@ -61,6 +61,7 @@ class Exact:
         self.parameters = {name: self.number(value) for name, value in program.parameters.items()}
         self.names = [v.name for v in program.variables if v.name not in program.held]
         self.parameters |= {name: self.number(x[name]) for name in program.held}
+        self.parameters |= {name: self.number(value) for name, value in sampler.hints.items()}
         sizes = {v.name: v.scale for v in program.variables}
         self.scales = [self.number(sizes[name]) for name in self.names]
         self.base = [self.number(x[name]) / scale for name, scale in zip(self.names, self.scales, strict=True)]
@@ -120,7 +121,7 @@ class Exact:
     def _row(self, k: int, row: Row, given: Given, static: dict[str, Any]) -> Any:
         if row.node:
             value = self._at(given, row.quantity, row.node.piece, self.u[k])
-            bound = self.number(row.limit.value) if row.limit else 0
+            bound = self.number(row.limit.bound) if row.limit else 0
             return (self.number(row.sign) * value - bound) / self.number(row.scale)
         if row.limit:
             values = given.values if row.limit.family == "variable" else static
@@ -144,6 +145,11 @@ class Exact:
 
     def _mean(self, given: Given, integral: Any) -> Any:
         """Return an integral's mean by the sampler's own rule, node by node."""
+        if integral.angles:
+            fixed = zip(integral.angles, integral.data, strict=True)
+            model = self.program.model
+            values = [model.quantity(self.maths, given, integral.quantity, self.number(a), [d]) for a, d in fixed]
+            return total(values) / len(values)
         weighted, widths = [], []
         for piece, u, weight in zip(*self.sampler.quadrature(integral), strict=True):
             width = self._angle(given, int(piece), 1) - self._angle(given, int(piece), 0)

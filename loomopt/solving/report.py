@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt.jobs.program import Program
+from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import Task
 from loomopt.solving.certificate import FEASIBILITY, Certificate
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
@@ -23,16 +24,24 @@ def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, fl
         design=named,
         figures=figures,
         units=units,
-        limits=_findings(program, {**named, **figures, **task.sampler(scene, design).static}, named),
+        limits=_findings(program, figures, named, task.sampler(scene, design)),
     )
 
 
-def _findings(program: Program, values: Mapping[str, float | None], design: Mapping[str, float]) -> tuple[Finding, ...]:
+def _findings(
+    program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
+) -> tuple[Finding, ...]:
     """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
     sides: dict[tuple[str, bool], dict[int, float]] = {}
     sizes: dict[tuple[str, bool], float] = {}
+    values: dict[str, float | None] = {**design, **figures, **sampler.static}
     for limit in program.limits:
-        chosen = limit.family == "variable" or bool(limit.weight)
+        if limit.hidden or (limit.family == "variable" and limit.name not in values):
+            continue
+        if limit.family == "cycle":
+            peak = sampler.peak(limit.row, limit.where)
+            values[limit.name] = limit.sign * (peak - limit.complement)
+        chosen = limit.name in design and (limit.family == "variable" or bool(limit.weight))
         key = limit.name, chosen
         for sign in (limit.sign,) if limit.sign else (-1, 1):
             other = sides.setdefault(key, {}).setdefault(sign, limit.value)

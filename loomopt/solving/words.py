@@ -33,8 +33,8 @@ class Words:
             return str(job.variables[name])
         if name in job.figures:
             return str(job.figures[name].kind)
-        if name.startswith("assembly"):
-            return "length"
+        if name in job.margins:
+            return str(job.margins[name])
         models = [job.operation, job.mechanism, *(type(own) for own in self.scene.effects.values())]
         return next(kind_of(model, name) for model in models if name in model.model_fields)
 
@@ -52,7 +52,7 @@ class Words:
 
     def limit(self, limit: Limit) -> str:
         """Return a limit as a phrase: "l1 >= 30 mm"."""
-        if limit.name.startswith("assembly"):
+        if limit.name in self.scene.job.margins:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
 

@@ -20,7 +20,7 @@ from loomopt.solving.certificate import certify
 class Wave:
     """A model of two numbers whose whole-cycle quantity has peaks that are known in closed form."""
 
-    loads = integrals = ()
+    loads = integrals = switched = ()
     quantities = ("wave", "circle", "sharp")
     key = "wave"
 
@@ -29,6 +29,12 @@ class Wave:
 
     def corners(self, maths, given):
         return ()
+
+    def hints(self, given):
+        return {}
+
+    def implied(self, values):
+        return {}
 
     def static(self, maths, given, front, names=None):
         x, y = given.values["x"], given.values["y"]

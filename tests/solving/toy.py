@@ -17,6 +17,7 @@ class Toy:
     rows: tuple[tuple[str, object], ...] = ()
     waves: tuple[tuple[str, object], ...] = ()
     loads = ()
+    switched = ()
     integrals = ()
 
     @property
@@ -32,6 +33,12 @@ class Toy:
 
     def corners(self, maths, given):
         return ()
+
+    def hints(self, given):
+        return {}
+
+    def implied(self, values):
+        return {}
 
     def static(self, maths, given, front, names=None):
         return {name: row(given.values) for name, row in self.rows if names is None or name in names}

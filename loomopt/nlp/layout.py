@@ -1,0 +1,36 @@
+"""Where each parameter of an NLP stands in its parameter vector."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from loomopt.cycle import Floats
+
+
+class Layout:
+    """Where each parameter stands in the NLP's parameter vector."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, tuple[int, tuple[int, ...]]] = {}
+        self.size = 0
+
+    def add(self, name: str, *shape: int) -> None:
+        """Reserve room for an array."""
+        self.places[name] = (self.size, shape)
+        self.size += math.prod(shape)
+
+    def write(self, vector: Floats, name: str, values: Any) -> None:
+        """Put an array in its place."""
+        begin, shape = self.places[name]
+        vector[begin : begin + math.prod(shape)] = np.asarray(values, dtype=float).ravel()
+
+    def read(self, vector: Any, name: str) -> list[Any]:
+        """Return the entries of an array as a flat list."""
+        begin, shape = self.places[name]
+        return [vector[begin + k] for k in range(math.prod(shape))]
+
+    def rows(self, vector: Any, name: str) -> list[list[Any]]:
+        """Return the entries of a two-dimensional array, row by row."""
+        flat, width = self.read(vector, name), self.places[name][1][1]
+        return [flat[k : k + width] for k in range(0, len(flat), width)]
