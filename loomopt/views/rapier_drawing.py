@@ -9,7 +9,7 @@ import numpy as np
 from loomopt import maths
 from loomopt.errors import BadInput
 from loomopt.maths import FLOAT
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import rapier_faults
 from loomopt.mechanisms.dyad import Vector
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.views.drawing import Label, arrow, captioned, fixed_pivot, place
@@ -69,17 +69,11 @@ def _turn(dimensions: Dimensions) -> Pose:
     return Pose(maths.numpy(), dimensions, stand, 2 * math.pi / SAMPLES * np.arange(SAMPLES))
 
 
-def _check(d: Dimensions) -> None:
-    """Raise BadInput where the sley four-bar is no crank-rocker, or links l5 and l6 do not meet all round."""
-    fault, key = crank_rocker.fault(d.l1, d.l2, d.l3, d.l71).replace("l4", "l71"), "l1, l2, l3, l71"
-    if not fault:
-        base, key = _turn(d).base, "l4, l5, l6, l3p, alpha, C0x, C0y, phi40"
-        distance = np.hypot(base.x, base.y)
-        apart = (distance >= d.l5 + d.l6) | (distance <= abs(d.l5 - d.l6))
-        if apart.any():
-            first = 360 / SAMPLES * int(np.argmax(apart))
-            fault = f"links l5 and l6 do not meet at crank angle {first:.4g} deg"
+def _check(dimensions: Dimensions) -> None:
+    """Raise BadInput where the drive does not turn all round."""
+    fault = rapier_faults.fault(dimensions)
     if fault:
+        key = "l1, l2, l3, l71, l3p, alpha, l4, l5, l6, C0x, C0y, phi40"
         raise BadInput(f"the drive cannot be drawn: {fault}", key=key, remedy="Correct them")
 
 

@@ -6,12 +6,15 @@ import sys
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 import loomopt as lo
+from loomopt import packaged
 from loomopt.jobs import JOBS
 from loomopt.jobs.tasks import TASKS
 from loomopt.views import crank_rocker_drawing, job_views, scene_view
 from loomopt.views.layout import Grid
+from loomopt.views.shapes import LAYERS
 
 
 def test_every_job_has_its_views():
@@ -67,3 +70,17 @@ def test_an_end_without_its_beginning_is_a_mark_of_its_own(monkeypatch):
 
 def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
     assert set(shown(monkeypatch, {})[1]) == set(range(0, 361, 15))
+
+
+@pytest.mark.parametrize("name", packaged.problem_names())
+def test_every_packaged_scene_is_drawn_and_its_equations_printed(name):
+    scene = lo.load(name)
+    view = job_views.view(scene)
+    drawn = view.linkage(scene, {})
+    marks = {mark for mark in TASKS[scene.job.name].marks(scene, scene.mechanism) if mark in LAYERS}
+    assert marks >= {"front dead centre", "rear dead centre"}
+    assert marks <= {primitive.layer for primitive in drawn.primitives}
+    assert len(view.joints_csv(scene, {}).splitlines()) > 6
+    printed = {equation.name for equation in view.equations(scene)}
+    assert set(scene.effects) <= printed
+    assert {"front dead centre", "rear dead centre"} <= printed

@@ -131,7 +131,11 @@ def test_joints_are_written_in_mm_with_every_digit():
 
 @pytest.mark.parametrize(
     ("change", "reason"),
-    [({"l1": 0.5}, "fails"), ({"l5": 0.3}, "links l5 and l6 do not meet at crank angle"), ({"l5": 0.9}, "do not meet")],
+    [
+        ({"l1": 0.5}, "fails"),
+        ({"l5": 0.3}, r"farther apart than l5 \+ l6"),
+        ({"l5": 0.9}, "closer than l5 and l6 differ"),
+    ],
 )
 def test_a_drive_that_does_not_assemble_is_refused(change, reason):
     for draw in (rapier_drawing.joints_csv, lambda design: rapier_drawing.linkage(design, "")):
