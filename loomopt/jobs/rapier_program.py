@@ -24,6 +24,8 @@ CYCLE = {name: name for name in ("peak_acceleration", "peak_jerk", "tape_force",
 STATIC = {"swing": ("swing",), "theta": ("theta",), "phi_stroke": ("phi_stroke",)} | {
     "sley_mu_min": ("sley_mu_near", "sley_mu_far")
 }
+S_DWELL = 0.005
+"""Share of the stroke that the head may move in a usual dwell."""
 ROOM = 0.01
 """Share of a bound's width that a start keeps from its ends."""
 
@@ -119,7 +121,8 @@ def _demand_loads(scene: Any, loaded: bool) -> None:
 
 
 def _size(name: str, known: Any) -> float:
-    return known[name] if name in ("stroke", "s_dwell") else 1.0
+    """Return the natural size of a number that targets keep."""
+    return {"stroke": known["stroke"], "s_dwell": max(known["s_dwell"], S_DWELL * known["stroke"])}.get(name, 1.0)
 
 
 def _variable(name: str, ends: tuple[float, float], known: Any) -> Variable:

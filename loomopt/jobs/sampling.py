@@ -109,7 +109,8 @@ class Sampler:
             part = slice(begin, begin + CHUNK)
             angles = self.cycle.angles(pieces[part], u[part])
             switches = self.cycle.switches[pieces[part]].T
-            result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
+            with np.errstate(invalid="ignore", divide="ignore"):
+                result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
         return result
 
     def grid(self, samples: int = SAMPLES) -> tuple[NDArray[np.intp], Floats]:

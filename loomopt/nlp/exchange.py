@@ -19,7 +19,7 @@ from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
 from loomopt.nlp.polish import BINDING
 from loomopt.nlp.transcribe import Transcription
 
-ROUNDS, LEADING = 16, 4
+ROUNDS, ELASTIC_ROUNDS, LEADING = 16, 32, 4
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at."""
 
@@ -58,7 +58,7 @@ class _Run:
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
         status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None
-        for _ in range(ROUNDS):
+        for _ in range(ELASTIC_ROUNDS if self.elastic else ROUNDS):
             nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=bool(raw))
             before, cold = x, not raw
             status, x, extra, raw = self._solve(nlp, sampler, before, extra, peaks, nodes, raw)
@@ -80,7 +80,7 @@ class _Run:
         if extra is None or not reached:
             return point
         if self.elastic:
-            return replace(point, relaxed=self._relaxed(extra))
+            return replace(point, reached=violation <= STANDS, relaxed=self._relaxed(extra))
         x, touching = polish(calls, x, extra, point, peaks)
         binding = tuple(map(tuple, touching))
         return replace(point, x=x, binding=binding, built=calls.built, structure=self.program.structure)

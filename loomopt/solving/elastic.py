@@ -1,5 +1,6 @@
 """When nothing is admissible: which limits clash, and the least relaxations that help."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -11,6 +12,8 @@ from loomopt.solving.words import Words
 
 PRICED = 1e-6
 """Multipliers above this belong to the clash."""
+ENOUGH = 3
+"""Starts that must agree on the least sum of relaxations before the rest need not be tried."""
 NEEDED = 1e-7
 """Excess, in natural sizes, below which a set of limits is admissible after all."""
 
@@ -38,7 +41,11 @@ def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     """Return the limits with a price in the least relaxation: without any of them it would be less."""
     prices = point.raw["lam_g"][: len(program.limits)]
     rows = [limit for limit in program.limits if limit.family != "cycle"]
-    named = [words.limit(limit) for limit, price in zip(rows, prices, strict=False) if abs(price) > PRICED]
+    named = [
+        words.limit(limit)
+        for limit, price in zip(rows, prices, strict=False)
+        if abs(price) > PRICED and not limit.hidden
+    ]
     return tuple(dict.fromkeys(named))
 
 
@@ -46,12 +53,17 @@ def _least(
     program: Program, starts: Sequence[Mapping[str, float]], settings: Settings
 ) -> tuple[Point, dict[int, float]] | None:
     """Return the point that needs least, and each limit's need in SI, both rows of one limit counted once."""
-    points = [exchange.solve(program, start, settings, elastic=True) for start in starts]
-    solved = [point for point in points if point.reached]
-    if not solved:
-        return None
-    best = min(solved, key=lambda point: _total(program, point))
-    return best, _by_limit(program, best.relaxed)
+    best, agreeing = None, 0
+    for start in starts:
+        point = exchange.solve(program, start, settings, elastic=True)
+        if not point.reached:
+            continue
+        gain = _total(program, best) - _total(program, point) if best else math.inf
+        agreeing = 1 if gain > NEEDED else agreeing + (gain >= -NEEDED)
+        best = point if gain > 0.0 else best
+        if agreeing == ENOUGH:
+            break
+    return (best, _by_limit(program, best.relaxed)) if best else None
 
 
 def _total(program: Program, point: Point) -> float:

@@ -232,7 +232,7 @@ class _Search:
         solver["accuracy"] = self.settings.accuracy
         before = report.evaluation(scene, task, program, task.today(scene))
         if self.best is None:
-            tried = exchange.starts(program, MORE_STARTS, self.seed)
+            tried = [*exchange.starts(program, MORE_STARTS, self.seed), task.values(program, task.today(scene))]
             from loomopt.solving.elastic import clash
 
             began = time.perf_counter()
