@@ -52,6 +52,13 @@ class Cycle:
         weights[second[0]] += u
         return TURN * (first[1] * (1 - u) + wrapped * u), weights
 
+    def located(self, angle: float) -> tuple[int, float]:
+        """Return the node (piece, u) at a crank angle in rad."""
+        turned = self.starts[0] + (angle - self.starts[0]) % TURN
+        piece = min(max(int(np.searchsorted(self.starts, turned, side="right")) - 1, 0), self.pieces - 1)
+        start, end = self.starts[piece : piece + 2]
+        return piece, float((turned - start) / (end - start))
+
     def piece_before(self, angle: float) -> int:
         """Return the piece that ends at, or holds, a crank angle in rad."""
         ahead = (self.starts[1:] - angle + SAME_ANGLE) % TURN

@@ -69,7 +69,9 @@ def marks(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
 def _rows(sampled: Sampler) -> tuple[np.ndarray, Floats]:
     """Return nodes (pieces, u) at every half degree and the hand-over; corners of loads from both sides."""
     starts = sampled.cycle.starts
-    phi = np.unique(np.append(np.linspace(0.0, TURN, STEPS, endpoint=False), read(sampled).phi_stroke))
+    centres = sampled.given.values["centres"]
+    marked = [read(sampled).phi_stroke, (math.pi + centres.beta_r - centres.beta) % TURN]
+    phi = np.unique(np.append(np.linspace(0.0, TURN, STEPS, endpoint=False), marked))
     turned = starts[0] + np.mod(phi - starts[0], TURN)
     piece = np.clip(np.searchsorted(starts, turned, side="right") - 1, 0, sampled.cycle.pieces - 1)
     inside = (turned - starts[piece]) / np.diff(starts)[piece]

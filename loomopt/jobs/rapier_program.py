@@ -122,7 +122,10 @@ def _demand_loads(scene: Any, loaded: bool) -> None:
 
 def _size(name: str, known: Any) -> float:
     """Return the natural size of a number that targets keep."""
-    return {"stroke": known["stroke"], "s_dwell": max(known["s_dwell"], S_DWELL * known["stroke"])}.get(name, 1.0)
+    stroke = float(known.get("stroke", 0.0))
+    if name == "stroke":
+        return stroke
+    return max(float(known[name]), S_DWELL * stroke) if name == "s_dwell" else 1.0
 
 
 def _variable(name: str, ends: tuple[float, float], known: Any) -> Variable:

@@ -100,7 +100,8 @@ def _crossing(excess: Callable[[float], float], low: float, high: float) -> floa
 def turns(pose_at: Callable[[Floats], Any]) -> list[float]:
     """Return the crank angles, rad, where the head turns, the first onto its way out; none for one that never does."""
     angles = np.linspace(0.0, TURN, SAMPLES + 1)
-    slopes = np.asarray(pose_at(angles).q1, dtype=np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = np.asarray(pose_at(angles).q1, dtype=np.float64)
     found = []
     for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
         sign = 1.0 if slopes[k + 1] > slopes[k] else -1.0

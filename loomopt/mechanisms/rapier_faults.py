@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt import maths
 from loomopt.mechanisms import crank_rocker
@@ -11,6 +13,7 @@ from loomopt.mechanisms.dyad import dot
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 SAMPLES = 3600
+Floats = NDArray[np.float64]
 
 
 def fault(dimensions: Dimensions) -> str:
@@ -21,9 +24,9 @@ def fault(dimensions: Dimensions) -> str:
     four_bar = crank_rocker.fault(d.l1, d.l2, d.l3, d.l71)
     if four_bar:
         return f"the sley four-bar is no crank-rocker: {four_bar.replace('l4', 'l71')}"
-    phi1 = np.linspace(0.0, 2 * math.pi, SAMPLES + 1)
-    pose = Pose(maths.numpy(), d, Sley(maths.FLOAT, d).stand, phi1)
-    span = np.sqrt(dot(pose.base, pose.base))
+    phi1 = _angles(d)
+    span = _span(d, phi1)
+    locks = []
     for text, open_at in (
         ("C and B2 are farther apart than l5 + l6", span >= d.l5 + d.l6),
         ("C and B2 are closer than l5 and l6 differ", span <= abs(d.l5 - d.l6)),
@@ -31,19 +34,45 @@ def fault(dimensions: Dimensions) -> str:
         if open_at.all():
             return f"the five-bar closes at no crank angle: {text}"
         if open_at.any():
-            return f"the five-bar locks: {text} {_stretches(np.degrees(phi1), open_at)}"
-    return ""
+            locks.append(f"{text} {_stretches(np.degrees(phi1), open_at)}")
+    return f"the five-bar locks: {'; '.join(locks)}" if locks else ""
 
 
-def _stretches(degrees: "np.ndarray", open_at: "np.ndarray") -> str:
-    """Return the stretches of crank angle where something holds, as words."""
-    edges = np.diff(open_at.astype(int))
-    begins, ends = [float(degrees[k + 1]) for k in np.flatnonzero(edges > 0)], []
-    ends = [float(degrees[k]) for k in np.flatnonzero(edges < 0)]
-    if open_at[0]:
-        ends = [*ends[1:], ends[0] + 360.0]
-        begins = begins or [0.0]
-    return " and ".join(f"from {a:.1f} to {b:.1f} deg" for a, b in zip(begins, ends, strict=False))
+def _span(d: Dimensions, phi1: NDArray[np.floating[Any]]) -> Floats:
+    """Return the distance of C and B2, m, at crank angles φ1, rad."""
+    base = Pose(maths.numpy(), d, Sley(maths.FLOAT, d).stand, phi1).base
+    return np.asarray(np.sqrt(dot(base, base)), dtype=np.float64)
+
+
+def _angles(d: Dimensions) -> Floats:
+    """Return crank angles of one turn, rad: evenly spread, and where C and B2 are farthest apart and closest."""
+    step = 2 * math.pi / SAMPLES
+    even: Floats = step * np.arange(SAMPLES, dtype=np.float64)
+    span = _span(d, even)
+    before, after = np.roll(span, 1), np.roll(span, -1)
+    turns = np.flatnonzero((span - before) * (after - span) <= 0.0)
+    found: Floats = even[turns]
+    for width in (step, step / 16, step / 256):
+        low, mid, high = (_span(d, found + k * width) for k in (-1, 0, 1))
+        bend = low - 2 * mid + high
+        shift = np.divide(low - high, 2 * bend, out=np.zeros_like(bend), where=bend != 0.0)
+        found = found + width * np.clip(shift, -1.0, 1.0)
+    return np.unique(np.concatenate([even, np.mod(found, 2 * math.pi)]))
+
+
+def _stretches(degrees: Floats, open_at: NDArray[np.bool_]) -> str:
+    """Return the stretches of crank angle where something holds, as words; one across FDC ends beyond 360 deg."""
+    inside = [int(k) for k in np.flatnonzero(open_at)]
+    runs: list[list[int]] = []
+    for k in inside:
+        if runs and runs[-1][-1] == k - 1:
+            runs[-1].append(k)
+        else:
+            runs.append([k])
+    spans = [(float(degrees[run[0]]), float(degrees[run[-1]])) for run in runs]
+    if len(runs) > 1 and open_at[0] and open_at[-1]:
+        spans = [*spans[1:-1], (spans[-1][0], spans[0][1] + 360.0)]
+    return " and ".join(f"from {begin:.1f} to {end:.1f} deg" for begin, end in spans)
 
 
 def named(design: Mapping[str, float]) -> str:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from loomopt.cycle import Floats
+from loomopt.cycle import Cycle, Floats
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.calls import Calls
@@ -64,9 +64,12 @@ class _Run:
             status, x, extra, raw = self._solve(nlp, sampler, before, extra, peaks, nodes, raw)
             if status not in SUCCESS and not cold:
                 status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
-            sampler = sampler_at(self.program, x)
-            if sampler is None:
+            order, here = sampler.cycle, sampler_at(self.program, x)
+            if here is None:
                 return Point(x, "Invalid_Number_Detected", False, self.iterations)
+            sampler = here
+            if sampler.cycle.order != order.order:
+                nodes, raw = [[_moved(e, order, sampler) for e in of] for of in nodes], {}
             peaks = calls.peaks(sampler)
             violation = self._extend(nodes, peaks, extra)
             reached = status in SUCCESS or self._stands(nlp, sampler, x, extra, nodes)
@@ -93,7 +96,7 @@ class _Run:
         They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
         extremes it creeps.
         """
-        if self.elastic or point.status not in SUCCESS:
+        if self.elastic or point.status not in SUCCESS or not point.raw:
             return None
         prices = point.raw["lam_g"][-len(nodes) * nlp.slots :].reshape(len(nodes), nlp.slots)
         pairs = zip(nodes, prices, strict=True)
@@ -167,6 +170,12 @@ class _Run:
         limits = self.program.limits
         needs = {k: extra[2 * g] - extra[2 * g + 1] * (limits[k].sign == 0) for k, g in self.program.soft.items()}
         return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
+
+
+def _moved(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:
+    """Return a node of a cycle whose corners stood in another order, at the same crank angle."""
+    angle = float(before.angles(np.array([node.piece]), np.array([node.u]))[0])
+    return Extreme(*sampler.cycle.located(angle), node.value)
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

@@ -1,5 +1,6 @@
 """Newton's method on what binds, with each whole-cycle row standing on its own extreme as that moves."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -14,8 +15,9 @@ from loomopt.nlp.polish import BINDING, binding, met
 
 TOUCHING, SETTLED, POLISHES, POLISH = 1e-8, 1e-8, 3, 1e-6
 """Rows this close to their bound are polished onto it, in steps up to POLISH; below SETTLED no extreme moves."""
-FOLLOW, FOLLOW_ROUNDS = 0.2, 5
-"""Farthest that a neighbour's answer is followed, in the variables' own scales."""
+FOLLOW, FOLLOW_ROUNDS, PATIENCE = 0.2, 24, 5
+"""Farthest that a neighbour's answer is followed, in the variables' own scales; rounds in all, and the rounds in a
+row that may leave the extremes moving as far as ever."""
 ALIKE = 1e-3
 """Nodes of one piece this close in u stand for one extreme."""
 
@@ -56,19 +58,47 @@ def follow(calls: Calls, warm: Point) -> Point | None:
     None where they lead nowhere: then the solver must choose what binds.
     """
     point: Point | None = warm
-    sampler, found = sampler_at(calls.program, warm.x), warm.nodes
+    found: Nodes = warm.nodes
+    sampler = sampler_at(calls.program, warm.x)
+    order = sampler.cycle.order if sampler else ()
+    nearest, idle, last = math.inf, 0, None
     for _ in range(FOLLOW_ROUNDS):
         point = _pivoted(calls, sampler, point, found) if sampler and point else None
         sampler = sampler_at(calls.program, point.x) if point else None
-        if sampler is None or point is None:
+        if sampler is None or point is None or sampler.cycle.order != order:
             return None
         found = tuple(map(tuple, calls.peaks(sampler)))
         pairs = [(node, _same(of, node)) for of, old in zip(found, point.binding, strict=True) for node in old]
         families = zip(calls.families, found, strict=True)
         worst = max((calls.excess(family, e, point.raw["extra"]) for family, of in families for e in of), default=0.0)
-        if worst <= calls.settings.excess and all(abs(node.u - now.u) <= SETTLED for node, now in pairs):
+        moved = max((abs(node.u - now.u) for node, now in pairs), default=0.0)
+        if worst <= calls.settings.excess and moved <= SETTLED:
             return replace(point, iterations=0, violation=worst, built=calls.built)
+        found, last = _hastened(found, pairs, last)
+        idle = 0 if moved < 0.9 * nearest else idle + 1
+        nearest = min(nearest, moved)
+        if idle == PATIENCE:
+            return None
     return None
+
+
+def _hastened(
+    found: Nodes, pairs: Sequence[tuple[Extreme, Extreme]], last: tuple[Floats, Floats] | None
+) -> tuple[Nodes, tuple[Floats, Floats]]:
+    """Return the extremes with those that bind moved to where the last two rounds point, and this round's (u, move).
+
+    Where the objective is nearly flat, extremes and design chase each other in circles: the secant through two rounds
+    (Anderson's mixing) ends that.
+    """
+    u = np.array([node.u for node, _ in pairs])
+    move = np.array([now.u - node.u for node, now in pairs])
+    if last is None or last[0].shape != u.shape or not np.any(move != last[1]):
+        return found, (u, move)
+    turned = move - last[1]
+    share = float(turned @ move / (turned @ turned))
+    goal = u + move - share * (u - last[0] + turned)
+    aims = {id(now): min(max(float(to), 0.0), 1.0) for (_, now), to in zip(pairs, goal, strict=True)}
+    return [[replace(e, u=aims.get(id(e), e.u)) for e in of] for of in found], (u, move)
 
 
 def _pivoted(calls: Calls, sampler: Sampler, point: Point, found: Nodes) -> Point | None:

@@ -253,7 +253,7 @@ def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
     def ratio(design):
         return machine.static(design)["M3_fdc"] / size
 
-    starts = random_designs(machine, 3, seed)
+    starts = random_designs(machine, 6, seed)
     ends = [end for end in (least(machine, lambda d: ratio(d) ** 2, start) for start in starts) if end]
     assert ends
     assert M3 / size <= min(abs(ratio(end)) for end in ends) + 1e-6
