@@ -118,18 +118,37 @@ def test_a_table_that_cannot_be_matched_is_refused(tmp_path, name):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.xfail(reason="the mean square is resolved to rounding, so its root only to about 1e-8 m")
-@pytest.mark.parametrize("today", [True, False], ids=["today's", "another drive's"])
-def test_a_drives_own_travel_is_matched_to_a_nanometre(tmp_path, today):
-    """The scene's start is elsewhere where it is another's."""
-    scene = lo.load("rapier")
-    drive = scene if today else scene.update({"mechanism.l4": "11 mm", "mechanism.l6": "190 mm"})
-    curves = lo.simulate(drive)
-    place = next(name for name in curves if name.startswith("phi"))
-    assert {place, "S [m]"} <= set(curves)
-    every = curves.iloc[:: max(1, len(curves) // 40)]
-    rows = [f"{math.degrees(p)!r},{1e3 * s!r}" for p, s in zip(every[place], every["S [m]"], strict=True)]
-    text = "phi1 [deg],S [mm]\n" + "\n".join(rows) + "\n"
-    answer = lo.solve(wished(tmp_path, text), "match")
+def travels(scene, every):
+    """Return a scene's travel as a table for target match: each so many of the curves' rows."""
+    curves = lo.simulate(scene).iloc[::every]
+    pairs = zip(curves["phi [rad]"], curves["S [m]"], strict=True)
+    return "phi1 [deg],S [mm]\n" + "".join(f"{math.degrees(phi)!r},{1e3 * travel!r}\n" for phi, travel in pairs)
+
+
+def other():
+    """Return another drive than the packaged one, from whose start it has to be found."""
+    return lo.load("rapier").update({"mechanism.l4": "11 mm", "mechanism.l6": "190 mm"})
+
+
+@pytest.mark.parametrize("every", [18, 19], ids=["today's", "another drive's"])
+def test_a_drives_own_travel_is_recovered(tmp_path, every):
+    """To 1e-7 m of 0.85 m: the mean square is then at rounding, its root is not."""
+    scene = lo.load("rapier") if every == 18 else other()
+    answer = lo.solve(wished(tmp_path, travels(scene, every)), "match")
     assert answer.status == "optimal", answer.message
-    assert answer.figures["match_rms"] < 1e-9
+    assert answer.figures["match_rms"] < 1e-7
+
+
+@pytest.mark.xfail(reason="the mean square is resolved to rounding, its root only to about 1e-8 m")
+@pytest.mark.parametrize("every", [18, 19], ids=["today's", "another drive's"])
+def test_a_drives_own_travel_is_recovered_to_a_nanometre(tmp_path, every):
+    scene = lo.load("rapier") if every == 18 else other()
+    assert lo.solve(wished(tmp_path, travels(scene, every)), "match").figures["match_rms"] < 1e-9
+
+
+@pytest.mark.xfail(reason="the built program keeps the travels of the first table with as many rows")
+def test_a_second_table_is_matched_and_not_the_first(tmp_path):
+    for scene in (lo.load("rapier"), other()):
+        answer = lo.solve(wished(tmp_path, travels(scene, 20)), "match")
+        assert answer.status == "optimal", answer.message
+        assert answer.figures["match_rms"] < 1e-7
