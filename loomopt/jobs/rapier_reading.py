@@ -102,6 +102,8 @@ def turns(pose_at: Callable[[Floats], Any]) -> list[float]:
     angles = np.linspace(0.0, TURN, SAMPLES + 1)
     with np.errstate(invalid="ignore", divide="ignore"):
         slopes = np.asarray(pose_at(angles).q1, dtype=np.float64)
+    if not np.all(np.isfinite(slopes)):
+        return []
     found = []
     for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
         sign = 1.0 if slopes[k + 1] > slopes[k] else -1.0

@@ -114,7 +114,8 @@ class _Run:
         nodes: Sequence[list[Extreme]],
     ) -> bool:
         """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
-        if self.elastic or len(extra) != nlp.extras or max(map(len, nodes), default=0) > nlp.slots:
+        grown = max(map(len, nodes), default=0) > nlp.slots or sampler.corner_count != nlp.corners
+        if self.elastic or len(extra) != nlp.extras or grown:
             return False
         arguments = self.calls.arguments(nlp, sampler, x, extra, nodes)
         rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()

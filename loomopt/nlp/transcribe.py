@@ -73,7 +73,7 @@ class Transcription:
         self.soft = program.soft if elastic else {}
         self.groups = len(set(self.soft.values()))
         self.epigraphs = [] if elastic else [k for k, o in enumerate(program.objectives) if o.form != "value"]
-        self.integrals = _wanted_integrals(program)
+        self.integrals = _wanted_integrals(program, elastic)
         self.quadrature = {i.name: _nodes(sampler, i) for i in self.integrals}
         self.layout = self._layout()
         self._quantities: dict[str, tuple[Any, list[str]]] = {}
@@ -266,7 +266,7 @@ class Transcription:
         write(p, "objective weight", weights)
         write(p, "objective scale", [objective.scale for objective in program.objectives])
         write(p, "front", sampler.front)
-        for integral in self.integrals:
+        for integral in _wanted_integrals(program, self.elastic):
             write(p, f"{integral.name} nodes", self._rule(sampler, integral))
         for k, chosen in enumerate(nodes):
             used = [[1.0, np.sign(e.value) or 1.0, *self.node(sampler, e.piece, e.u)] for e in chosen]
@@ -291,9 +291,10 @@ def _nodes(sampler: Sampler, integral: Integral) -> int:
     return len(integral.angles) or len(sampler.quadrature(integral)[0])
 
 
-def _wanted_integrals(program: Program) -> list[Any]:
-    """Return the model's integrals that a limit or an objective reads."""
-    read = {o.row for o in program.objectives} | {limit.row for limit in program.limits}
+def _wanted_integrals(program: Program, elastic: bool) -> list[Any]:
+    """Return the model's integrals that a limit reads, or an objective; an elastic program has no objectives."""
+    read = {limit.row for limit in program.limits}
+    read |= set() if elastic else {o.row for o in program.objectives}
     return [integral for integral in program.model.integrals if {integral.name, integral.root} & read]
 
 
@@ -302,7 +303,7 @@ _cache: OrderedDict[Hashable, Transcription] = OrderedDict()
 
 def transcribe(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> tuple[Transcription, bool]:
     """Return the NLP of a program's structure, and whether it had to be built."""
-    nodes = tuple(_nodes(sampler, integral) for integral in _wanted_integrals(program))
+    nodes = tuple(_nodes(sampler, integral) for integral in _wanted_integrals(program, elastic))
     key = (program.structure, slots, elastic, nodes, sampler.corner_count)
     if key in _cache:
         _cache.move_to_end(key)

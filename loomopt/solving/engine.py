@@ -24,6 +24,8 @@ MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified."""
 SAME = 1e-7
 """Objectives that agree to this, relative to their natural size, are one optimum."""
+ALIKE = 4
+"""Points of one optimum that are put before the certificate."""
 CORRECTIONS, PRECISE = 4, 1e-9
 STRONGER, STRONGEST_PENALTY = 100.0, 1e7
 
@@ -177,7 +179,20 @@ class _Search:
                 self.points.remove(self.best)
                 return self._judge()
             self.best, self.certificate, self.x = before
-        return self.certificate.passed
+        return self.certificate.passed or self._other(solved)
+
+    def _other(self, solved: list[Point]) -> bool:
+        """Say whether another point with the same objectives passes where the best one did not; then it is the best."""
+        before = self.best, self.certificate, self.x
+        assert self.best is not None
+        alike = [point for point in solved if point is not self.best and self._compare(point, self.best) == 0]
+        for point in alike[:ALIKE]:
+            self._certify(point)
+            if self.certificate and self.certificate.passed:
+                self.best = point
+                return True
+        self.best, self.certificate, self.x = before
+        return False
 
     def _too_weak(self, certificate: Certificate) -> bool:
         """Say whether an earlier objective gave way to a later one: its weight must exceed twice its multiplier."""
@@ -238,6 +253,10 @@ class _Search:
             began = time.perf_counter()
             found = clash(program, tried, self.settings, Words(scene))
             self.spent += time.perf_counter() - began
+            if found.x and not found.relaxations and self._try(found.x, None):
+                # The elastic solve came upon an admissible design that no start led to.
+                self._judge()
+                return self.answer(target)
             if self.points:
                 solver["status"] = self.points[0].status
                 solver["iterations"] = sum(point.iterations for point in self.points)
