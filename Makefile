@@ -21,6 +21,7 @@ benchmark: .venv/installed-test
 	$(BIN)/pip install -q -e '.[bench]'
 	$(BIN)/python benchmarks/kinematics_speed.py
 	$(BIN)/python benchmarks/balance_peers.py
+	$(BIN)/python benchmarks/rapier_peers.py
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv
