@@ -146,31 +146,16 @@ def _bound_limits(variable: Variable) -> list[Limit]:
 
 def _kept_limits(physics: Rapier, kept: list[str], known: Any) -> list[Limit]:
     """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
-    if "stroke" not in kept:
-        return [Limit("head at rest at phi_stroke", 0, "rest", 0.0, 1.0, "static", relaxable=False, hidden=True)]
-    size = known["stroke"]
-    found = [
-        Limit("stroke is reached", 0, "stroke_short", 0.0, size, "static", relaxable=False, hidden=True),
-        Limit("head at rest at phi_stroke", 0, "rest", 0.0, size, "static", relaxable=False, hidden=True),
-    ]
+    size = known["stroke"] if "stroke" in kept else 1.0
+    rows = {"head at rest at phi_stroke": "rest"} | ({"stroke is reached": "stroke_short"} if "stroke" in kept else {})
+    found = [Limit(name, 0, row, 0.0, size, "static", relaxable=False, hidden=True) for name, row in rows.items()]
     for side, name in physics.arcs:
-        word = "after" if side == AFTER else "before"
-        found.append(
-            Limit(
-                f"head within s_dwell {word} front dead centre",
-                1,
-                "dwell_travel",
-                1.0,
-                1.0,
-                "cycle",
-                relaxable=False,
-                where=physics.where(side),
-                hidden=True,
-            )
-            if name in (*kept, "dwell")
-            else found[0]
-        )
-    return list(dict.fromkeys(found))
+        if name in (*kept, "dwell"):
+            text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
+            where = physics.where(side)
+            row = Limit(text, 1, "dwell_travel", 1.0, 1.0, "cycle", relaxable=False, where=where, hidden=True)
+            found.append(row)
+    return found
 
 
 def _margins(sley: bool, known: Any) -> list[Limit]:
