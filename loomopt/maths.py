@@ -1,13 +1,13 @@
 """The number systems one formula runs in: float, NumPy arrays, CasADi symbols, mpmath digits, SymPy expressions.
 
-A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi`, operators and
+A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
 integers, so it is written once. Each system is imported only when it is asked for.
 """
 
 import functools
 import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ class Maths:
 
     sin, cos, sqrt: functions of one number; atan2(y, x): angle in (−π, π]; pi: the system's own π.
     number(x): the system's own copy of a float64, exact in every system.
+    choose(place, values): the value at a place that is data of a node (0, 1, 2 ... as numbers), never of the design.
     """
 
     name: str
@@ -30,9 +31,14 @@ class Maths:
     atan2: Callable[[Number, Number], Number]
     pi: Number
     number: Callable[[float], Number]
+    choose: Callable[[Number, Sequence[Number]], Number]
 
 
-FLOAT = Maths("float", math.sin, math.cos, math.sqrt, math.atan2, math.pi, float)
+def _chosen(place: Number, values: Sequence[Number]) -> Number:
+    return values[int(place)]
+
+
+FLOAT = Maths("float", math.sin, math.cos, math.sqrt, math.atan2, math.pi, float, _chosen)
 """Plain float64 scalars: several times faster than NumPy on one angle."""
 
 
@@ -41,7 +47,14 @@ def numpy() -> Maths:
     """Arrays of float64, any shape."""
     import numpy as np
 
-    return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64)
+    def choose(place: Number, values: Sequence[Number]) -> Number:
+        stacked = np.array(np.broadcast_arrays(*values))
+        places = np.asarray(place, dtype=np.intp)
+        if stacked.ndim == 1:
+            return stacked[places]
+        return np.take_along_axis(stacked, np.broadcast_to(places, stacked.shape[1:])[None], axis=0)[0]
+
+    return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64, choose)
 
 
 @functools.cache
@@ -49,7 +62,12 @@ def casadi() -> Maths:
     """CasADi SX or MX expressions: what the NLPs are made of."""
     import casadi as ca
 
-    return Maths("casadi", ca.sin, ca.cos, ca.sqrt, ca.atan2, math.pi, float)
+    def choose(place: Number, values: Sequence[Number]) -> Number:
+        if isinstance(place, float | int):
+            return values[int(place)]
+        return sum((place == k) * value for k, value in enumerate(values))
+
+    return Maths("casadi", ca.sin, ca.cos, ca.sqrt, ca.atan2, math.pi, float, choose)
 
 
 @functools.cache
@@ -60,11 +78,11 @@ def mpmath(digits: int = 40) -> Maths:
     """
     mp = importlib.import_module("mpmath").MPContext()
     mp.dps = digits
-    return Maths("mpmath", mp.sin, mp.cos, mp.sqrt, mp.atan2, +mp.pi, mp.mpf)
+    return Maths("mpmath", mp.sin, mp.cos, mp.sqrt, mp.atan2, +mp.pi, mp.mpf, _chosen)
 
 
 @functools.cache
 def sympy() -> Maths:
     """SymPy expressions: equations to print and to derive from."""
     sp = importlib.import_module("sympy")
-    return Maths("sympy", sp.sin, sp.cos, sp.sqrt, sp.atan2, sp.pi, sp.Float)
+    return Maths("sympy", sp.sin, sp.cos, sp.sqrt, sp.atan2, sp.pi, sp.Float, _chosen)
