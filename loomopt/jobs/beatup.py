@@ -66,6 +66,11 @@ class Beatup:
         """Whole-cycle quantities whose largest |value| is a figure."""
         return ("peak_torque", *(name for check in self.checks for name in check.quantities))
 
+    @property
+    def signed(self) -> frozenset[str]:
+        """No quantity: magnitudes count."""
+        return frozenset()
+
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])

@@ -49,6 +49,10 @@ class Model(Protocol):
         """Whole-cycle quantities whose largest |value| is a figure."""
 
     @property
+    def signed(self) -> frozenset[str]:
+        """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
+
+    @property
     def integrals(self) -> tuple[Integral, ...]:
         """The means over part of the cycle this model knows."""
 
@@ -93,7 +97,8 @@ class Limit:
 
     name: as the scene calls it; row, weight: names of values, static figures or whole-cycle quantities (weight "" = 1);
     family: where the row lives; scale: natural size of the row; relaxable: whether a designer could give way.
-    A whole-cycle row is |quantity| ≤ bound: the value itself or, for a minimum, what it leaves of the complement.
+    A whole-cycle row is |quantity| ≤ bound (of a signed quantity, quantity ≤ bound): the value itself or, for a
+    minimum, what it leaves of the complement.
     where: (switch, its value) on the pieces it holds for; hidden: it states what a named one means.
     """
 

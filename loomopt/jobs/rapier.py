@@ -106,6 +106,11 @@ class Rapier:
         loads = ("peak_torque", "tape_force") if self.loads else ()
         return ("peak_acceleration", "peak_jerk", *loads)
 
+    @property
+    def signed(self) -> frozenset[str]:
+        """No quantity: magnitudes count."""
+        return frozenset()
+
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers, the sley's stand, and the driving link's direction at front dead centre."""
         dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})

@@ -31,11 +31,22 @@ def gauss() -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Extreme:
-    """A local extreme of |quantity|: where, and the value with its sign, SI."""
+    """A local extreme of |quantity|: where, and the value with its sign, SI; signed: of the quantity as it is."""
 
     piece: int
     u: float
     value: float
+    signed: bool = False
+
+    @property
+    def height(self) -> float:
+        """What is compared with a bound, SI."""
+        return self.value if self.signed else abs(self.value)
+
+    @property
+    def sign(self) -> float:
+        """What the value is multiplied by to give the height."""
+        return -1.0 if self.value < 0 and not self.signed else 1.0
 
 
 @functools.cache
@@ -120,7 +131,7 @@ class Sampler:
         return _grid(tuple(counts))
 
     def extremes(self, name: str, where: tuple[int, float] | None = None) -> list[Extreme]:
-        """Return the local extremes of |quantity|, largest first: sampled, then refined to rounding.
+        """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
 
         where: (switch, its value) on the pieces they are asked for; every piece without it.
         """
@@ -132,22 +143,28 @@ class Sampler:
     def _find_extremes(self, name: str) -> list[Extreme]:
         pieces, u = self.grid()
         values = self.at(name, pieces, u)
-        size = np.abs(values)
+        size = self.heights(name, values)
         if not np.all(np.isfinite(size)):
             return [Extreme(0, 0.0, float("inf"))]
         first, last = u == 0.0, u == 1.0
         left, right = np.full_like(size, -np.inf), np.full_like(size, -np.inf)
         left[1:], right[:-1] = size[:-1], size[1:]
         left[first] = right[last] = -np.inf
-        peaks = np.flatnonzero((size >= left) & (size >= right) & ((size > left) | (size > right)))
+        peaks = np.flatnonzero((size > left) & (size >= right))
         found = self._refine(name, pieces, u, values, peaks)
-        return sorted(found, key=lambda extreme: -abs(extreme.value))
+        return sorted(found, key=lambda extreme: -extreme.height)
+
+    def heights(self, name: str, values: Floats) -> Floats:
+        """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
+        return values if name in self.model.signed else np.abs(values)
 
     def _refine(
         self, name: str, pieces: NDArray[np.intp], u: Floats, values: Floats, peaks: NDArray[np.intp]
     ) -> list[Extreme]:
         """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak."""
-        piece, sign, sampled = pieces[peaks], np.sign(values[peaks]), np.abs(values[peaks])
+        signed = name in self.model.signed
+        piece, sign = pieces[peaks], np.ones(len(peaks)) if signed else np.sign(values[peaks])
+        sampled = sign * values[peaks]
         inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
         step = u[inner + 1] - u[inner]
         centre = u[inner] + step * _vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
@@ -160,11 +177,11 @@ class Sampler:
         better = refined >= sampled
         best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
-        return [Extreme(*extreme) for extreme in found]
+        return [Extreme(*extreme, signed=signed) for extreme in found]
 
     def peak(self, name: str, where: tuple[int, float] | None = None) -> float:
-        """Return the largest |quantity| over the cycle, or over the pieces `where` (0 without any), SI."""
-        return max((abs(extreme.value) for extreme in self.extremes(name, where)), default=0.0)
+        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
+        return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
 
     def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
         """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""

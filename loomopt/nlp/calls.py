@@ -90,7 +90,7 @@ class Calls:
                 first.append(abs(sampler.static[objective.row]) / objective.scale)
             else:
                 family = next(place for place, f in enumerate(self.families) if f.objective == k)
-                first.append(abs(peaks[family][0].value) / objective.scale)
+                first.append(peaks[family][0].height / objective.scale)
         return 1.01 * np.array(first) + 0.01
 
     def idle_rows(self, nlp: Transcription, nodes: Sequence[Sequence[Extreme]]) -> list[bool]:
@@ -110,4 +110,4 @@ class Calls:
             soft = self.program.soft
             scale, bound = limit.scale, limit.bound / limit.scale
             bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
-        return float(abs(extreme.value) / scale - bound)
+        return float(extreme.height / scale - bound)

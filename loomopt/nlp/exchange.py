@@ -176,7 +176,7 @@ class _Run:
 def _moved(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:
     """Return a node of a cycle whose corners stood in another order, at the same crank angle."""
     angle = float(before.angles(np.array([node.piece]), np.array([node.u]))[0])
-    return Extreme(*sampler.cycle.located(angle), node.value)
+    return Extreme(*sampler.cycle.located(angle), node.value, node.signed)
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

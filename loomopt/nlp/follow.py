@@ -156,5 +156,5 @@ def _newton(
 
 def _same(found: Sequence[Extreme], node: Extreme) -> Extreme:
     """Return the extreme a node has become: the nearest of its sign on its piece, itself where there is none."""
-    alike = [e for e in found if e.piece == node.piece and (e.value > 0) == (node.value > 0)]
+    alike = [e for e in found if e.piece == node.piece and e.sign == node.sign]
     return min(alike, key=lambda extreme: abs(extreme.u - node.u), default=node)

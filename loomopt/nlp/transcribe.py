@@ -269,7 +269,7 @@ class Transcription:
         for integral in _wanted_integrals(program, self.elastic):
             write(p, f"{integral.name} nodes", self._rule(sampler, integral))
         for k, chosen in enumerate(nodes):
-            used = [[1.0, np.sign(e.value) or 1.0, *self.node(sampler, e.piece, e.u)] for e in chosen]
+            used = [[1.0, e.sign, *self.node(sampler, e.piece, e.u)] for e in chosen]
             idle = [[0.0, 1.0, *self.node(sampler, 0, 0.5)]] * (self.slots - len(used))
             write(p, f"family {k}", used + idle)
         return p

@@ -117,8 +117,8 @@ class _Trial:
         if limit.family != "cycle":
             return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)]
         found = self.sampler.extremes(limit.row, limit.where)
-        touching = [e for e in found if abs(e.value) >= limit.bound - ACTIVE * limit.scale]
-        return [Row(limit.name, limit.scale, float(np.sign(e.value)), limit=limit, node=e) for e in touching]
+        touching = [e for e in found if e.height >= limit.bound - ACTIVE * limit.scale]
+        return [Row(limit.name, limit.scale, e.sign, limit=limit, node=e) for e in touching]
 
     def _pieces(self, objective: Objective) -> list[Row]:
         """Return the smooth pieces whose largest is the objective's value."""
@@ -129,12 +129,9 @@ class _Trial:
             signs = (1.0, -1.0) if abs(value) <= FEASIBILITY * objective.scale else (float(np.sign(value)),)
             return [Row(objective.figure, objective.scale, sign, objective=objective) for sign in signs]
         found = self.sampler.extremes(objective.row)
-        top = abs(found[0].value)
-        touching = [e for e in found if abs(e.value) >= top - ACTIVE * objective.scale]
-        return [
-            Row(objective.figure, objective.scale, float(np.sign(e.value)), objective=objective, node=e)
-            for e in touching
-        ]
+        top = found[0].height
+        touching = [e for e in found if e.height >= top - ACTIVE * objective.scale]
+        return [Row(objective.figure, objective.scale, e.sign, objective=objective, node=e) for e in touching]
 
     def verdict(self) -> Certificate:
         """Judge the levels in order."""
@@ -183,7 +180,7 @@ class _Trial:
             on = np.ones(len(u), dtype=bool)
             if where:
                 on = self.sampler.cycle.switches[pieces, where[0]] == where[1]
-            highest = float(np.abs(self.sampler.at(name, pieces[on], u[on])).max(initial=0.0))
+            highest = float(self.sampler.heights(name, self.sampler.at(name, pieces[on], u[on])).max(initial=-np.inf))
             worst = max(worst, (highest - self.sampler.peak(name, where)) / scale)
         return worst
 
@@ -224,7 +221,7 @@ class _Trial:
         row = self.rows[k]
         assert row.limit is not None
         if row.node:
-            return (abs(row.node.value) - row.limit.bound) / row.limit.scale
+            return (row.node.height - row.limit.bound) / row.limit.scale
         return self.excess[row.place]
 
     def _curve(self, pieces: list[int], equal: list[int], multipliers: Floats) -> None:
@@ -265,7 +262,7 @@ class _Trial:
         """Return by how much a binding row is missed, with its sign; 0 for an objective held where it stands."""
         row = self.rows[k]
         if row.node:
-            return (abs(row.node.value) - (row.limit.bound if row.limit else 0.0)) / row.scale
+            return (row.node.height - (row.limit.bound if row.limit else 0.0)) / row.scale
         if row.limit is None:
             return 0.0
         values = self.sampler.given.values

@@ -20,7 +20,7 @@ from loomopt.solving.certificate import certify
 class Wave:
     """A model of two numbers whose whole-cycle quantity has peaks that are known in closed form."""
 
-    loads = integrals = switched = ()
+    loads = integrals = switched = signed = ()
     quantities = ("wave", "circle", "sharp")
     key = "wave"
 

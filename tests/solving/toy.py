@@ -19,6 +19,7 @@ class Toy:
     loads = ()
     switched = ()
     integrals = ()
+    signed = frozenset()
 
     @property
     def key(self):
