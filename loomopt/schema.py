@@ -67,10 +67,20 @@ class Arcs:
 
 
 @dataclass(frozen=True)
+class Demand:
+    """What an effect's row must keep: a value, SI, or that of a key of its table; sign +1 at most, −1 at least, 0 ="""
+
+    row: str
+    sign: int
+    value: float | str
+
+
+@dataclass(frozen=True)
 class Check:
     """An effect that takes no part in the balance: whole-cycle figures read from the solved motion.
 
     quantities: figure name → value(maths, pose, given, own) over the cycle; the figure is the largest |value|.
+    rows: name → value(maths, given, own) of the design alone; demands: what rows must keep while the effect is on.
     """
 
     name: str
@@ -79,6 +89,8 @@ class Check:
     quantities: Mapping[str, Callable[[Maths, Any, Values, Values], Number]]
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
+    demands: tuple[Demand, ...] = ()
 
 
 Effect = Load | Check

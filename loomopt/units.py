@@ -63,6 +63,7 @@ SI_UNIT: dict[str, str] = {
     "density": "kg/m^3",
     "travel acceleration": "m/rad^2",
     "travel jerk": "m/rad^3",
+    "curvature": "1/m",
 }
 """Kind of quantity → the SI unit its numbers have inside the program."""
 

@@ -3,7 +3,11 @@
 from loomopt.effects import (
     bearing_friction,
     centrifugal,
+    coil,
     counterweight_inertia,
+    dry_friction,
+    frame_damping,
+    frame_inertia,
     gravity,
     head_inertia,
     reed_inertia,
@@ -11,6 +15,8 @@ from loomopt.effects import (
     rocker_inertia,
     rod_inertia,
     tape_friction,
+    warp_tension,
+    weight,
 )
 from loomopt.schema import Effect
 
@@ -31,3 +37,9 @@ BEATUP: dict[str, Effect] = {
 
 RAPIER: dict[str, Effect] = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
 """Effects of the rapier drive."""
+
+SHEDDING: dict[str, Effect] = {
+    module.EFFECT.name: module.EFFECT
+    for module in (weight, warp_tension, frame_inertia, frame_damping, dry_friction, coil)
+}
+"""Effects of the heald frame on its cam, the return spring apart, in the order its balance lists them."""

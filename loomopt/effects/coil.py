@@ -1,0 +1,118 @@
+"""The return spring as coils that can be made: rate, stresses, hooks, initial tension, surge, space [Shigley, ch. 10].
+
+It takes no part in the balance: K1 (X + X0) stays the whole force of all springs together. Their wire, coil and turns
+must give K1, and keep what material, winding and space allow.
+"""
+
+from collections.abc import Callable
+
+from loomopt.maths import Maths, Number
+from loomopt.mechanisms.tension_spring import Coil, strength
+from loomopt.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
+from loomopt.schema import Check, Demand, Table, Values
+
+INDEX = 4.0, 12.0
+"""Spring indices that can be wound."""
+MEGA = 1e6
+RATE = "coils give K1"
+LEAST_INITIAL, MOST_INITIAL = (
+    "initial tension: no less than winding gives",
+    "initial tension: no more than can be wound",
+)
+OPENED = "coils are drawn open at the top"
+
+
+class Own(Table):
+    """springs: how many share K1; wire, diameter (mean), m, turns (active), initial_tension (N): one of them.
+
+    shear_modulus, elasticity, Pa, density, kg/m³: its steel; strength: of 1 mm wire, Pa, falls as d^−strength_exponent.
+    shear_share, bending_share: shares of the strength that body and hooks may carry; spring_length: space inside the
+    hooks with the shed fully open, m; surge_ratio: least surge frequency over the cam's; hook_factor: bend radius of
+    the hooks over half the coil diameter.
+    """
+
+    springs: PositiveNumber = 2.0
+    wire: PositiveLength
+    diameter: PositiveLength
+    turns: PositiveNumber
+    initial_tension: Force
+    shear_modulus: PositivePressure
+    elasticity: PositivePressure
+    density: PositiveDensity
+    strength: PositivePressure
+    strength_exponent: PureNumber
+    shear_share: PositiveNumber
+    bending_share: PositiveNumber
+    spring_length: PositiveLength
+    surge_ratio: PositiveNumber = 13.0
+    hook_factor: PositiveNumber = 1.0
+
+
+def coil(own: Values) -> Coil:
+    """Return one of the coils."""
+    return Coil(
+        own["wire"],
+        own["diameter"],
+        own["turns"],
+        own["shear_modulus"],
+        own["density"],
+        own["initial_tension"],
+        own["elasticity"],
+        own["hook_factor"],
+    )
+
+
+def load(given: Values, own: Values) -> Number:
+    """Return the largest force on one coil, with the shed open downward, N."""
+    return given["K1"] * (given["X0"] + given["travel"]) / own["springs"]
+
+
+def tensile(maths: Maths, own: Values) -> Number:
+    """Return the tensile strength of the wire, Pa."""
+    return strength(maths, own["wire"], own["strength"], own["strength_exponent"])
+
+
+def _length(maths: Maths, given: Values, own: Values) -> Number:
+    """Return the length inside the hooks with the shed open downward, m."""
+    own_coil = coil(own)
+    return own_coil.free_length + given["X0"] + given["travel"] - own_coil.initial_tension / own_coil.rate
+
+
+ROWS: dict[str, Callable[[Maths, Values, Values], Number]] = {
+    "coil_index": lambda m, v, own: coil(own).index,
+    "shear_stress": lambda m, v, own: coil(own).shear_stress(m, load(v, own)),
+    "shear_share": lambda m, v, own: coil(own).shear_stress(m, load(v, own)) / tensile(m, own),
+    "bending_share": lambda m, v, own: coil(own).hook_bending(m, load(v, own)) / tensile(m, own),
+    "surge_ratio": lambda m, v, own: 2 * m.pi * coil(own).surge_frequency(m) / v["speed"],
+    "spring_length": _length,
+    "spring_mass": lambda m, v, own: own["springs"] * coil(own).mass(m),
+    RATE: lambda m, v, own: own["springs"] * coil(own).rate - v["K1"],
+    LEAST_INITIAL: lambda m, v, own: coil(own).initial_stress(m) - coil(own).initial_stress_least(m),
+    MOST_INITIAL: lambda m, v, own: coil(own).initial_stress_most(m) - coil(own).initial_stress(m),
+    OPENED: lambda m, v, own: v["K1"] * v["X0"] / own["springs"] - own["initial_tension"],
+}
+"""Figures of the coils, then what they keep as margins that are never negative (the rate's is zero), SI."""
+
+MARGINS = {RATE: "stiffness", LEAST_INITIAL: "pressure", MOST_INITIAL: "pressure", OPENED: "force"}
+
+EFFECT = Check(
+    "coil",
+    "tension springs that can be made: stresses, hooks, surge, space",
+    Own,
+    {},
+    reads=("K1", "X0", "travel"),
+    needs=("operation.speed",),
+    rows=ROWS,
+    demands=(
+        Demand("coil_index", -1, INDEX[0]),
+        Demand("coil_index", 1, INDEX[1]),
+        Demand("shear_share", 1, "shear_share"),
+        Demand("bending_share", 1, "bending_share"),
+        Demand("surge_ratio", -1, "surge_ratio"),
+        Demand("spring_length", 1, "spring_length"),
+        Demand(RATE, 0, 0.0),
+        Demand(LEAST_INITIAL, -1, 0.0),
+        Demand(MOST_INITIAL, -1, 0.0),
+        Demand(OPENED, -1, 0.0),
+    ),
+)

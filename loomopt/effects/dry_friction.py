@@ -1,0 +1,25 @@
+"""Coulomb friction of the heald frame in its guides: output term F sgn X˙ [Qiu21, eq 4].
+
+It jumps where the frame starts and stops. In a dwell it is any value in [−F, F]: `pose.worst` says which end is meant,
+−1 for the least cam force, by which contact is judged, +1 for the largest.
+"""
+
+from typing import Any
+
+from loomopt.maths import Maths, Number
+from loomopt.quantities import Force
+from loomopt.schema import Load, Table, Values
+
+
+class Own(Table):
+    """F: friction, N."""
+
+    F: Force
+
+
+def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+    """Return F sgn X˙, N; in a dwell its worst value."""
+    return own["F"] * maths.choose(pose.segment, (1, pose.worst, -1, pose.worst))
+
+
+EFFECT = Load("dry_friction", "Coulomb friction of the frame in its guides", Own, "output", force)

@@ -1,0 +1,24 @@
+"""Weight of the heald frame: output term −G [Qiu21, eq 4], for gravity pulls the frame the way the cam pushes it.
+
+A frame whose weight presses the roller on the cam instead has a negative G.
+"""
+
+from typing import Any
+
+from loomopt.maths import Maths, Number
+from loomopt.quantities import SignedForce
+from loomopt.schema import Load, Table, Values
+
+
+class Own(Table):
+    """G: weight in the direction of the cam's push, N."""
+
+    G: SignedForce
+
+
+def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+    """Return −G, N."""
+    return -own["G"]
+
+
+EFFECT = Load("weight", "weight of the heald frame", Own, "output", force)
