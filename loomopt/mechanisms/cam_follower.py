@@ -96,7 +96,8 @@ class Contact:
     def pressure_angle(self) -> Number:
         """Angle, rad, between the common normal and the roller centre's path.
 
-        tan = (l(1 + φ') − a cos b)/(a sin b); it grows with φ', so rise and return bound it from either side.
+        tan = (l(1 + φ') − a cos b)/(a sin b); positive where the outward normal lies anticlockwise of the path of a
+        rising arm. It grows with φ': rise and return bound it from either side.
         """
         along, across = self._local
         return self.maths.atan2(-across, along)
