@@ -117,10 +117,20 @@ def places(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table]) 
                 yield Place(path, key, quantity, own is not None and getattr(own, key) is not None)
 
 
-def bounds(raw: Any, job: Job, known: list[Place], origin: str) -> dict[str, Bound]:
-    """Return [bounds]; known: places of the scene's numbers, any of which may be bounded."""
-    inner = table(raw, origin, "bounds")
-    return {name: _bound(inner[name], _bounded(name, job, known, origin), origin, f"bounds.{name}") for name in inner}
+def bounds(raw: Any, job: Job, known: list[Place], available: Mapping[str, Any], origin: str) -> dict[str, Bound]:
+    """Return [bounds]; known: places of the scene's numbers, any of which may be bounded.
+
+    A bound on a number of an effect that is off waits for it: it is checked and left out.
+    """
+    inner, found = table(raw, origin, "bounds"), {}
+    for name in inner:
+        waiting = [p for p in known if p.key == name and p.table.removeprefix("effects.") in available]
+        given = any(place.key == name and place.given for place in known)
+        quantity = waiting[0].quantity if waiting and not given else _bounded(name, job, known, origin)
+        bound = _bound(inner[name], quantity, origin, f"bounds.{name}")
+        if given or not waiting:
+            found[name] = bound
+    return found
 
 
 def _bounded(name: str, job: Job, known: list[Place], origin: str) -> Quantity:

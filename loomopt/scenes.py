@@ -194,7 +194,7 @@ def build(document: Mapping[str, Any], jobs: Mapping[str, Job], origin: str) -> 
         operation=_given(tables["operation"]),
         mechanism=_given(tables["mechanism"]),
         effects=effects,
-        bounds=read.bounds(raw["bounds"], job, places, origin),
+        bounds=read.bounds(raw["bounds"], job, places, raw["available"], origin),
         limits=read.limits(raw["limits"], job, effects, origin),
         targets=read.named(own_targets, targets, "target", origin, "targets"),
     )

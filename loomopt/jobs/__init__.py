@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt import packaged
-from loomopt.jobs import beatup_tables, rapier_tables
+from loomopt.jobs import beatup_tables, rapier_tables, shedding_tables
 from loomopt.scene_document import read_document
 from loomopt.scenes import Scene, build
 from loomopt.schema import Job
 
-JOBS: dict[str, Job] = {job.name: job for job in (beatup_tables.SCHEMA, rapier_tables.SCHEMA)}
+JOBS: dict[str, Job] = {job.name: job for job in (beatup_tables.SCHEMA, rapier_tables.SCHEMA, shedding_tables.SCHEMA)}
 """Every job a scene can name."""
 
 

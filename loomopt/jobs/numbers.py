@@ -9,7 +9,8 @@ from loomopt.jobs.program import Wish
 
 def numbers(scene: Any) -> dict[str, float]:
     """Return every number of the scene by name, SI; an effect's as `effect.key`."""
-    found: dict[str, float] = {**scene.mechanism, **scene.operation}
+    tables = {**scene.mechanism, **scene.operation}
+    found = {name: value for name, value in tables.items() if isinstance(value, float)}
     for effect, own in scene.effects.items():
         for key, value in own.model_dump().items():
             if isinstance(value, float | int):

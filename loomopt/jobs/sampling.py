@@ -179,6 +179,10 @@ class Sampler:
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme, signed=signed) for extreme in found]
 
+    def angle(self, extreme: Extreme) -> float:
+        """Return the crank angle of an extreme, rad."""
+        return float(self.cycle.angles(np.array([extreme.piece]), np.array([extreme.u]))[0])
+
     def peak(self, name: str, where: tuple[int, float] | None = None) -> float:
         """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
         return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)

@@ -12,6 +12,9 @@ from loomopt.jobs import (
     rapier_curves,
     rapier_design,
     rapier_program,
+    shedding_curves,
+    shedding_design,
+    shedding_program,
 )
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
@@ -73,6 +76,20 @@ TASKS = {
         sampler=rapier_design.sampler,
         curves=rapier_curves.curves,
         marks=rapier_curves.marks,
+    ),
+    "shedding": Task(
+        demand=shedding_program.demand,
+        program=shedding_program.program,
+        today=shedding_program.today,
+        design=shedding_design.design,
+        values=shedding_design.values,
+        tidy=shedding_design.tidy,
+        moves=shedding_design.moves,
+        wish=shedding_design.wish,
+        figures=shedding_design.figures,
+        sampler=shedding_design.sampler,
+        curves=shedding_curves.curves,
+        marks=shedding_curves.marks,
     ),
 }
 """Job name → its functions."""

@@ -174,3 +174,103 @@ sley_mu_min = { min = "60 deg" }
 # [targets.match]
 # table = "travel.csv"          # beside this file; columns: phi1 [deg],S [mm]
 """
+
+SHEDDING_TEMPLATE = """\
+# A shedding scene: a heald frame that a cam pushes down and a return spring pulls up. Cam angles count from the rise.
+# The frame is at 0 with the shed open upward (near dwell), at `travel` with it open downward (far dwell).
+# Change the numbers to those of your loom, then:
+#     loomopt show FILE            the scene as it was read
+#     loomopt solve FILE           the least spring that keeps the roller on the cam
+#
+# Every number is text with its unit: "31 mm", "1.22 in", "120 deg", "600 rpm", "37.7 kg", "8 N/mm", "35 N*s/m".
+# Decimal point, no comma; units are joined by * and /, powers are written ^2.
+
+[problem]
+name = "my-shedding"
+job = "shedding"
+title = "My heald frame on its cam"
+source = ""
+
+[operation]
+speed = "600 rpm"  # cam shaft
+N_min = "0 N"  # least cam force that counts as contact
+
+[mechanism]
+travel = "65.6 mm"  # of the heald frame
+law = "cycloidal"  # or harmonic, modified_sine, modified_trapezoid, polynomial_345, polynomial_4567,
+#                    polynomial_56789, gutman_13, freudenstein_13; table with law_table = "law.csv" (angle [deg],s [mm])
+rise = "120 deg"  # the four angles make a whole turn
+far_dwell = "60 deg"
+return = "120 deg"
+near_dwell = "60 deg"
+base_radius = "50 mm"  # of the curve of the roller's centre; these five for pressure angle, curvature and profile
+arm = "130 mm"  # pivot to roller
+centre_distance = "140 mm"  # pivot to cam shaft
+roller_radius = "20 mm"
+arm_swing = "12.4 deg"  # for the whole travel
+K1 = "8029.14 N/m"  # today's spring: both springs together
+X0 = "80 mm"  # its elongation with the shed open upward
+
+# Effects: one table for each that is on. --with NAME puts one on from [available], --without NAME takes one off.
+
+[effects.weight]
+G = "369.55 N"  # negative where the weight presses the roller on the cam
+
+[effects.warp_tension]
+T1 = "124.545 N"  # pull of the warp with the shed open upward
+T2 = "83.03 N"  # and downward
+shape = "linear"  # or step, or levels: known in the dwells only
+
+[effects.inertia]
+M = "37.68361265059934 kg"  # frame and what moves with it
+
+[available.damping]
+C = "35 N*s/m"  # viscous friction in the guides
+
+[available.dry_friction]
+F = "20 N"  # Coulomb friction in the guides; assumed
+
+[available.coil]
+wire = "6 mm"  # one spring: wire diameter
+diameter = "45 mm"  # mean coil diameter
+turns = "8"  # active turns
+initial_tension = "100 N"  # force that parts the turns
+springs = "2"  # how many share K1
+shear_modulus = "77.2 GPa"  # its steel
+elasticity = "203.4 GPa"
+density = "7850 kg/m^3"
+strength = "1974 MPa"  # tensile strength of 1 mm wire; it falls as wire^-strength_exponent
+strength_exponent = "0.108"
+shear_share = "0.5"  # share of the strength the body may carry
+bending_share = "0.75"  # and the hooks
+spring_length = "400 mm"  # space inside the hooks, shed open downward
+surge_ratio = "13"  # least surge frequency over that of the cam
+
+# Bounds: what may change, and how far. With `free = false` it stays until --free NAME; --free rise frees the angles.
+
+[bounds]
+K1 = { min = "0 N/m", max = "1000 kN/m" }
+X0 = { min = "0 mm", max = "80 mm" }  # space for the preload
+rise = { min = "90 deg", max = "150 deg", free = false }
+far_dwell = { min = "50 deg", max = "90 deg", free = false }
+return = { min = "90 deg", max = "150 deg", free = false }
+near_dwell = { min = "50 deg", max = "90 deg", free = false }
+wire = { min = "2 mm", max = "9.5 mm" }  # these wait for the effect coil
+diameter = { min = "10 mm", max = "80 mm" }
+turns = { min = "3", max = "40" }
+initial_tension = { min = "0 N", max = "1000 N" }
+
+# Limits: figures to keep, at least (min), at most (max) or both:
+#     contact_max, spring_force_max, spring_stretch, law_acceleration, pressure_angle_max, curvature_min, curvature_max;
+#     and with the effect coil: shear_stress, spring_mass.
+
+[limits]
+pressure_angle_max = { max = "45 deg" }
+
+# Targets: stiffness (the default), law, force, speed. Only law has values of its own.
+
+[targets.law]
+intervals = 16  # of the spline
+symmetric = false  # true asks s(u) + s(1 - u) = 1
+acceleration = 6.283185307179586  # largest |s''|; 2 pi is the cycloid's own
+"""

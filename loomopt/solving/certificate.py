@@ -295,7 +295,8 @@ class _Trial:
         """Return a binding limit with its multiplier in SI units of objective per limit."""
         weight = {**self.sampler.given.values, **self.sampler.figures}[limit.weight] if limit.weight else 1.0
         worth = abs(multiplier) * objective.scale / limit.scale * weight
-        if objective.power == 2:
-            worth /= 2 * self.sampler.figures[objective.figure]
+        if objective.power != 1:
+            figure = self.sampler.figures[objective.figure]
+            worth /= abs(objective.power * figure ** (objective.power - 1))
         side = limit.sign or (1 if multiplier > 0 else -1)
         return Binding(limit, side, objective, worth)

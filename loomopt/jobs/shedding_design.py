@@ -1,0 +1,103 @@
+"""Between the NLP's variables and the spring, cam and law a person reads."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from loomopt.jobs.numbers import full_name
+from loomopt.jobs.program import Move, Program, Wish
+from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.jobs.shedding import Shedding
+from loomopt.jobs.shedding_law import PREFIX, Spline
+from loomopt.jobs.shedding_pose import DWELLS
+from loomopt.jobs.shedding_program import CYCLE, bounds, named, numbers, today
+from loomopt.jobs.shedding_program import model as model_of
+from loomopt.jobs.shedding_reading import contact_speed
+from loomopt.jobs.shedding_tables import FIGURES, SEGMENTS, VARIABLES
+
+
+SAME = 1e-12
+"""Share of the largest |N| by which two least values are one: rise and return mirror each other."""
+
+
+def moves(program: Program) -> tuple[Move, ...]:
+    """Return the direction that may leave everything unchanged: the preload of a spring that is not needed."""
+    room = any(v.name == "X0" and v.lower < v.upper for v in program.variables)
+    return (Move("preload", ("X0",), "axis"),) if room else ()
+
+
+def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
+    """Return what the silent levels want of a move: the preload nearest today's, m."""
+    low, high = bounds(scene)["X0"]
+    return Wish({"X0": min(max(numbers(scene)["X0"], low), high)}, "least change from today")
+
+
+def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+    """Return the design, SI, of NLP variables: the spring, every other number that is freed, and a free law's knots."""
+    values = {**program.parameters, **x}
+    free = [v.name for v in program.variables if v.lower < v.upper and not v.name.startswith(PREFIX)]
+    found = {name: values[name] for name in (*VARIABLES, *(name for name in free if name not in VARIABLES))}
+    if set(SEGMENTS) & set(found):
+        found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
+    law = getattr(program.model, "law", None)
+    if isinstance(law, Spline) and set(law.names) & {v.name for v in program.variables}:
+        found |= {f"{PREFIX}{k}": float(value) for k, value in enumerate(law.accelerations(values))}
+    return found
+
+
+def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:
+    """Return the NLP's variables, SI, of a design."""
+    return program.completed({**program.parameters, **design})
+
+
+def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+    """Return NLP variables as they are."""
+    return dict(x)
+
+
+def model(scene: Any, design: Mapping[str, float]) -> Shedding:
+    """Return the frame of a design: with its own law where it has one."""
+    intervals = named(design)
+    return model_of(scene, Spline(intervals) if intervals else None)
+
+
+def values_of(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
+    """Return all numbers of a design, SI; a scene number it does not name stays the scene's."""
+    known = numbers(scene)
+    return known | {(name if name.startswith(PREFIX) else full_name(known, name)): v for name, v in design.items()}
+
+
+def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
+    """Return a design ready to be sampled."""
+    return Sampler(model(scene, design), values_of(scene, design))
+
+
+def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
+    """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
+    sampled = sampler(scene, design)
+    physics: Any = sampled.model
+    static = sampled.static
+    found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
+    arcs = [(0, float(dwell)) for dwell in DWELLS] if physics.is_level else [None]
+    found["contact_min"], found["contact_angle"] = _least(
+        [e for w in arcs for e in sampled.extremes("lift", w)], sampled
+    )
+    for name, quantity in CYCLE.items():
+        if quantity in physics.quantities:
+            found[name] = sampled.peak(quantity) * (-1 if quantity == "concavity" else 1)
+    found["contact_speed"] = None
+    if "inertia" in scene.effects and not physics.is_level:
+        speed = contact_speed(physics, values_of(scene, design), scene.operation["N_min"])
+        found["contact_speed"] = speed if math.isfinite(speed) else None
+    return found
+
+
+def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
+    """Return the least cam force, N, and the first cam angle where it is reached, rad."""
+    highest = max(extreme.height for extreme in found)
+    size = max(abs(extreme.value) for extreme in found)
+    alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
+    return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
+
+
+__all__ = ["design", "figures", "model", "moves", "sampler", "tidy", "today", "values", "values_of", "wish"]

@@ -1,0 +1,43 @@
+"""One sentence of what an optimum reached, and one of what today's spring does."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from loomopt.jobs import shedding_design
+from loomopt.units import show
+
+CLOSE = 1e-9
+"""Share of the largest cam force below which contact just holds."""
+
+
+def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
+    """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
+    size = {name: value or 0.0 for name, value in figures.items()}
+    stiffness = show(size["spring_force_max"] / (size["spring_stretch"] or math.inf), scene.unit("K1", "stiffness"), 9)
+    speed = show(size["contact_speed"], scene.unit("speed", "angular speed"), 7)
+    kept = "keeps the roller on the cam all round"
+    if "levels" in [getattr(own, "shape", "") for own in scene.effects.values()]:
+        kept = "keeps the roller on the cam in both dwells"
+    said = {
+        "stiffness": f"The least return spring that {kept} has {stiffness}.",
+        "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
+        "force": f"The least peak cam force is {size['contact_max']:.6g} N, with a return spring of {stiffness}.",
+        "speed": f"Today's spring {kept} up to {speed}.",
+    }[target]
+    return said if target == "speed" else f"{said} {today(scene)}".strip()
+
+
+def today(scene: Any) -> str:
+    """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
+    found = shedding_design.figures(scene, shedding_design.today(scene))
+    least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
+    wanted, angle = scene.operation["N_min"], math.degrees(found["contact_angle"] or 0.0)
+    spring = f"Today's spring ({show(scene.mechanism['K1'], scene.unit('K1', 'stiffness'), 9)})"
+    if least >= wanted - CLOSE * max(most, 1.0):
+        return f"{spring} holds: the cam force is never less than {least:.6g} N."
+    lost = f"the cam force would be {least:.6g} N at {angle:.4f} deg"
+    speed = found["contact_speed"]
+    if speed:
+        lost += f"; it holds up to {show(speed, scene.unit('speed', 'angular speed'), 7)}"
+    return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
