@@ -15,7 +15,6 @@ from loomopt.jobs.shedding_program import model as model_of
 from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_tables import FIGURES, SEGMENTS, VARIABLES
 
-
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
 
