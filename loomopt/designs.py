@@ -1,7 +1,7 @@
 """Designs from files: the JSON of a `design` object, or of a whole answer."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ from loomopt.scene_errors import refusal, unknown
 
 LARGEST_FILE = 1_000_000
 """Bytes; an answer has a few thousand."""
+LONGEST = 1000
+"""Numbers in a list."""
 LARGEST = 1e60
 """SI; fourth powers of it are still numbers."""
 _ALLOWED = "a finite number in SI units, not negative"
@@ -39,15 +41,43 @@ def read(path: Path, scene: Any) -> dict[str, float]:
     return checked(data, scene, origin)
 
 
+def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, Any]:
+    """Return a design with NAME_0, NAME_1 ... of each named list as one tuple."""
+    found: dict[str, Any] = dict(design)
+    for name in names:
+        members = {k: key for key in design if (k := _place(key, name)) is not None}
+        if members:
+            found[name] = tuple(found.pop(members[k]) for k in sorted(members))
+    return found
+
+
+def flat(design: Mapping[str, Any]) -> dict[str, float]:
+    """Return a design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
+    found: dict[str, float] = {}
+    for name, value in design.items():
+        found |= {f"{name}_{k}": v for k, v in enumerate(value)} if isinstance(value, list | tuple) else {name: value}
+    return found
+
+
+def _place(key: str, name: str) -> int | None:
+    number = key.removeprefix(f"{name}_")
+    return int(number) if number != key and number.isdigit() else None
+
+
 def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]:
     """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput."""
     kinds = _numbers(scene)
+    lists = {name: Quantity(kind) for name, kind in scene.job.lists.items()}
     if not isinstance(data, Mapping) or not data:
         known = ", ".join(scene.job.variables)
         raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
+    data = {name: value for name, value in data.items() if name not in lists} | _listed(data, lists, origin)
     for name, value in data.items():
+        listed = next((lists[of] for of in lists if _place(str(name), of) is not None), None)
+        if listed:
+            kinds[name] = listed
         if name not in kinds:
-            raise unknown("design variable", str(name), list(kinds), origin, f"design.{name}")
+            raise unknown("design variable", str(name), [*kinds, *lists], origin, f"design.{name}")
         number = not isinstance(value, bool) and isinstance(value, int | float) and abs(value) < LARGEST
         if not number or not _fits(kinds[name], value):
             allowed = f"{_ALLOWED}; {kinds[name].range}" if number else _ALLOWED
@@ -57,6 +87,18 @@ def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]
     if fault:
         raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy="Correct its lengths")
     return design
+
+
+def _listed(data: Mapping[str, Any], lists: Mapping[str, Quantity], origin: str) -> dict[str, Any]:
+    """Return the numbers of a design's lists, each under a name of its own. Raises BadInput."""
+    found: dict[str, Any] = {}
+    for name in lists:
+        values = data.get(name, [])
+        if not isinstance(values, list | tuple) or len(values) > LONGEST:
+            allowed = f"a list of up to {LONGEST} numbers"
+            raise refusal("it is not such a list", origin, f"design.{name}", allowed=allowed, remedy=_GIVE)
+        found |= {f"{name}_{k}": value for k, value in enumerate(values)}
+    return found
 
 
 def _numbers(scene: Any) -> dict[str, Quantity]:

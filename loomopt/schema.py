@@ -128,6 +128,7 @@ class Job:
     headline(scene, target, figures): one sentence that says what an optimum of the target is worth.
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
     groups: name → bounds that --free frees together.
+    lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
     """
 
     name: str
@@ -146,3 +147,4 @@ class Job:
     needs: tuple[str, ...] = field(default=())
     margins: Mapping[str, str] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lists: Mapping[str, str] = field(default_factory=dict)

@@ -4,6 +4,7 @@ import datetime
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from loomopt import designs
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -44,7 +45,7 @@ def rows(solution: Evaluation, scene: Any, before: Evaluation | None = None) -> 
     limits = {limit.name: limit for limit in solution.limits}
     found = []
     for name, value in {**solution.design, **solution.figures}.items():
-        if value is None or name == "change":
+        if value is None or name == "change" or name in scene.job.lists:
             continue
         unit = words.unit(name)
         size, limit = factor(unit), limits.get(name)
@@ -61,7 +62,7 @@ def curves(scene: Any, design: Mapping[str, float]) -> "pd.DataFrame":
     import pandas as pd
 
     task = TASKS[scene.job.name]
-    full = {**task.today(scene), **design}
+    full = {**task.today(scene), **designs.flat(design)}
     frame = pd.DataFrame(task.curves(scene, full))
     frame.attrs.update(provenance(scene))
     return frame

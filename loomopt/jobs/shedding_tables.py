@@ -172,4 +172,5 @@ SCHEMA = Job(
     template=SHEDDING_TEMPLATE,
     margins=MARGINS,
     groups={"rise": SEGMENTS},
+    lists={"law": "number"},
 )

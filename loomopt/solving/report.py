@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from loomopt import designs
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import Task
@@ -15,15 +16,14 @@ def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, fl
     """Return a design's figures and limits, each limit judged from the figures alone."""
     figures = task.figures(scene, design)
     words = Words(scene)
-    units = {name: words.si(name.rpartition(".")[2]) for name in (*design, *figures)}
     named = {name.rpartition(".")[2]: value for name, value in design.items()}
-    units = {name.rpartition(".")[2]: unit for name, unit in units.items()}
+    shown = designs.packed(named, scene.job.lists)
     return Evaluation(
         problem=scene.name,
         effects=tuple(scene.effects),
-        design=named,
+        design=shown,
         figures=figures,
-        units=units,
+        units={name: words.si(name) for name in (*shown, *figures)},
         limits=_findings(program, figures, named, task.sampler(scene, design)),
     )
 

@@ -75,7 +75,7 @@ class Evaluation:
 
     problem: str
     effects: tuple[str, ...]
-    design: Mapping[str, float]
+    design: Mapping[str, Any]
     figures: Mapping[str, float | None]
     units: Mapping[str, str]
     limits: tuple[Finding, ...]

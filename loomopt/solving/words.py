@@ -33,6 +33,8 @@ class Words:
             return str(job.variables[name])
         if name in job.figures:
             return str(job.figures[name].kind)
+        if name in job.lists:
+            return str(job.lists[name])
         if name in job.margins:
             return str(job.margins[name])
         models = [job.operation, job.mechanism, *(type(own) for own in self.scene.effects.values())]

@@ -57,11 +57,17 @@ def reference(found: Solution, scene: Any) -> "pd.DataFrame":
 
     columns: dict[str, Any] = {"status": found.status}
     figures = {**found.figures, **found.design}
+    lists = {
+        f"{name}_{k} [{found.units[name]}]": v
+        for name in scene.job.lists
+        for k, v in enumerate(found.design.get(name, ()))
+    }
     if found.status == "infeasible":
         figures = {}
         columns["clash"] = " | ".join(found.clash)
         columns |= {f"needed {r.limit} {r.side}{' alone' if r.alone else ''} [SI]": r.needed for r in found.relaxation}
-    columns |= {f"{k} [{found.units[k]}]": value for k, value in figures.items() if value is not None}
+    single = {k: value for k, value in figures.items() if value is not None and k not in scene.job.lists}
+    columns |= {f"{k} [{found.units[k]}]": value for k, value in single.items()} | lists
     if found.certificate:
         columns["binding"] = " | ".join(sorted(f"{price.limit} {price.side}" for price in found.binding))
         columns["objectives"] = " | ".join(level.objective for level in found.certificate.levels)
