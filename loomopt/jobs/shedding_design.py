@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt.jobs.numbers import full_name
-from loomopt.jobs.program import Move, Program, Wish
+from loomopt.jobs.program import Move, Program, Variable, Wish
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.jobs.shedding import Shedding
 from loomopt.jobs.shedding_law import PREFIX, Spline
@@ -15,6 +15,8 @@ from loomopt.jobs.shedding_program import model as model_of
 from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_tables import FIGURES, SEGMENTS, VARIABLES
 
+GAVE_WAY = 1e-7
+"""A number that a target keeps has given way when it is off by this, in its natural size."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
 
@@ -34,7 +36,7 @@ def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
 def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the design, SI, of NLP variables: the spring, every other number that is freed, and a free law's knots."""
     values = {**program.parameters, **x}
-    free = [v.name for v in program.variables if v.lower < v.upper and not v.name.startswith(PREFIX)]
+    free = [v.name for v in program.variables if _chosen(v, values[v.name]) and not v.name.startswith(PREFIX)]
     found = {name: values[name] for name in (*VARIABLES, *(name for name in free if name not in VARIABLES))}
     if set(SEGMENTS) & set(found):
         found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
@@ -42,6 +44,11 @@ def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     if isinstance(law, Spline) and set(law.names) & {v.name for v in program.variables}:
         found |= {f"{PREFIX}{k}": float(value) for k, value in enumerate(law.accelerations(values))}
     return found
+
+
+def _chosen(variable: Variable, value: float) -> bool:
+    """Say whether a variable is a choice: it has room, or it had to give way."""
+    return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
 
 
 def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:

@@ -4,7 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from loomopt.jobs import shedding_design
+from loomopt.effects.coil import INDEX
+from loomopt.jobs import shedding_design, shedding_program
+from loomopt.maths import FLOAT
+from loomopt.mechanisms.tension_spring import Coil, strength
 from loomopt.units import show
 
 CLOSE = 1e-9
@@ -41,3 +44,23 @@ def today(scene: Any) -> str:
     if speed:
         lost += f"; it holds up to {show(speed, scene.unit('speed', 'angular speed'), 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
+
+
+def explain(scene: Any) -> str:
+    """Say why coils that surge late enough are stressed too much, and what helps; "" without coils."""
+    own = scene.effects.get("coil")
+    if own is None:
+        return ""
+    known, limited = shedding_program.numbers(scene), shedding_program.bounds(scene)
+    stretch = limited["X0"][1] + known["travel"]
+    thinnest = limited.get("coil.wire", (own.wire, own.wire))[0]
+    slimmest = Coil(1.0, INDEX[1], 1.0, own.shear_modulus, own.density, 0.0, own.elasticity)
+    surge = own.surge_ratio * known["speed"] / (2 * math.pi)
+    least = 2 * slimmest.wahl * stretch * surge * math.sqrt(2 * own.shear_modulus * own.density)
+    most = own.shear_share * strength(FLOAT, thinnest, own.strength, own.strength_exponent)
+    return (
+        f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
+        f"{1e3 * stretch:.4g} mm carry at least {1e-6 * least:.4g} MPa of shear, whatever their size "
+        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {1e-6 * most:.4g} MPa at most. "
+        "Less preload asks for a stiffer spring. A lower speed, less travel or a softer cam law (target law) helps."
+    )

@@ -14,12 +14,17 @@ from loomopt.jobs import (
     rapier_program,
     shedding_curves,
     shedding_design,
+    shedding_headline,
     shedding_program,
 )
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
 
 Numbers = Mapping[str, float]
+
+
+def _nothing(scene: Any) -> str:
+    return ""
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,7 @@ class Task:
     tidy(program, x): x without what is only rounding. moves(program), wish(scene, move, x): the silent levels.
     figures(scene, design): every figure. sampler(scene, design): the design's cycle.
     curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
+    explain(scene): what physics says of why no design is admissible; "" where it says nothing.
     """
 
     demand: Callable[[Any, str], None]
@@ -46,6 +52,7 @@ class Task:
     sampler: Callable[[Any, Numbers], Sampler]
     curves: Callable[[Any, Numbers], dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
+    explain: Callable[[Any], str] = _nothing
 
 
 TASKS = {
@@ -90,6 +97,7 @@ TASKS = {
         sampler=shedding_design.sampler,
         curves=shedding_curves.curves,
         marks=shedding_curves.marks,
+        explain=shedding_headline.explain,
     ),
 }
 """Job name → its functions."""

@@ -110,6 +110,7 @@ def without_optimum(
     found: Clash,
     solver: Mapping[str, Any],
     before: Evaluation,
+    explanation: str = "",
 ) -> Solution:
     """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
     if found.relaxations:
@@ -118,8 +119,8 @@ def without_optimum(
         single = f" By itself, any one of these would do: {'; '.join(alone)}." if alone else ""
         message = (
             f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
-            f"The least relaxation that helps: {together}.{single}"
-        )
+            f"The least relaxation that helps: {together}.{single} {explanation}"
+        ).strip()
     else:
         status = str(solver["status"])
         message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts (--starts 20).')}"
@@ -130,6 +131,7 @@ def without_optimum(
         message=message,
         relaxation=found.relaxations,
         clash=found.limits,
+        explanation=explanation if found.relaxations else "",
         solver=solver,
         before=before,
     )

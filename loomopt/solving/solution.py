@@ -113,6 +113,8 @@ class Solution(Evaluation):
     relaxation: tuple[Relaxation, ...] = ()
     clash: tuple[str, ...] = ()
     """Limits that cannot all be kept, as phrases."""
+    explanation: str = ""
+    """What physics says of why no design is admissible."""
     solver: Mapping[str, Any] = field(default_factory=dict)
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
