@@ -116,10 +116,10 @@ def test_the_packaged_scenes_are_what_is_printed():
             pytest.approx(angle, rel=1e-15) for angle in (120, 60, 120, 60)
         ]
         assert scene.effects["weight"].G == 369.55
-        assert scene.effects["warp_tension"].T1 == pytest.approx(0.06 * ENDS, rel=1e-15)
-        assert scene.effects["warp_tension"].T2 == pytest.approx(0.04 * ENDS, rel=1e-15)
+        assert pytest.approx(0.06 * ENDS, rel=1e-15) == scene.effects["warp_tension"].T1
+        assert pytest.approx(0.04 * ENDS, rel=1e-15) == scene.effects["warp_tension"].T2
     for scene in (MOVING, SHORT):
-        assert scene.effects["inertia"].M == pytest.approx(369.55 / 9.80665, rel=1e-15)
+        assert pytest.approx(369.55 / 9.80665, rel=1e-15) == scene.effects["inertia"].M
         assert scene.operation["speed"] == pytest.approx(20 * math.pi, rel=1e-15)
 
 
