@@ -5,6 +5,7 @@ must give K1, and keep what material, winding and space allow.
 """
 
 from collections.abc import Callable
+from typing import Literal
 
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms.tension_spring import Coil, strength
@@ -28,7 +29,7 @@ class Own(Table):
     shear_modulus, elasticity, Pa, density, kg/m³: its steel; strength: of 1 mm wire, Pa, falls as d^−strength_exponent.
     shear_share, bending_share: shares of the strength that body and hooks may carry; spring_length: space inside the
     hooks with the shed fully open, m; surge_ratio: least surge frequency over the cam's; hook_factor: bend radius of
-    the hooks over half the coil diameter.
+    the hooks over half the coil diameter; sizes: whether a free wire is one of the preferred sizes, or any.
     """
 
     springs: PositiveNumber = 2.0
@@ -46,6 +47,7 @@ class Own(Table):
     spring_length: PositiveLength
     surge_ratio: PositiveNumber = 13.0
     hook_factor: PositiveNumber = 1.0
+    sizes: Literal["preferred", "any"] = "preferred"
 
 
 def coil(own: Values) -> Coil:

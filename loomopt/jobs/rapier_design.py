@@ -10,7 +10,7 @@ from loomopt.jobs.rapier import SLEY
 from loomopt.jobs.rapier_program import bounds, jerk_mean, match_mean, today
 from loomopt.jobs.rapier_program import model as model_of
 from loomopt.jobs.rapier_reading import read
-from loomopt.jobs.rapier_tables import FIGURES, VARIABLES
+from loomopt.jobs.rapier_tables import FIGURES, STROKE, VARIABLES
 from loomopt.jobs.sampling import Sampler
 
 FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
@@ -30,7 +30,8 @@ def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
 
 def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""
-    own = {v.name for v in program.variables if v.lower < v.upper} - {"phi_stroke", "dwell"}
+    fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0} - set(STROKE)
+    own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
     values = {**program.parameters, **x}
     return {name: values[name] for name in (*VARIABLES, *(name for name in x if name in own and name not in VARIABLES))}
 

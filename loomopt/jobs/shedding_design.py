@@ -22,21 +22,25 @@ SAME = 1e-12
 
 
 def moves(program: Program) -> tuple[Move, ...]:
-    """Return the direction that may leave everything unchanged: the preload of a spring that is not needed."""
-    room = any(v.name == "X0" and v.lower < v.upper for v in program.variables)
-    return (Move("preload", ("X0",), "axis"),) if room else ()
+    """Return what may leave everything unchanged: a preload that is not needed, and the coils' initial tension."""
+    room = {v.name for v in program.variables if v.lower < v.upper}
+    axes = {"preload": "X0", "initial tension": "coil.initial_tension"}
+    return tuple(Move(name, (along,), "axis") for name, along in axes.items() if along in room)
 
 
 def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
-    """Return what the silent levels want of a move: the preload nearest today's, m."""
-    low, high = bounds(scene)["X0"]
-    return Wish({"X0": min(max(numbers(scene)["X0"], low), high)}, "least change from today")
+    """Return what the silent levels want of a move: the value nearest today's, SI."""
+    (name,) = move.along
+    low, high = bounds(scene)[name]
+    return Wish({name: min(max(numbers(scene)[name], low), high)}, "least change from today")
 
 
 def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the design, SI, of NLP variables: the spring, every other number that is freed, and a free law's knots."""
     values = {**program.parameters, **x}
-    free = [v.name for v in program.variables if _chosen(v, values[v.name]) and not v.name.startswith(PREFIX)]
+    fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0}
+    chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
+    free = [name for name in chosen if not name.startswith(PREFIX)]
     found = {name: values[name] for name in (*VARIABLES, *(name for name in free if name not in VARIABLES))}
     if set(SEGMENTS) & set(found):
         found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])

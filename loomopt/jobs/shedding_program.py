@@ -16,6 +16,7 @@ from loomopt.jobs.shedding_pose import DWELLS, RETURN_SPRING
 from loomopt.jobs.shedding_sizes import Sizes
 from loomopt.jobs.shedding_tables import SEGMENTS, VARIABLES
 from loomopt.mechanisms import cam_spline
+from loomopt.mechanisms.tension_spring import WIRES
 from loomopt.schema import Check, Load
 
 DYNAMIC = ("inertia", "damping", "coil")
@@ -68,6 +69,14 @@ def today(scene: Any) -> dict[str, float]:
 def bounds(scene: Any) -> dict[str, tuple[float, float]]:
     """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
     return scene_numbers.bounds(scene, numbers(scene), VARIABLES)
+
+
+def sizes(scene: Any) -> dict[str, tuple[float, ...]]:
+    """Return the wire diameters that are sold, m, where the coils' wire is free and must be one of them."""
+    own = scene.effects.get("coil")
+    bound = scene.bounds.get("wire")
+    free = own is not None and bound is not None and bound.free and bound.min < bound.max
+    return {"wire": WIRES} if free and own.sizes == "preferred" else {}
 
 
 def demand(scene: Any, target: str) -> None:
@@ -132,6 +141,7 @@ class _Task:
         ends["X0"] = self.limited["X0"]
         ends["K1"] = self.limited["K1"] if "K1" in scene.bounds else (0.0, math.inf)
         if self.target == "speed":
+            ends |= {name: (known[name],) * 2 for name in ends if name.startswith("coil.")}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.coiled else {"K1": (known["K1"],) * 2})
             ends["speed"] = self.limited.get("speed", (1e-3 * known["speed"], math.inf))
         for name in self._kept():

@@ -1,6 +1,6 @@
 """How the solver speaks to a job: one record of functions each, so that it knows no mechanism by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,10 @@ def _nothing(scene: Any) -> str:
     return ""
 
 
+def _any(scene: Any) -> dict[str, Sequence[float]]:
+    return {}
+
+
 @dataclass(frozen=True)
 class Task:
     """A job at work; all numbers SI.
@@ -37,6 +41,7 @@ class Task:
     tidy(program, x): x without what is only rounding. moves(program), wish(scene, move, x): the silent levels.
     figures(scene, design): every figure. sampler(scene, design): the design's cycle.
     curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
+    sizes(scene): the freed variables that come in sizes only → those sold, ascending.
     explain(scene): what physics says of why no design is admissible; "" where it says nothing.
     """
 
@@ -53,6 +58,7 @@ class Task:
     curves: Callable[[Any, Numbers], dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
     explain: Callable[[Any], str] = _nothing
+    sizes: Callable[[Any], Mapping[str, Sequence[float]]] = _any
 
 
 TASKS = {
@@ -98,6 +104,7 @@ TASKS = {
         curves=shedding_curves.curves,
         marks=shedding_curves.marks,
         explain=shedding_headline.explain,
+        sizes=shedding_program.sizes,
     ),
 }
 """Job name → its functions."""

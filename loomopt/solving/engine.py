@@ -13,6 +13,7 @@ from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings, sampler_at
 from loomopt.solving import report
+from loomopt.solving.catalogue import fitted
 from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, Certificate, certify
 from loomopt.solving.settle import settle
 from loomopt.solving.solution import Evaluation, Solution
@@ -70,6 +71,9 @@ def solve(
     same = near is not None and near.point is not None and near.point.structure == program.structure
     search.run(starts, near.point if near and same else None, on_start)
     answer = search.answer(target)
+    for name, sizes in task.sizes(scene).items() if answer.status == "optimal" else ():
+        options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
+        answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
     return replace(answer, time={**times, "certify_s": search.certified, "total_s": total})

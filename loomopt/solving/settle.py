@@ -32,9 +32,10 @@ def settle(
         if wanted is None or not _flat(program, x, wanted.goal):
             continue
         share = _reach(program, x, wanted.goal)
-        if share > 0.0 and any(
-            abs(wanted.goal[v.name] - x[v.name]) > NOTICED * v.scale for v in program.variables if v.name in wanted.goal
-        ):
+        moved = [
+            share * abs(wanted.goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in wanted.goal
+        ]
+        if max(moved, default=0.0) > NOTICED:
             settled.append(f"{move.name}: {wanted.reason}")
         x = _part_way(x, wanted.goal, share)
     return dict(x), tuple(settled)

@@ -19,11 +19,11 @@ def solution(answer: Solution, scene: Any) -> list[str | Grid]:
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]
-        parts += [answer.explanation] if answer.explanation else []
     elif answer.status == "optimal":
         parts.append(scene.job.headline(scene, answer.target, answer.figures))
     else:
         parts.append(answer.message)
+    parts += [answer.explanation] if answer.explanation else []
     parts.append(comparison(answer, scene, answer.before, heading))
     if answer.certificate:
         parts.append(_binding(answer))

@@ -1,0 +1,64 @@
+"""From a continuous optimum to sizes that are sold: solve again with each neighbour, keep the best."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from loomopt.quantities import show
+from loomopt.solving.solution import Solution
+
+FARTHEST = 4
+"""Sizes tried on either side before there is none."""
+SAME = 1e-9
+"""Share of an objective by which two sizes are equally good."""
+
+Solve = Callable[[Any], Solution]
+
+
+def fitted(scene: Any, ideal: Solution, name: str, sizes: Sequence[float], solve: Solve) -> Solution:
+    """Return the best optimum with `name` at one of `sizes` (SI, ascending), `ideal` itself where it is one already.
+
+    solve(scene): the answer of a changed scene. On either side the nearest size with an admissible design is enough;
+    where there is none, ideal is returned with a message that says so, as no answer to build.
+    """
+    value = ideal.design[name]
+    if any(abs(value - size) <= SAME * size for size in sizes):
+        return ideal
+    unit = scene.unit(name, "length")
+    found, tried = [], []
+    for side in (reversed([size for size in sizes if size < value]), (size for size in sizes if size > value)):
+        for size, answer in _until_admissible(scene, name, side, solve):
+            tried.append(show(size, unit))
+            found += [answer] if answer.status == "optimal" else []
+    said = f"Any size would have {name} {show(value, unit)}"
+    if not found:
+        message = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'}). "
+        return replace(ideal, status="infeasible", message=f"{message}{said}.", certificate=None, binding=())
+    best = found[0]
+    for answer in found[1:]:
+        best = answer if _better(answer, best) else best
+    first = next(iter(best.certificate.levels)).objective if best.certificate else ""
+    figure = f" and {first} {ideal.figures[first]:.9g}" if first and ideal.figures.get(first) is not None else ""
+    explanation = f"{said}{figure} (SI); of those sold, tried {', '.join(tried)}."
+    return replace(best, message=f"{best.message} {explanation}", explanation=explanation)
+
+
+def _until_admissible(scene: Any, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[tuple[float, Solution]]:
+    """Yield sizes with their answers, ending with the first that is optimal."""
+    bound = scene.bounds[name]
+    for _, size in zip(range(FARTHEST), sizes, strict=False):
+        if not bound.min <= size <= bound.max:
+            return
+        answer = solve(scene.set(f"bounds.{name}", f"{size!r} m"))
+        yield size, answer
+        if answer.status == "optimal":
+            return
+
+
+def _better(one: Solution, other: Solution) -> bool:
+    """Say whether one answer's objectives are less, level by level."""
+    for level in one.certificate.levels if one.certificate else ():
+        a, b = one.figures[level.objective] or 0.0, other.figures[level.objective] or 0.0
+        if abs(a - b) > SAME * max(abs(a), abs(b)):
+            return a < b
+    return False
