@@ -1,4 +1,4 @@
-"""The number systems one formula runs in: float, NumPy arrays, CasADi symbols, mpmath digits, SymPy expressions.
+"""The number systems one formula runs in: float, NumPy arrays, CasADi symbols, mpmath digits, SymPy, Arb's balls.
 
 A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
 integers, so it is written once. Each system is imported only when it is asked for.
@@ -79,6 +79,39 @@ def mpmath(digits: int = 40) -> Maths:
     mp = importlib.import_module("mpmath").MPContext()
     mp.dps = digits
     return Maths("mpmath", mp.sin, mp.cos, mp.sqrt, mp.atan2, +mp.pi, mp.mpf, _chosen)
+
+
+ORDER = 3
+"""Terms of a truncated Taylor series over balls: value, slope, half the curvature."""
+
+
+@functools.cache
+def balls() -> Maths:
+    """Arb's balls, and truncated Taylor series of them: every result encloses the true one.
+
+    atan2 is of balls only: there is no series of it.
+    """
+    flint = importlib.import_module("flint")
+
+    def atan2(y: Number, x: Number) -> Number:
+        return flint.arb.atan2(flint.arb(y), flint.arb(x))
+
+    return Maths(
+        "balls",
+        lambda x: x.sin(),
+        lambda x: x.cos(),
+        lambda x: x.sqrt(),
+        atan2,
+        flint.arb.pi(),
+        flint.arb,
+        lambda place, values: values[int(float(place))],
+    )
+
+
+def ball_series(centre: float, half: float) -> Number:
+    """Return the series of a variable itself around the ball centre ± half."""
+    flint = importlib.import_module("flint")
+    return flint.arb_series([flint.arb(centre, half), 1], ORDER)
 
 
 @functools.cache

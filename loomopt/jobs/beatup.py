@@ -71,6 +71,11 @@ class Beatup:
         """No quantity: magnitudes count."""
         return frozenset()
 
+    @property
+    def bounded(self) -> frozenset[str]:
+        """None yet."""
+        return frozenset()
+
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])

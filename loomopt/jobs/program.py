@@ -53,6 +53,10 @@ class Model(Protocol):
         """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
 
     @property
+    def bounded(self) -> frozenset[str]:
+        """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
+
+    @property
     def integrals(self) -> tuple[Integral, ...]:
         """The means over part of the cycle this model knows."""
 

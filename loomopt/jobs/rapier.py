@@ -111,6 +111,11 @@ class Rapier:
         """No quantity: magnitudes count."""
         return frozenset()
 
+    @property
+    def bounded(self) -> frozenset[str]:
+        """None yet."""
+        return frozenset()
+
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers, the sley's stand, and the driving link's direction at front dead centre."""
         dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})

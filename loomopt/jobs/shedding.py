@@ -84,6 +84,11 @@ class Shedding:
         return frozenset(("lift", "cam_force", "curvature", "concavity"))
 
     @property
+    def bounded(self) -> frozenset[str]:
+        """The cam force from below and from above, and the law's acceleration."""
+        return frozenset(("lift", "cam_force", "law_acceleration"))
+
+    @property
     def integrals(self) -> tuple[Integral, ...]:
         """No means."""
         return ()

@@ -12,6 +12,7 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Limit, Objective, Program
 from loomopt.jobs.sampling import Sampler
+from loomopt.solving.bounded import CycleRow, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.nnls import nnls
 
@@ -143,6 +144,10 @@ class _Trial:
         violation = self._between_points()
         if not violation <= self.accuracy:
             reasons.append(f"a whole-cycle value is exceeded by {violation:.2g} between refined points")
+        values = {**self.program.parameters, **self.x}
+        bound = judged(self.sampler, values, self._cycle_rows(), self.accuracy)
+        if bound == "violated":
+            reasons.append("a whole-cycle value is exceeded somewhere between refined points")
         levels = []
         for place, objective in enumerate(self.program.objectives):
             if self.settled_alone:
@@ -166,17 +171,21 @@ class _Trial:
             self.minimum,
             self.unique,
             self._binding(),
+            by="bounded" if bound == "proven" else "refined",
             correction=self.correction,
         )
 
+    def _cycle_rows(self) -> list[CycleRow]:
+        """Return each whole-cycle quantity that counts, with its natural size and the pieces it counts on."""
+        found: list[CycleRow] = [(o.row, o.scale, None) for o in self.program.objectives if o.form == "peak"]
+        found += [(limit.row, limit.scale, limit.where) for limit in self.program.limits if limit.family == "cycle"]
+        return list(dict.fromkeys(found))
+
     def _between_points(self) -> float:
         """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
-        rows: list[tuple[str, float, tuple[int, float] | None]]
-        rows = [(o.row, o.scale, None) for o in self.program.objectives if o.form == "peak"]
-        rows += [(limit.row, limit.scale, limit.where) for limit in self.program.limits if limit.family == "cycle"]
         pieces, u = self.sampler.grid(DENSE)
         worst = 0.0
-        for name, scale, where in dict.fromkeys(rows):
+        for name, scale, where in self._cycle_rows():
             on = np.ones(len(u), dtype=bool)
             if where:
                 on = self.sampler.cycle.switches[pieces, where[0]] == where[1]

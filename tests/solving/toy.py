@@ -19,7 +19,7 @@ class Toy:
     loads = ()
     switched = ()
     integrals = ()
-    signed = frozenset()
+    signed = bounded = frozenset()
 
     @property
     def key(self):

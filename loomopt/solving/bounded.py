@@ -1,0 +1,104 @@
+"""A bound between all points: whole-cycle rows proven on boxes of crank angle, by truncated Taylor series over balls.
+
+On a box of half-width r around c, f(c + h) = f(c) + f'(c) h + k h² with k enclosed over the whole box. Where the
+bound is too coarse the box is halved. The formulas are the model's own, run in Arb's ball arithmetic: rounding is
+inside the balls.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from loomopt import maths
+from loomopt.jobs.sampling import Sampler
+
+MOST_BOXES = 20_000
+
+
+CycleRow = tuple[str, float, tuple[int, float] | None]
+"""A whole-cycle quantity, its natural size, and the pieces where it counts."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed."""
+
+    status: str
+    boxes: int
+    angle: float | None = None
+
+
+class Boxes:
+    """One design, ready to be bounded: its numbers as balls."""
+
+    def __init__(self, sampler: Sampler, values: Mapping[str, float]) -> None:
+        self.sampler, self.model = sampler, sampler.model
+        system = maths.balls()
+        self.maths = system
+        exact = {name: system.number(value) for name, value in {**values, **sampler.hints}.items()}
+        self.given = self.model.given(system, exact)
+        corners = [corner for of_load in self.model.corners(system, self.given) for corner in of_load]
+        turns = [2 * system.pi * turn + corners[index] for index, turn in sampler.cycle.order]
+        self.starts = [*turns, turns[0] + 2 * system.pi] if turns else [system.number(0.0), 2 * system.pi]
+
+    def bound(self, name: str, sign: float, limit: float, where: tuple[int, float] | None = None) -> Bound:
+        """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
+        cycle, used = self.sampler.cycle, 0
+        for piece in range(cycle.pieces):
+            if where and cycle.switches[piece, where[0]] != where[1]:
+                continue
+            boxes = [(0.0, 1.0)]
+            while boxes:
+                low, high = boxes.pop()
+                used += 1
+                holds = self._judge(name, sign, limit, piece, (low + high) / 2, (high - low) / 2)
+                if holds is False:
+                    middle = (low + high) / 2
+                    angle = cycle.starts[piece] * (1 - middle) + cycle.starts[piece + 1] * middle
+                    return Bound("violated", used, float(angle))
+                if holds is None:
+                    if used >= MOST_BOXES:
+                        return Bound("undecided", used)
+                    boxes += [((low + high) / 2, high), (low, (low + high) / 2)]
+        return Bound("proven", used)
+
+    def _judge(self, name: str, sign: float, limit: float, piece: int, centre: float, half: float) -> bool | None:
+        """Return True where the box keeps the limit, False where its centre breaks it, None where that is open."""
+        here = self._series(name, piece, centre, 0.0)
+        if sign * here[0] > limit:
+            return False
+        slope, bend = sign * here[1], sign * self._series(name, piece, centre, half)[2]
+        rise = abs(slope).upper() * half
+        if bend < 0:
+            # The parabola's own top, wherever it lies: what touches its bound from below is proven in a wide box.
+            rise = min(rise, (slope**2 / (4 * abs(bend))).upper(), key=float)
+            within = sign * here[0] + rise <= limit
+        else:
+            within = sign * here[0] + rise + bend.upper() * half**2 <= limit
+        return True if within else None
+
+    def _series(self, name: str, piece: int, centre: float, half: float) -> Any:
+        """Return a quantity's Taylor series in u, to second order, around a ball of u on a piece."""
+        u = maths.ball_series(centre, half)
+        begin, end = self.starts[piece : piece + 2]
+        angle = begin + (end - begin) * u
+        switches = [float(switch) for switch in self.sampler.cycle.switches[piece]]
+        value = self.model.quantity(self.maths, self.given, name, angle, switches)
+        return maths.ball_series(0.0, 0.0) * 0 + value
+
+
+def judged(sampler: Sampler, values: Mapping[str, float], rows: Sequence[CycleRow], accuracy: float) -> str:
+    """Return "proven" where boxes bound the refined peak of every row, "violated" where one is exceeded.
+
+    accuracy: what a peak may be exceeded by, in the row's natural size. "undecided" where boxes run out, and where a
+    formula does not run on balls.
+    """
+    if not rows or not {name for name, _, _ in rows} <= sampler.model.bounded:
+        return "undecided"
+    boxes = Boxes(sampler, values)
+    found = []
+    for name, scale, where in rows:
+        peak = sampler.peak(name, where) + accuracy * scale
+        signs = (1.0,) if name in sampler.model.signed else (1.0, -1.0)
+        found += [boxes.bound(name, sign, peak, where).status for sign in signs]
+    return next((status for status in ("violated", "undecided") if status in found), "proven")
