@@ -345,3 +345,14 @@ def test_a_follower_is_refused_exactly_when_its_triangle_does_not_close(arm, cen
         assert 0 < follower.start_angle(maths.FLOAT) < math.pi
     elif gap < -1e-12:
         assert "the roller cannot" in fault(follower)
+
+
+def test_a_follower_that_only_just_closes_is_refused_too():
+    """Folded, stretched and stretched at the end of its swing, in lengths that floats hold exactly."""
+    follower = Follower(0.25, 0.5, 0.5, 0.125, 1.0)
+    assert fault(follower) == ""
+    assert "so near" in fault(dataclasses.replace(follower, base_radius=0.25))
+    assert "so far" in fault(dataclasses.replace(follower, base_radius=0.75))
+    rest = math.pi - follower.start_angle(maths.FLOAT)
+    assert follower.start_angle(maths.FLOAT) + rest == math.pi
+    assert "below 180 deg" in fault(dataclasses.replace(follower, arm_swing=rest))
