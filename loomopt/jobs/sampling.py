@@ -174,7 +174,7 @@ class Sampler:
         around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
         vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
         refined = sign * self.at(name, piece, vertex)
-        better = refined >= sampled
+        better = refined > sampled
         best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme, signed=signed) for extreme in found]

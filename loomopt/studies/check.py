@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt import tables
 from loomopt.errors import BadInput
 from loomopt.jobs import load
+from loomopt.jobs.tasks import TASKS
 from loomopt.packaged import problem_names, results_path
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
@@ -17,10 +18,12 @@ from loomopt.solving.solution import Solution
 if TYPE_CHECKING:
     import pandas as pd
 
-LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0}
+LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""
+LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
+"""Figures that another of the same unit, which may be zero, is measured against."""
 OBJECTIVE, DESIGN = 1e-8, 1e-6
-"""Allowed differences, relative to the value (to the peak torque where a torque is zero)."""
+"""Allowed differences, relative to the value (to the largest of its kind where it is zero)."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +48,22 @@ def check(problems: Iterable[str] = (), folder: Path | None = None) -> Iterable[
             raise BadInput(f"{name} is not a packaged scene", value=name, allowed=", ".join(known), remedy="Name one.")
     for name in names:
         scene = load(name)
-        for target in scene.job.targets:
+        for target in served(scene):
             found = engine.solve(scene, target)
             path = (folder or results_path()) / f"{name}.{target}.csv"
             yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
+
+
+def served(scene: Any) -> list[str]:
+    """Return the targets that a scene has what they need for."""
+    found = []
+    for target in scene.job.targets:
+        try:
+            TASKS[scene.job.name].demand(scene, target)
+        except BadInput:
+            continue
+        found.append(target)
+    return found
 
 
 def reference(found: Solution, scene: Any) -> "pd.DataFrame":
@@ -84,7 +99,7 @@ def write(folder: Path) -> list[Path]:
     written = []
     for name in problem_names():
         scene = load(name)
-        for target in scene.job.targets:
+        for target in served(scene):
             text = tables.csv(reference(engine.solve(scene, target), scene))
             path = folder / f"{name}.{target}.csv"
             atomically(path, functools.partial(_put, text))
@@ -107,7 +122,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
     found = [f"column {name} is new" for name in now.columns.difference(then.columns)]
     found += [f"column {name} is gone" for name in then.columns.difference(now.columns)]
     objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []
-    peak = float(then["peak_torque [N*m]"].iloc[0]) if "peak_torque [N*m]" in then else 1.0
+    least = LEAST | {of: float(then[column].iloc[0]) for of, column in LARGEST.items() if column in then}
     for name in now.columns.intersection(then.columns):
         new, old = now[name].iloc[0], then[name].iloc[0]
         if isinstance(new, str) or name == "unique":
@@ -115,7 +130,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
                 found.append(f"{name}: {new}, reference {old}")
             continue
         allowed = OBJECTIVE if name.split(" [")[0] in objectives else DESIGN
-        size = max(abs(float(old)), peak if "N*m]" in name else LEAST.get(name.rpartition(" ")[2], 1e-3))
+        size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
         if not abs(float(new) - float(old)) <= allowed * size:
             found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")
     return found
