@@ -77,14 +77,14 @@ def _harmonics(first: int, third: int) -> Callable[[Maths, Number, Number], Deri
 def _modified_sine(maths: Maths, u: Number, piece: Number) -> Derivatives:
     """Acceleration of a quarter sine, half a sine three times as long, a quarter sine; each about its own zero at t."""
     pi, scale = maths.pi, 4 + maths.pi
-    zero, sign, long = (maths.choose(piece, values) for values in ((0, 1, 2), (-1, 1, -1), (1, 3, 1)))
+    zero, wave, long = (maths.choose(piece, values) for values in ((0, 1, 2), (-1, 1, -1), (1, 3, 1)))
     t = (2 * u - zero) / 2
     sine, cosine = maths.sin(4 * pi * t / long), maths.cos(4 * pi * t / long)
     return Derivatives(
-        (zero + (4 * pi * t + sign * long**2 * sine) / (2 * scale)) / 2,
-        pi * (1 + sign * long * cosine) / scale,
-        -4 * pi**2 * sign * sine / scale,
-        -16 * pi**3 * sign * cosine / (long * scale),
+        (zero + (4 * pi * t + wave * long**2 * sine) / (2 * scale)) / 2,
+        pi * (1 + wave * long * cosine) / scale,
+        -4 * pi**2 * wave * sine / scale,
+        -16 * pi**3 * wave * cosine / (long * scale),
     )
 
 
