@@ -5,7 +5,7 @@ pushes it down with N = M X'' w² + C X' w + K1 (X + X0) − G − T(X) + F sgn 
 the rise begins (X from 0 to the travel), then the far dwell, the return (the rise mirrored), the near dwell.
 Scenes are decimal numbers in SI units, angles in degrees, the cam's speed in rpm; results are SI, mpmath's or floats.
 
-    python benchmarks/plain_shedding.py      the figures of `tests/benchmarks/test_shedding_small.py`, to 15 digits
+    python benchmarks/plain_shedding.py      the figures, to 15 digits
 
 [Qiu21] Qiu H., Dang B., Simulation design of negative cam shedding based on spring return, J. Mech. Electr. Eng.
 38(1), 2021, doi 10.3969/j.issn.1001-4551.2021.01.019
@@ -404,3 +404,21 @@ def least_law(scene, n, amax=2 * np.pi, symmetric=False):
             break
         K1 = need
     return need, at
+
+
+def main():
+    with mp.workdps(DIGITS):
+        for name, scene in (("65.6 mm", PAPER), ("14.5 mm", PRINTED), ("pressed on", PRESSED)):
+            for C in (0, 35):
+                K1, _, theta = least_stiffness(replace(scene, C=C))
+                print(f"{name}, C = {C}: K1 = {mp.nstr(K1, 15)} N/m at {mp.nstr(theta, 12)} deg")
+            print(*(f"{count} points: {uniform_grid(scene, count):.15g}" for count in (36, 72, 180, 3600)), sep=", ")
+            print(*(f"dK1/d{of} = {mp.nstr(value, 15)}" for of, value in worths(scene).items()), sep=", ")
+            print("peak N, K1, X0:", *(f"{value:.15g}" for value in least_force(scene)))
+            for K1 in (6176.1875, 8029.14) if scene.G > 0 else ():
+                print(f"K1 = {K1} N/m keeps contact up to {mp.nstr(contact_speed(scene, K1), 15)} rpm")
+            print(f"law of 16 intervals: {least_law(scene, 16)[0]:.15g} N/m")
+
+
+if __name__ == "__main__":
+    main()
