@@ -128,7 +128,7 @@ NAMES = [
     (("bounds", "l1", "max", REMOVED), "bounds.l1.max", "max is missing", "min and max"),
     (("bounds", "l1", "low", "30 mm"), "bounds.l1.low", 'unknown key "low"', "min, max, free"),
     (("bounds", "l9", {}), "bounds.l9", 'unknown number to bound "l9"', "l1, l2, l3, l4"),
-    (("bounds", "J3", {}), "bounds.J3", "J3 has no value", "effects.rocker_inertia.J3"),
+    (("bounds", "J3", {}), "bounds.J3.min", "min is missing", "min and max"),
     (("limits", "swing", {}), "limits.swing", "empty", "min and max"),
     (("limits", "swing", "low", "20 deg"), "limits.swing.low", 'unknown key "low"', "min, max"),
     (("limits", "swng", {}), "limits.swng", 'unknown figure to limit "swng"', '"swing"'),

@@ -89,7 +89,8 @@ def test_every_package_the_code_imports_is_a_declared_dependency():
         )
         used |= {first or second for first, second in names}
     outside = used - set(sys.stdlib_module_names) - {"loomopt"}
-    assert outside - {"pydantic_core"} <= declared
+    named = {"flint": "python_flint"}
+    assert {named.get(name, name) for name in outside} - {"pydantic_core"} <= declared
 
 
 @wheel_needed

@@ -18,6 +18,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs import JOBS, load, scene
 from loomopt.jobs.template import BEATUP_TEMPLATE
 from loomopt.scenes import Bound, Limit, Scene
+from loomopt.studies.check import served
 
 BEATUP = load("beatup")
 
@@ -64,8 +65,8 @@ def test_packaged_scenes_are_complete(name):
     assert found.name == name
     assert found.title
     assert found.source
-    for target in found.targets.values():
-        assert target.expected is not None
+    for target in served(found):
+        assert found.targets[target].expected is not None
     for effect in set(found.job.effects) - set(found.effects):
         assert effect in found.with_effect(effect).effects
 
@@ -154,6 +155,17 @@ def test_effects_go_on_and_off_in_the_order_of_the_job():
     assert BEATUP.with_effect("inertia") is BEATUP
     assert BEATUP.without_effect("gravity") is BEATUP
     assert scene(edited({"available": {}})).with_effect("centrifugal").effects["centrifugal"].model_dump() == {}
+
+
+def test_a_bound_on_a_number_of_an_effect_that_is_off_waits_for_it():
+    bound = {"min": "0.01 kg*m^2", "max": "0.02 kg*m^2"}
+    waiting = BEATUP.set("bounds.J3", bound)
+    assert "J3" not in waiting.bounds
+    assert waiting.with_effect("rocker_inertia").bounds["J3"] == Bound(0.01, 0.02, True, "kg*m^2")
+    with pytest.raises(BadInput, match="J3 has no value in this scene"):
+        scene(edited({"available": {}, "bounds.J3": bound}))
+    with pytest.raises(BadInput, match="min is more than max"):
+        BEATUP.set("bounds.J3", {"min": "0.03 kg*m^2", "max": "0.02 kg*m^2"})
 
 
 def test_bounds_that_hold_free_and_fix():

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ROUNDING = 1e-9
-"""How far below 0 a table's slope (1 on average) may fall: what float64 leaves of a level stretch of many points."""
+DIP = 5e-3
+"""How far below 0 a table's slope (1 on average) may fall: what few digits, or wide steps, leave beside a dwell."""
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ def _refuse_a_fall(u: "Floats", v: "Floats", a: "Floats") -> None:
     inside = v[:-1] + np.diff(u) * share * (a[:-1] + rise * share / 2)
     least = np.minimum(inside, v[1:])
     k = int(np.argmin(least))
-    if least[k] < -ROUNDING:
+    if least[k] < -DIP:
         raise ValueError(
             f"the curve through the table falls between u = {u[k]:.9g} and {u[k + 1]:.9g} (slope down to "
             f"{least[k]:.3g}); a rise must never fall: correct the points there, or give more digits or other points"

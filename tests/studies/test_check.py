@@ -70,13 +70,18 @@ def test_all_packaged_results_are_reproduced(capsys):
     out, err = capsys.readouterr()
     assert err == ""
     for name in packaged.problem_names():
-        for target in load(name).job.targets:
+        for target in study.served(load(name)):
             line = next(line for line in out.splitlines() if line.split()[:2] == [name, target])
             assert line.endswith("reproduces")
 
 
+def test_targets_that_need_what_a_scene_lacks_are_left_out():
+    assert study.served(load("shedding-static")) == ["stiffness", "force"]
+    assert study.served(load("shedding")) == ["stiffness", "law", "force", "speed"]
+
+
 def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
-    wanted = {f"{name}.{target}.csv" for name in packaged.problem_names() for target in load(name).job.targets}
+    wanted = {f"{name}.{target}.csv" for name in packaged.problem_names() for target in study.served(load(name))}
     assert {path.name for path in packaged.results_path().iterdir()} == wanted
     for path in packaged.results_path().iterdir():
         head = dict(line[2:].split(": ", 1) for line in path.read_text().splitlines() if line.startswith("# "))
