@@ -80,8 +80,17 @@ def loop(
     return found
 
 
-def sums(loads: Sequence[Load], pose: Any, total: Expression, letter: str) -> list[Equation]:
-    """Return the output's balance and the crank torque Md by the balance's own sums; a load's term: LETTER_name."""
+def sums(
+    loads: Sequence[Load],
+    pose: Any,
+    total: Expression,
+    letter: str,
+    torque: tuple[str, str] = ("crank torque", "Md"),
+) -> list[Equation]:
+    """Return the output's balance and the crank torque by the balance's own sums; a load's term: LETTER_name.
+
+    torque: what the crank's torque is called, and its symbol.
+    """
     system, found = maths.sympy(), []
     shown = [dataclasses.replace(load, force=_constant(symbol(f"{letter}_{load.name}"))) for load in loads]
     output = [load for load in shown if load.acts == "output"]
@@ -91,8 +100,8 @@ def sums(loads: Sequence[Load], pose: Any, total: Expression, letter: str) -> li
     summed = [dataclasses.replace(load, force=_constant(total)) for load in output[:1]]
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
-        torque = balance.crank_torque(system, summed, pose, given, [0] * len(summed))
-        found.append(equation("crank torque", symbol("Md"), torque))
+        name, sign = torque
+        found.append(equation(name, symbol(sign), balance.crank_torque(system, summed, pose, given, [0] * len(summed))))
     return found
 
 
@@ -109,6 +118,40 @@ def own_values(effect: Effect, words: Mapping[str, str]) -> Values:
 def equation(name: str, left: Expression, right: Expression) -> Equation:
     """Return an equation of two expressions."""
     return Equation(name, f"{text(left)} = {text(right)}", f"{latex(left)} = {latex(right)}")
+
+
+def relation(name: str, left: Expression, sign: str, right: Expression, where: str = "") -> Equation:
+    """Return what a number must keep: sign is "=", "<=" or ">="; where: words that follow."""
+    written = {"=": "=", "<=": r"\le", ">=": r"\ge"}[sign]
+    words, tail = (f" {where}", rf"\quad \text{{{where}}}") if where else ("", "")
+    return Equation(name, f"{text(left)} {sign} {text(right)}{words}", f"{latex(left)} {written} {latex(right)}{tail}")
+
+
+Case = tuple[Expression | str, str | tuple[Expression, Expression, Expression]]
+"""A formula (or words), and where it holds: words, or low, value, high."""
+
+
+def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
+    """Return an equation whose right side is one formula after another; a single one needs no condition."""
+    if len(rows) == 1:
+        return equation(name, left, rows[0][0])
+    written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
+    lines = r" \\ ".join(f"{_said(value, latex)} & {_where(when, latex)}" for value, when in rows)
+    return Equation(name, f"{text(left)} = {written}", rf"{latex(left)} = \begin{{cases}} {lines} \end{{cases}}")
+
+
+def _said(value: Expression | str, write: Callable[[Expression], str]) -> str:
+    if not isinstance(value, str):
+        return write(value)
+    return value if write is text else rf"\text{{{value}}}"
+
+
+def _where(when: str | tuple[Expression, ...], write: Callable[[Expression], str]) -> str:
+    if isinstance(when, str):
+        return when if write is text else rf"\text{{{when}}}"
+    if write is text:
+        return "for " + " <= ".join(map(text, when))
+    return r" \le ".join(map(latex, when))
 
 
 def text(expression: Expression) -> str:

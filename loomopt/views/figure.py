@@ -1,7 +1,6 @@
 """Figures by matplotlib: a drawing, or curves over the crank angle. No window, no global state."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from loomopt import store
 from loomopt.views import svg
+from loomopt.views.panels import ANGLE, Panel, each, split
 from loomopt.views.shapes import (
     CAPITAL,
     DASH,
@@ -38,7 +38,8 @@ _PAGE = 240.0
 _STYLE = {"svg.hashsalt": "loomopt", "pdf.fonttype": 42, "font.size": 9.0, "axes.titlesize": 9.0}
 _COLOURS = ("#1d4ed8", "#c2410c", "#047857", "#7c3aed", "#b91c1c", "#0e7490", "#a16207")
 _NAME_SIZE = 8.0
-_COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
+_BEFORE = "#6b7280"
+"""Today's machine beside a design."""
 
 
 def draw(drawing: Drawing, path: Path) -> None:
@@ -63,50 +64,133 @@ def draw(drawing: Drawing, path: Path) -> None:
         _save(figure, path)
 
 
-def curves(frame: "pd.DataFrame", path: Path, title: str, marks: Mapping[str, float] | None = None) -> None:
-    """Write one small diagram per column over `phi [rad]`, as PNG, PDF or SVG; angles are shown in degrees.
+def curves(
+    frame: "pd.DataFrame",
+    path: Path,
+    title: str,
+    marks: Mapping[str, float] | None = None,
+    panels: Sequence[Panel] = (),
+    today: tuple["pd.DataFrame", Sequence[Panel]] | None = None,
+    angle: str = "crank angle",
+) -> None:
+    """Write small diagrams over `phi [rad]` as PNG, PDF or SVG; angles are shown in degrees.
 
     marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
-    is shaded. Columns without a unit in their name are left out.
+    is shaded. panels: what to show, one panel per column with its unit without them. today: curves and panels of
+    today's machine, drawn beside where a panel asks for it. angle: what phi is.
     Raises BadInput as `draw` does, and ValueError where there is no column.
     """
     store.suffix(path, SUFFIXES)
-    columns = [name for name in frame.columns if _COLUMN.fullmatch(name) and name != "phi [rad]"]
-    if not columns or "phi [rad]" not in frame:
+    panels = panels or each(None, None, frame.columns)
+    if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
-    wide = 1 if len(columns) <= 4 else 2
-    rows = math.ceil(len(columns) / wide)
-    angle = np.degrees(frame["phi [rad]"].to_numpy(dtype=float))
     with _own_style():
-        figure = _figure(7.0 if wide == 1 else 11.0, 1.75 * rows + 0.9)
-        figure.set_layout_engine("constrained")
+        figure, placed = _grid(panels)
         figure.suptitle(plain(title), fontsize=11, parse_math=False)
-        panels = figure.subplots(rows, wide, sharex=True, squeeze=False).T.ravel()
-        for index, (axes, column) in enumerate(zip(panels, columns, strict=False)):
-            _curve(axes, angle, frame[column].to_numpy(dtype=float), column, _COLOURS[index % len(_COLOURS)])
-            _mark(axes, marks or {}, named=index % rows == 0)
-            axes.tick_params(labelbottom=index % rows == rows - 1 or index == len(columns) - 1)
-        for axes in panels[len(columns) :]:
-            axes.set_visible(False)
-        figure.supxlabel("crank angle phi [deg]", fontsize=9)
+        for place, (axes, panel, first, last) in enumerate(placed):
+            _curves(axes, frame, panel, place)
+            if today and panel.today:
+                _before(axes, *today, panel)
+            if len(axes.get_legend_handles_labels()[0]) > 1:
+                axes.legend(fontsize=_NAME_SIZE, ncols=2, edgecolor="none", framealpha=0.8)
+            _mark(axes, marks or {}, named=first)
+            axes.tick_params(labelbottom=last)
+        figure.supxlabel(f"{angle} phi [deg]", fontsize=9)
         _save(figure, path)
 
 
-def _curve(axes: Any, angle: Any, values: Any, column: str, colour: str) -> None:
+def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Any, Panel, bool, bool]]]:
+    """Return a figure and its axes with their panels, and whether each is the first and the last of its column.
+
+    Wide panels stand on top, the others below in columns of their own.
+    """
+    on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
+    wide = 1 if len(panels) <= 4 else 2
+    rows, height = math.ceil(len(others) / wide), len(on_top)
+    figure = _figure(7.0 if wide == 1 else 11.0, 1.75 * (rows + 1.5 * height) + 0.9)
+    figure.set_layout_engine("constrained")
+    grid = figure.add_gridspec(height + rows, wide, height_ratios=[1.5] * height + [1.0] * rows)
+    shared: Any = None
+    placed = []
+    for place, panel in enumerate([*on_top, *others]):
+        column, row = divmod(max(place - height, 0), rows or 1)
+        spec = grid[place, :] if panel.wide else grid[height + row, column]
+        shared = axes = figure.add_subplot(spec, sharex=shared)
+        last = panel.wide or row == rows - 1 or place == len(panels) - 1
+        placed.append((axes, panel, place == 0 or (row == 0 and not height), last))
+    return figure, placed
+
+
+def _angles(frame: "pd.DataFrame") -> Any:
+    """Return a table's crank angles in degrees, never falling: one that starts again goes on a turn later."""
+    return np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
+
+
+def _curves(axes: Any, frame: "pd.DataFrame", panel: Panel, place: int) -> None:
+    """Draw a panel's columns, with its levels and points; place: of the panel, which chooses its first colour."""
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-    match = _COLUMN.fullmatch(column)
-    name, unit = (match["name"], match["unit"]) if match else (column, "1")
-    if unit == "rad":
-        values, unit = np.degrees(values), "deg"
-    axes.axhline(0.0, color="#9ca3af", linewidth=0.6) if values.min() < 0 < values.max() else None
-    axes.plot(angle, values, color=colour, linewidth=1.4)
-    axes.set_ylabel(name if unit == "1" else f"{name} [{unit}]", parse_math=False)
+    angle, unit = _angles(frame), panel.unit
+    size = math.degrees(1.0) if unit == "rad" else 1.0
+    unit = "deg" if unit == "rad" else unit
+    drawn = [size * frame[column].to_numpy(dtype=float) for column in panel.columns]
+    some = np.concatenate([values[np.isfinite(values)] for values in drawn])
+    if some.size and some.min() < 0 < some.max():
+        axes.axhline(0.0, color="#9ca3af", linewidth=0.6)
+    colours = [_COLOURS[(place + k) % len(_COLOURS)] for k in range(len(drawn))]
+    for column, values, colour in zip(panel.columns, drawn, colours, strict=True):
+        axes.plot(angle, values, color=colour, linewidth=1.4, label=plain(split(column)[0]))
+    axes.set_ylabel(panel.label if unit == "1" else f"{panel.label} [{unit}]", parse_math=False)
     axes.set_xlim(angle.min(), angle.max())
+    for text, value in panel.levels.items():
+        axes.axhline(size * value, color="#374151", linewidth=0.8)
+        _write(axes, text, (angle.min(), size * value), (3, 3), "left")
+    _points(axes, panel, size, colours[0])
     axes.xaxis.set_major_locator(MultipleLocator(45))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
     axes.grid(color="#e5e7eb", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _before(axes: Any, frame: "pd.DataFrame", panels: Sequence[Panel], panel: Panel) -> None:
+    """Draw today's curves beside a design's."""
+    size = math.degrees(1.0) if panel.unit == "rad" else 1.0
+    for line in axes.get_lines():
+        if not line.get_label().startswith("_"):
+            line.set_label("design")
+    for column in panel.columns:
+        values = size * frame[column].to_numpy(dtype=float)
+        axes.plot(_angles(frame), values, color=_BEFORE, linewidth=1.2, linestyle=(0, (4, 2)), label="today")
+    for before in panels:
+        if before.columns == panel.columns:
+            _points(axes, before, size, _BEFORE)
+
+
+def _points(axes: Any, panel: Panel, size: float, colour: str) -> None:
+    """Mark a panel's named points."""
+    middle = sum(axes.get_xlim()) / 2
+    for point in panel.points:
+        if not math.isfinite(point.value):
+            continue
+        at = math.degrees(point.phi), size * point.value
+        axes.plot(*at, "o", color=colour, markersize=4.5)
+        side, gap = ("left", 7) if at[0] < middle else ("right", -7)
+        _write(axes, point.text, at, (gap, 3), side)
+
+
+def _write(axes: Any, text: str, at: tuple[float, float], gap: tuple[int, int], side: str) -> None:
+    """Write a text beside a point of the axes."""
+    axes.annotate(
+        plain(text),
+        at,
+        gap,
+        textcoords="offset points",
+        ha=side,
+        fontsize=_NAME_SIZE,
+        color="#374151",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+        parse_math=False,
+    )
 
 
 def _mark(axes: Any, marks: Mapping[str, float], named: bool) -> None:
@@ -145,7 +229,9 @@ def _turns(angle: float, low: float, high: float) -> list[float]:
 def _name(axes: Any, names: Sequence[tuple[float, str]]) -> None:
     """Write names above an axis, each in the lowest row where it does not run into the one before."""
     low, high = axes.get_xlim()
-    panel = 72 * 0.85 * axes.figure.get_figwidth() / axes.get_subplotspec().get_geometry()[1]
+    spec = axes.get_subplotspec()
+    share = len(spec.colspan) / spec.get_geometry()[1]
+    panel = 72 * 0.85 * axes.figure.get_figwidth() * share
     character = 0.55 * _NAME_SIZE / panel * (high - low)
     ends: list[float] = []
     for place, name in names:

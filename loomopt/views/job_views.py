@@ -1,14 +1,27 @@
 """How each job shows itself: one record of functions, so that tables, drawings and notebooks know no mechanism."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from loomopt.views import panels as panels_of
 
 if TYPE_CHECKING:
     from loomopt.views.equations import Equation
+    from loomopt.views.panels import Panel
     from loomopt.views.shapes import Drawing
 
 Numbers = Mapping[str, float]
+
+
+def no_remarks(scene: Any, design: Numbers) -> tuple[str, ...]:
+    """Return nothing: a job that has nothing to remark upon."""
+    return ()
+
+
+def nothing_missing(scene: Any) -> tuple[str, ...]:
+    """Return nothing: every scene of the job can be drawn."""
+    return ()
 
 
 @dataclass(frozen=True)
@@ -16,13 +29,22 @@ class JobView:
     """A job's own views; a design, SI, may name only some numbers, the others are today's.
 
     linkage(scene, design): the mechanism drawn at full scale in the positions that matter.
-    joints_csv(scene, design): the joints it draws, as CSV, mm. Both raise BadInput for a design that does not assemble.
+    joints_csv(scene, design): what it draws as CSV for the workshop, mm: joints, or the cam's profile. Both raise
+    BadInput for a design that does not assemble, and where numbers are missing(scene), which names their keys.
     equations(scene): the equations the scene really uses.
+    panels(scene, design, columns): what a figure of the curves shows.
+    remarks(scene, design): what to know beside the numbers, each a sentence without its full stop.
+    angle: what phi is; lists: part of a design that is a list → what its numbers are, "{count}" for how many.
     """
 
     linkage: Callable[[Any, Numbers], "Drawing"]
     joints_csv: Callable[[Any, Numbers], str]
     equations: Callable[[Any], tuple["Equation", ...]]
+    panels: Callable[[Any, Numbers, Sequence[str]], tuple["Panel", ...]] = panels_of.each
+    remarks: Callable[[Any, Numbers], tuple[str, ...]] = no_remarks
+    missing: Callable[[Any], tuple[str, ...]] = nothing_missing
+    angle: str = "crank angle"
+    lists: Mapping[str, str] = field(default_factory=dict)
 
 
 def view(scene: Any) -> JobView:
@@ -72,8 +94,54 @@ def _rapier_equations(scene: Any) -> tuple["Equation", ...]:
     return rapier_equations.equations(scene)
 
 
+def _shedding_linkage(scene: Any, design: Numbers) -> "Drawing":
+    from loomopt.views import shedding_drawing
+
+    return shedding_drawing.linkage(scene, design)
+
+
+def _shedding_profile(scene: Any, design: Numbers) -> str:
+    from loomopt.views import shedding_drawing
+
+    return shedding_drawing.joints_csv(scene, design)
+
+
+def _shedding_equations(scene: Any) -> tuple["Equation", ...]:
+    from loomopt.views import shedding_equations
+
+    return shedding_equations.equations(scene)
+
+
+def _shedding_panels(scene: Any, design: Numbers, columns: Sequence[str]) -> tuple["Panel", ...]:
+    from loomopt.views import shedding_panels
+
+    return shedding_panels.panels(scene, design, columns)
+
+
+def _shedding_remarks(scene: Any, design: Numbers) -> tuple[str, ...]:
+    from loomopt.views import shedding_remarks
+
+    return shedding_remarks.remarks(scene, design)
+
+
+def _shedding_missing(scene: Any) -> tuple[str, ...]:
+    from loomopt.views import cam_curves
+
+    return cam_curves.missing(scene)
+
+
 VIEWS = {
     "beatup": JobView(_beatup_linkage, _beatup_joints, _beatup_equations),
     "rapier": JobView(_rapier_linkage, _rapier_joints, _rapier_equations),
+    "shedding": JobView(
+        _shedding_linkage,
+        _shedding_profile,
+        _shedding_equations,
+        _shedding_panels,
+        _shedding_remarks,
+        _shedding_missing,
+        angle="cam angle",
+        lists={"law": "s'' at {count} knots"},
+    ),
 }
 """Job name → its views; the modules behind them are imported when they are first used."""

@@ -9,10 +9,12 @@ from loomopt.views.layout import Grid, spaced
 
 
 def answer(solution: Solution, scene: Any) -> str:
-    """Return an answer as HTML: what was found, design beside today, what binds, certificate, the mechanism."""
+    """Return an answer as HTML: what was found, design beside today, what binds, certificate, and the mechanism
+    where the scene gives what a drawing needs."""
     shown = terminal.solution(solution, scene)
     parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
-    drawn = svg.render(job_views.view(scene).linkage(scene, solution.design))
+    view = job_views.view(scene)
+    drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, solution.design))
     return f"<div>{''.join(parts)}{drawn}</div>"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from loomopt import __version__, tables
+from loomopt.designs import flat
 from loomopt.errors import BadInput
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.solution import Evaluation, Solution
@@ -43,15 +44,20 @@ def _put(content: str, place: Path) -> None:
 
 
 def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
-    """Write an answer into a folder: answer.json, table.csv, curves.csv, linkage.svg; returns the files."""
+    """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg where there is one to draw.
+
+    Returns the files.
+    """
     from loomopt.views import svg
 
     contents = {
         "answer.json": document(solution) + "\n",
         "table.csv": tables.csv(tables.answer(solution, scene)),
         "curves.csv": tables.csv(tables.curves(scene, solution.design)),
-        "linkage.svg": svg.render(job_views.view(scene).linkage(scene, solution.design)),
     }
+    view = job_views.view(scene)
+    if not view.missing(scene):
+        contents["linkage.svg"] = svg.render(view.linkage(scene, solution.design))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -83,12 +89,18 @@ def curves(path: Path, scene: Any, design: Mapping[str, float]) -> None:
     else:
         from loomopt.views import figure
 
-        marks = TASKS[scene.job.name].marks(scene, {**TASKS[scene.job.name].today(scene), **design})
-        atomically(path, functools.partial(_figure, figure, frame, scene.title, marks))
+        atomically(path, functools.partial(_figure, figure.curves, frame, scene, flat(design)))
 
 
-def _figure(figure: Any, frame: Any, title: str, marks: Mapping[str, float], place: Path) -> None:
-    figure.curves(frame, place, title, marks)
+def _figure(draw: Any, frame: Any, scene: Any, design: Mapping[str, float], place: Path) -> None:
+    """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
+    task, view = TASKS[scene.job.name], job_views.view(scene)
+    panels = view.panels(scene, design, tuple(frame.columns))
+    today = None
+    if design and any(panel.today for panel in panels):
+        before = tables.curves(scene, {})
+        today = before, view.panels(scene, {}, tuple(before.columns))
+    draw(frame, place, scene.title, task.marks(scene, {**task.today(scene), **design}), panels, today, view.angle)
 
 
 def linkage(path: Path, scene: Any, design: Mapping[str, float]) -> None:

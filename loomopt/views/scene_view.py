@@ -32,10 +32,12 @@ def parts(scene: Any) -> list[str | Grid]:
     """Return the tables of `loomopt show`."""
     words = Words(scene)
     lines = []
-    for key, value in _numbers(scene):
+    for key, value in _values(scene):
         name = key.split(".")[2 if key.startswith("effects.") else 1]
-        unit = words.si(name)
-        lines.append((key, scene.given(key) or "(default)", f"{value:.9g}", "" if unit == "1" else unit))
+        number = isinstance(value, int | float)
+        unit = words.si(name) if number else "1"
+        size = f"{value:.9g}" if number else listed(value)
+        lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
     effects = tuple((name, scene.job.effects[name].summary) for name in scene.effects)
     off = [name for name in scene.job.effects if name not in scene.effects]
     figures = tuple((figure.name, figure.text) for figure in scene.job.figures.values())
@@ -60,14 +62,19 @@ def _targets(scene: Any) -> list[tuple[str, str, str]]:
     return lines
 
 
-def _numbers(scene: Any) -> Iterator[tuple[str, float]]:
-    """Yield each number's dotted key with its SI value."""
+def listed(values: Any) -> str:
+    """Return a list of numbers in a few words; "" for a word."""
+    return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
+
+
+def _values(scene: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the dotted key of each number, word and list, with its SI value."""
     for table in ("operation", "mechanism"):
         for name, value in getattr(scene, table).items():
             yield f"{table}.{name}", value
     for effect, own in scene.effects.items():
         for name, value in own.model_dump().items():
-            if isinstance(value, float):
+            if isinstance(value, int | float | str):
                 yield f"effects.{effect}.{name}", value
     for table in ("bounds", "limits"):
         for name, limit in getattr(scene, table).items():
@@ -133,10 +140,11 @@ def _width(curve: tuple[str, list[str]]) -> int:
 
 
 def _curve(name: str, values: Any) -> tuple[str, list[str]]:
-    """Return a curve's heading and its cells, four digits of the largest, angles in degrees."""
+    """Return a curve's heading and its cells, four digits of the largest, angles in degrees; empty where undefined."""
     symbol, _, unit = name.removesuffix("]").partition(" [")
     numbers = np.degrees(values) if unit == "rad" else np.asarray(values, dtype=float)
-    largest = float(np.max(np.abs(numbers), initial=0.0))
-    places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 and math.isfinite(largest) else 0
-    texts = [f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
+    known = numbers[np.isfinite(numbers)]
+    largest = float(np.max(np.abs(known), initial=0.0))
+    places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
+    texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
     return f"{symbol}\n[{'deg' if unit == 'rad' else unit}]", texts

@@ -6,6 +6,7 @@ from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.units import factor
+from loomopt.views import job_views
 from loomopt.views.layout import Grid, joined
 
 NEGLIGIBLE = 1e-8
@@ -25,6 +26,7 @@ def solution(answer: Solution, scene: Any) -> list[str | Grid]:
         parts.append(answer.message)
     parts += [answer.explanation] if answer.explanation else []
     parts.append(comparison(answer, scene, answer.before, heading))
+    parts += lists(answer, scene)
     if answer.certificate:
         parts.append(_binding(answer))
         parts += certificate(answer)
@@ -42,7 +44,8 @@ def evaluation(found: Evaluation, scene: Any, before: Evaluation | None) -> list
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok)
     held = f"NOT admissible: {broken}" if broken else "all limits held"
-    return [f"{found.problem}: {held}", comparison(found, scene, before, "design" if before else "today")]
+    table = comparison(found, scene, before, "design" if before else "today")
+    return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
 
 def comparison(found: Evaluation, scene: Any, before: Evaluation | None, heading: str) -> Grid:
@@ -67,6 +70,16 @@ def comparison(found: Evaluation, scene: Any, before: Evaluation | None, heading
     ]
     first = ("", "today") if before else ("",)
     return Grid("", (*first, heading, "unit", "limits"), tuple(lines), right=tuple(range(1, len(first) + 1)))
+
+
+def lists(found: Evaluation, scene: Any) -> list[str]:
+    """Return one line for each part of a design that is a list of numbers."""
+    told = job_views.view(scene).lists
+    return [
+        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; see --json"
+        for name, values in found.design.items()
+        if name in told and values
+    ]
 
 
 def _number(value: float, size: float) -> str:
