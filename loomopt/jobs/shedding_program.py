@@ -13,6 +13,7 @@ from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.shedding import FOLLOWER, Shedding, spline_rows
 from loomopt.jobs.shedding_law import PREFIX, CamLaw, Spline
 from loomopt.jobs.shedding_pose import DWELLS, RETURN_SPRING
+from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_sizes import Sizes
 from loomopt.jobs.shedding_tables import SEGMENTS, VARIABLES
 from loomopt.mechanisms import cam_spline
@@ -89,6 +90,14 @@ def demand(scene: Any, target: str) -> None:
                 key=f"effects.{name}",
                 remedy=f"Add the table [effects.{name}], or choose another target.",
             )
+    if target == "speed" and math.isinf(contact_speed(model(scene), numbers(scene), scene.operation["N_min"])):
+        raise BadInput(
+            "the roller stays on the cam at any speed: nothing limits it",
+            file=scene.origin,
+            key="effects.inertia.M",
+            value=scene.given("effects.inertia.M"),
+            remedy="Give the moving mass, or choose another target.",
+        )
     own = scene.targets["law"]
     fewest, most = shedding_fault.FEWEST, shedding_fault.MOST
     if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
@@ -168,7 +177,8 @@ class _Task:
     def _range(self, name: str, ends: tuple[float, float]) -> tuple[float, float]:
         """Return where random starts lie, SI."""
         if name == "K1":
-            return max(ends[0], 0.1 * self.sizes.needed), min(ends[1], 10.0 * self.sizes.needed)
+            least = min(max(ends[0], 0.1 * self.sizes.needed), ends[1])
+            return least, min(ends[1], 10.0 * self.sizes.needed)
         return ends[0], min(ends[1], 3.0 * self.known[name]) if math.isinf(ends[1]) else ends[1]
 
     def _bounds(self, variables: list[Variable]) -> list[Limit]:

@@ -57,6 +57,7 @@ class _Run:
         peaks = calls.peaks(sampler)
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
+        last = raw
         status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None
         for _ in range(ELASTIC_ROUNDS if self.elastic else ROUNDS):
             nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=bool(raw))
@@ -64,6 +65,7 @@ class _Run:
             status, x, extra, raw = self._solve(nlp, sampler, before, extra, peaks, nodes, raw)
             if status not in SUCCESS and not cold:
                 status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
+            last = raw
             order, here = sampler.cycle, sampler_at(self.program, x)
             if here is None:
                 return Point(x, "Invalid_Number_Detected", False, self.iterations)
@@ -79,7 +81,7 @@ class _Run:
             if followed:
                 return followed
         kept = tuple(map(tuple, nodes))
-        point = Point(x, status, reached, self.iterations, kept, violation, raw, calls.built)
+        point = Point(x, status, reached, self.iterations, kept, violation, last, calls.built)
         if extra is None or not reached:
             return point
         if self.elastic:

@@ -4,9 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from loomopt.jobs.program import Limit, Program
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
+from loomopt.nlp.transcribe import families
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
 
@@ -39,14 +42,13 @@ def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Set
 
 def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     """Return the limits with a price in the least relaxation: without any of them it would be less."""
-    prices = point.raw["lam_g"][: len(program.limits)]
     rows = [limit for limit in program.limits if limit.family != "cycle"]
-    named = [
-        words.limit(limit)
-        for limit, price in zip(rows, prices, strict=False)
-        if abs(price) > PRICED and not limit.hidden
-    ]
-    return tuple(dict.fromkeys(named))
+    cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
+    prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
+    first, rest = prices[: len(rows)], prices[len(rows) :]
+    worst = rest.reshape(len(cycles), -1).max(axis=1) if rest.size else rest
+    priced = [*zip(rows, first, strict=False), *zip(cycles, worst, strict=False)]
+    return tuple(dict.fromkeys(words.limit(each) for each, price in priced if price > PRICED and not each.hidden))
 
 
 def _least(
