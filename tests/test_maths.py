@@ -109,6 +109,126 @@ def test_mpmath_has_its_own_digits_and_leaves_everybody_elses_alone():
     assert global_mpmath.mp.dps == before
 
 
+# A value chosen by a node's own data --------------------------------------------------------------------------------
+
+SCALAR = (maths.FLOAT, maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy(), maths.balls())
+CHOICES = (-2.5, 0.0, 0.1, 7.0)
+
+
+@pytest.mark.parametrize("system", SCALAR, ids=lambda system: system.name)
+@pytest.mark.parametrize("place", range(len(CHOICES)))
+def test_the_value_at_a_place_is_chosen_in_every_system(system, place):
+    """Places are numbers 0.0, 1.0 ...: what a switch holds; an integer will do."""
+    values = [system.number(value) for value in CHOICES]
+    for asked in (float(place), place):
+        assert float(system.choose(asked, values)) == CHOICES[place]
+    assert float(system.choose(system.number(float(place)), values)) == CHOICES[place]
+
+
+def test_numpy_chooses_for_each_node_its_own():
+    choose, places = maths.numpy().choose, np.array([[2.0, 0.0, 1.0], [1.0, 1.0, 3.0]])
+    assert np.array_equal(choose(places, CHOICES), [[0.1, -2.5, 0.0], [0.0, 0.0, 7.0]])
+    values = [10.0 * k + np.arange(6.0).reshape(2, 3) for k in range(3)] + [-1.0]
+    assert np.array_equal(choose(places, values), [[20.0, 1.0, 12.0], [13.0, 14.0, -1.0]])
+    assert np.array_equal(choose(2.0, values), values[2])
+    assert choose(places[0, 0], CHOICES) == 0.1
+
+
+def test_numpy_chooses_one_of_whole_columns():
+    """A place for each node, a value for all of them but one that has its own at each: what a pose hands over."""
+    theta = np.linspace(0.0, 1.0, 4)
+    found = maths.numpy().choose(np.array([0.0, 1.0, 0.0, 1.0]), (theta, 5))
+    assert np.array_equal(found, [0.0, 5.0, 2 / 3, 5.0])
+
+
+@pytest.mark.parametrize("kind", [ca.SX, ca.MX])
+def test_casadi_chooses_by_a_symbol_and_only_the_chosen_moves(kind):
+    """The slope is that of the chosen value; the place itself has none."""
+    x, place = kind.sym("x"), kind.sym("place")
+    chosen = maths.casadi().choose(place, [x**2, 3 * x, -1, ca.sin(x)])
+    function = ca.Function("f", [x, place], [chosen, ca.jacobian(chosen, x)])
+    expected = [(0.49, 1.4), (2.1, 3.0), (-1.0, 0.0), (math.sin(0.7), math.cos(0.7))]
+    for k, pair in enumerate(expected):
+        assert [float(value) for value in function(0.7, k)] == pytest.approx(pair, rel=1e-15, abs=1e-15)
+
+
+@pytest.mark.parametrize("system", SCALAR, ids=lambda system: system.name)
+def test_there_is_no_place_beyond_the_last(system):
+    with pytest.raises(IndexError):
+        system.choose(len(CHOICES), [system.number(value) for value in CHOICES])
+
+
+# Balls enclose ------------------------------------------------------------------------------------------------------
+
+DIGITS = maths.mpmath(60)
+WHOLE = {
+    "sin": lambda m, x: m.sin(x),
+    "cos": lambda m, x: m.cos(3 * x) / 7,
+    "sqrt": lambda m, x: m.sqrt(x * x + 2),
+    "pi": lambda m, x: m.pi * x**3 - m.pi**2,
+    "quotient": lambda m, x: (1 - x) / (m.cos(x) + 3),
+    "choice": lambda m, x: m.choose(1.0, (0, m.sin(x) ** 2, 0)) * m.number(0.1),
+}
+POINTS = (-2.5, -0.3, 1e-9, 0.7, 3.0)
+
+
+def holds(ball, value):
+    """Say whether a ball contains a number of 60 digits, rounded to a ball itself."""
+    return ball.overlaps(type(ball)(global_mpmath.nstr(value, 55)))
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_ball_contains_the_number_of_many_digits_and_is_no_wider_than_rounding(name):
+    system = maths.balls()
+    for x in POINTS:
+        ball, value = WHOLE[name](system, system.number(x)), WHOLE[name](DIGITS, DIGITS.number(x))
+        assert holds(ball, value)
+        assert float(ball.rad()) <= 1e-14 * max(1.0, abs(float(value)))
+
+
+def test_balls_have_the_angle_of_a_point_in_every_quadrant_and_no_series_of_it():
+    system = maths.balls()
+    for y, x in ((1.0, 2.0), (1.0, -2.0), (-1.0, -2.0), (-1.0, 2.0), (0.0, 1.0), (1.0, 0.0)):
+        ball = system.atan2(system.number(y), system.number(x))
+        assert holds(ball, DIGITS.atan2(DIGITS.number(y), DIGITS.number(x)))
+    with pytest.raises(TypeError):
+        system.atan2(maths.ball_series(0.5, 0.0), maths.ball_series(0.3, 0.0))
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_series_of_balls_holds_value_slope_and_half_the_curvature(name):
+    """Around a point, against differences in 60 digits."""
+    system, h = maths.balls(), DIGITS.number(1e-15)
+    for x in POINTS:
+        series = WHOLE[name](system, maths.ball_series(x, 0.0))
+        low, mid, high = (WHOLE[name](DIGITS, DIGITS.number(x) + k * h) for k in (-1, 0, 1))
+        expected = [mid, (high - low) / (2 * h), (high - 2 * mid + low) / (2 * h**2)]
+        assert [float(series[k].mid()) for k in range(3)] == pytest.approx([float(v) for v in expected], abs=1e-12)
+        assert len(series) <= maths.ORDER
+
+
+@pytest.mark.parametrize("half", [1e-9, 1e-3, 0.2])
+@pytest.mark.parametrize("name", WHOLE)
+def test_a_wide_series_contains_what_it_is_at_every_point_of_its_box(name, half):
+    """Values, and Taylor's formula with the remainder of the whole box, at points exactly in it."""
+    system = maths.balls()
+    for x in POINTS:
+        wide, narrow = (WHOLE[name](system, maths.ball_series(x, r)) for r in (half, 0.0))
+        for share in (-1.0, -0.4, 0.0, 0.7, 1.0):
+            h = share * half
+            value = WHOLE[name](DIGITS, DIGITS.number(x) + DIGITS.number(h))
+            step = system.number(h)
+            assert holds(wide[0], value)
+            assert holds(narrow[0] + narrow[1] * step + wide[2] * step * step, value)
+
+
+def test_the_series_of_the_variable_is_itself():
+    series = maths.ball_series(0.3, 0.01)
+    assert (float(series[0].mid()), float(series[1]), float(series[2])) == (0.3, 1.0, 0.0)
+    assert float(series[0].rad()) == pytest.approx(0.01, rel=1e-6)
+    assert series[0].contains(0.3 - 0.01)
+
+
 # What formulas are made of. An `if X is None` asks how the scene is built, not what a number is; everything else that
 # branches, compares, rounds or names a number system is out.
 
