@@ -1,0 +1,54 @@
+"""The plain reference of the heald frame beside the product: one scene for both, answers kept for the whole run."""
+
+import functools
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import loomopt as lo
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+import plain_shedding as plain
+
+ANGLES = ("rise", "far_dwell", "return", "near_dwell")
+CYCLOID = 2 * np.pi
+"""The peak s'' of the cycloidal law, by which a free law is bounded unless a scene says otherwise."""
+TRAVELS = {"65.6 mm": plain.PAPER, "14.5 mm": plain.PRINTED}
+
+
+def product(case):
+    """Return the product's scene of a plain one: of its effects only those that are not 0."""
+    optional = {"effects.damping.C": (case.C, "N*s/m"), "effects.dry_friction.F": (case.F, "N")}
+    changes = {key: f"{value!r} {unit}" for key, (value, unit) in optional.items() if value}
+    changes |= {f"mechanism.{name}": f"{angle!r} deg" for name, angle in zip(ANGLES, case.angles, strict=True)}
+    return lo.load("shedding").update(
+        {
+            "mechanism.travel": f"{case.travel!r} m",
+            "operation.N_min": f"{case.N_min!r} N",
+            "operation.speed": f"{case.rpm!r} rpm",
+            "effects.warp_tension.shape": case.shape,
+            **changes,
+        }
+    )
+
+
+@functools.cache
+def freed(case, n, symmetric=False, bound=CYCLOID):
+    """Return the product's least spring of a plain scene with a free law of n intervals."""
+    own = {"intervals": n, "symmetric": symmetric, "acceleration": float(bound)}
+    return lo.solve(product(case).update({f"targets.law.{key}": value for key, value in own.items()}), "law")
+
+
+@functools.cache
+def programmed(case, n, symmetric=False, bound=CYCLOID):
+    """Return the same stiffness, N/m, by the plain reference's linear programmes."""
+    return float(plain.least_law(case, n, bound, symmetric)[0])
+
+
+def lowest(case, law, K1, points=2001):
+    """Return the least and the largest cam force, N, of s'' at even knots with a spring K1, by a dense scan."""
+    at = replace(case, law=tuple(law))
+    found = [plain.force(np, at, s, np.linspace(float(s[3]), float(s[4]), points), K1) for s in plain.stretches(at)]
+    return min(each.min() for each in found), max(each.max() for each in found)
