@@ -22,6 +22,7 @@ benchmark: .venv/installed-test
 	$(BIN)/python benchmarks/kinematics_speed.py
 	$(BIN)/python benchmarks/balance_peers.py
 	$(BIN)/python benchmarks/rapier_peers.py
+	$(BIN)/python benchmarks/shedding_peers.py
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv

@@ -46,10 +46,10 @@ def today(scene: Any) -> str:
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
 
 
-def explain(scene: Any) -> str:
-    """Say why coils that surge late enough are stressed too much, and what helps; "" without coils."""
+def explain(scene: Any, target: str) -> str:
+    """Say why coils that surge late enough are stressed too much, and what helps; "" where none are sought."""
     own = scene.effects.get("coil")
-    if own is None:
+    if own is None or target == "speed":
         return ""
     known, limited = shedding_program.numbers(scene), shedding_program.bounds(scene)
     stretch = limited["X0"][1] + known["travel"]
