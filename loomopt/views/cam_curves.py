@@ -93,7 +93,7 @@ def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
     lacking = missing(scene)
     if lacking:
         keys = ", ".join(f"mechanism.{name}" for name in lacking)
-        remedy = f"Give {', '.join(lacking)}: the roller follower has {', '.join(FOLLOWER)}"
+        remedy = f"Give them in [mechanism]; a roller follower has {', '.join(FOLLOWER)}"
         raise refusal("the cam cannot be drawn without its follower", scene.origin, keys, remedy=remedy)
     given = flat(design)
     values = shedding_design.values_of(scene, given)

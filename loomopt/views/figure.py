@@ -148,6 +148,7 @@ def _curves(axes: Any, frame: "pd.DataFrame", panel: Panel, place: int) -> None:
     _points(axes, panel, size, colours[0])
     axes.xaxis.set_major_locator(MultipleLocator(45))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))  # no common power that stands in the way
     axes.grid(color="#e5e7eb", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
 

@@ -75,12 +75,29 @@ def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
 @pytest.mark.parametrize("name", packaged.problem_names())
 def test_every_packaged_scene_is_drawn_and_its_equations_printed(name):
     scene = lo.load(name)
-    view = job_views.view(scene)
+    view, task = job_views.view(scene), TASKS[scene.job.name]
     drawn = view.linkage(scene, {})
-    marks = {mark for mark in TASKS[scene.job.name].marks(scene, scene.mechanism) if mark in LAYERS}
-    assert marks >= {"front dead centre", "rear dead centre"}
+    marks = {mark for mark in task.marks(scene, task.today(scene)) if mark in LAYERS}
+    assert marks >= MARKED[scene.job.name]
     assert marks <= {primitive.layer for primitive in drawn.primitives}
     assert len(view.joints_csv(scene, {}).splitlines()) > 6
     printed = {equation.name for equation in view.equations(scene)}
     assert set(scene.effects) <= printed
-    assert {"front dead centre", "rear dead centre"} <= printed
+    assert NAMED[scene.job.name] <= printed
+    assert view.missing(scene) == view.remarks(scene, {}) == ()
+    columns = ("phi [rad]", *task.curves(scene, task.today(scene)))
+    shown = {column for panel in view.panels(scene, {}, columns) for column in panel.columns}
+    assert shown
+    assert shown <= set(columns)
+
+
+MARKED = {name: {"front dead centre", "rear dead centre"} for name in ("beatup", "rapier")}
+MARKED["shedding"] = {"least cam force"}
+NAMED = MARKED | {"shedding": {"cam law cycloidal", "return_spring", "balance", "contact", "profile"}}
+
+
+def test_a_job_shows_every_column_with_a_unit_unless_it_says_otherwise():
+    scene = lo.load("beatup")
+    panels = job_views.view(scene).panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
+    assert [panel.columns for panel in panels] == [("psi [rad]",), ("M3 [N*m]",)]
+    assert [(panel.label, panel.unit) for panel in panels] == [("psi", "rad"), ("M3", "N*m")]
