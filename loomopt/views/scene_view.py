@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from loomopt.designs import flat
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.words import Words
 from loomopt.views import job_views
@@ -98,7 +99,7 @@ def equations(scene: Any) -> list[str]:
 def curves(scene: Any, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
     """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
     task = TASKS[scene.job.name]
-    full = {**task.today(scene), **design}
+    full = {**task.today(scene), **flat(design)}
     columns = dict(task.curves(scene, full))
     angle = np.degrees(columns.pop("phi [rad]"))
     places = {name: math.degrees(value) for name, value in _single(task.marks(scene, full)).items()}
