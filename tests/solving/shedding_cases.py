@@ -26,6 +26,7 @@ def product(case):
     return lo.load("shedding").update(
         {
             "mechanism.travel": f"{case.travel!r} m",
+            "mechanism.law": case.law,
             "operation.N_min": f"{case.N_min!r} N",
             "operation.speed": f"{case.rpm!r} rpm",
             "effects.warp_tension.shape": case.shape,
@@ -34,17 +35,31 @@ def product(case):
     )
 
 
-@functools.cache
 def freed(case, n, symmetric=False, bound=CYCLOID):
     """Return the product's least spring of a plain scene with a free law of n intervals."""
-    own = {"intervals": n, "symmetric": symmetric, "acceleration": float(bound)}
+    return _freed(case, n, symmetric, float(bound))
+
+
+@functools.cache
+def _freed(case, n, symmetric, bound):
+    own = {"intervals": n, "symmetric": symmetric, "acceleration": bound}
     return lo.solve(product(case).update({f"targets.law.{key}": value for key, value in own.items()}), "law")
 
 
-@functools.cache
 def programmed(case, n, symmetric=False, bound=CYCLOID):
     """Return the same stiffness, N/m, by the plain reference's linear programmes."""
+    return _programmed(case, n, symmetric, float(bound))
+
+
+@functools.cache
+def _programmed(case, n, symmetric, bound):
     return float(plain.least_law(case, n, bound, symmetric)[0])
+
+
+def flat(design):
+    """Return a design with every number of its law under a name of its own."""
+    knots = {f"law_{k}": value for k, value in enumerate(design["law"])}
+    return {name: value for name, value in design.items() if name != "law"} | knots
 
 
 def lowest(case, law, K1, points=2001):

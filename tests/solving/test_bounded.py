@@ -9,7 +9,7 @@ import pytest
 import toy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shedding_cases import freed, plain
+from shedding_cases import flat, freed, plain
 
 import loomopt as lo
 from loomopt import maths
@@ -83,12 +83,6 @@ def test_the_bound_holds_for_a_free_law_that_touches_at_many_places(symmetric):
         check(sampled, boxes, name)
     touching = [e for e in sampled.extremes("lift") if abs(e.value) < 1e-9 * answer.figures["contact_max"]]
     assert len(touching) > 4
-
-
-def flat(design):
-    """Return a design with every number of its law under a name of its own."""
-    knots = {f"law_{k}": value for k, value in enumerate(design["law"])}
-    return {name: value for name, value in design.items() if name != "law"} | knots
 
 
 def test_a_bound_on_some_pieces_speaks_of_these_alone():
