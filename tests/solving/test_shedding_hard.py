@@ -8,6 +8,7 @@ import pytest
 from shedding_by_hand import peak, plain, product, softest
 
 import loomopt as lo
+from loomopt.errors import BadInput
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.certificate import certify
 
@@ -149,6 +150,30 @@ def test_a_speed_that_another_limit_stops_is_the_one_that_is_told():
     rpm = answer.design["speed"] * 30 / math.pi
     assert float(plain.least_stiffness(replace(PAPER, N_min=100, rpm=rpm))[0]) == pytest.approx(8029.14, rel=1e-9)
     assert f"{rpm:.2f}" in answer.message
+
+
+@pytest.mark.xfail(reason="24096050 rad/s is called the optimum; contact in the dwells does not depend on the speed")
+def test_a_speed_that_nothing_limits_is_refused():
+    """With the warp's pull known in the dwells only, contact is judged there, where the frame stands still."""
+    with pytest.raises(BadInput):
+        lo.solve(lo.load("shedding").set("effects.warp_tension.shape", "levels"), "speed")
+
+
+def test_a_frame_that_stands_still_has_no_highest_speed():
+    with pytest.raises(BadInput):
+        lo.solve(lo.load("shedding").set("mechanism.travel", "0 mm"), "speed")
+
+
+EXTREME = pytest.mark.xfail(reason="the size of the forces is that of today's speed: prices vanish, then the answer")
+
+
+@pytest.mark.parametrize(
+    "rpm", [0.1, 1.0, 3000.0, 10_000.0, pytest.param(1e-3, marks=EXTREME), pytest.param(1e5, marks=EXTREME)]
+)
+def test_the_highest_speed_is_found_from_far_away(rpm):
+    answer = solved(lo.load("shedding").set("operation.speed", f"{rpm} rpm"), "speed")
+    assert answer.design["speed"] * 30 / math.pi == pytest.approx(144.508702549280, rel=1e-9)
+    assert {price.limit for price in answer.binding} == {"K1", "X0", "travel", "N_min"}
 
 
 @pytest.mark.parametrize("angles", [(180, 0, 180, 0), (150, 0, 150, 60), (120, 60, 120, 60)])
