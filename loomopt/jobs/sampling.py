@@ -19,8 +19,6 @@ SAMPLES = 720
 """Samples of one turn from which extremes are refined; no piece gets fewer than SAMPLES/8."""
 CLOSER = 1 / 8
 """Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
-ROUNDING = 1e-14
-"""What float64 leaves of a value, relative."""
 GAUSS_NODES = 32
 
 
@@ -176,10 +174,8 @@ class Sampler:
         around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
         vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
         refined = sign * self.at(name, piece, vertex)
-        # A piece's end that is beaten by rounding only stays the extreme: where it lies is then known exactly.
-        end = (u[peaks] == 0.0) | (u[peaks] == 1.0)
-        better = refined >= sampled + np.where(end, ROUNDING * np.abs(sampled), 0.0)
-        better &= ~end | (refined > sampled)
+        level = np.ptp(around, axis=0) == 0.0
+        better = (refined >= sampled) & ~level
         best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme, signed=signed) for extreme in found]

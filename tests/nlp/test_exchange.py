@@ -20,7 +20,8 @@ from loomopt.solving.certificate import certify
 class Wave:
     """A model of two numbers whose whole-cycle quantity has peaks that are known in closed form."""
 
-    loads = integrals = switched = signed = bounded = ()
+    loads = integrals = switched = ()
+    signed = bounded = frozenset()
     quantities = ("wave", "circle", "sharp")
     key = "wave"
 
