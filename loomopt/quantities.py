@@ -4,6 +4,7 @@ Numbers and unit factors are exact fractions until the last step, so "155 mm", "
 give the same float64. Angle is a dimension of its own: an angle and an angular speed must name their unit.
 """
 
+import json
 import math
 import re
 import typing
@@ -191,6 +192,37 @@ class Quantity:
         return core_schema.no_info_plain_validator_function(self.validate)
 
 
+@dataclass(frozen=True)
+class NumberList:
+    """A list of pure numbers, as in TOML or as JSON text; at most `longest` of them."""
+
+    longest: int = 1000
+
+    def validate(self, raw: object) -> tuple[float, ...]:
+        """Return raw as numbers. Raises QuantityError."""
+        values = _parsed(raw) if isinstance(raw, str) else raw
+        numbers = values if isinstance(values, list | tuple) else []
+        if not numbers or len(numbers) > self.longest or not all(_is_number(value) for value in numbers):
+            allowed = f"a list of up to {self.longest} numbers, such as [0, 6.28, -6.28, 0]"
+            raise QuantityError("it is not a list of numbers", allowed, "Write numbers between brackets")
+        return tuple(float(value) for value in numbers)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Let pydantic read a field of this type by `validate`."""
+        return core_schema.no_info_plain_validator_function(self.validate)
+
+
+def _parsed(text: str) -> object:
+    try:
+        return json.loads(text[: 100 * _LONGEST_TEXT])
+    except (ValueError, RecursionError):
+        return None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e60
+
+
 def quantity_of(model: type[BaseModel], field: str) -> Quantity | None:
     """Return what a model's field may be, also for `X | None`; None for a field that holds no quantity."""
     info = model.model_fields[field]
@@ -236,4 +268,5 @@ PositiveDensity = Annotated[float, Quantity("density", above=0)]
 Speed = Annotated[float, Quantity("angular speed", above=0)]
 RotaryDamping = Annotated[float, Quantity("rotary damping", least=0)]
 PureNumber = Annotated[float, Quantity("number", least=0)]
+Numbers = Annotated[tuple[float, ...], NumberList()]
 PositiveNumber = Annotated[float, Quantity("number", above=0)]

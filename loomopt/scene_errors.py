@@ -19,6 +19,10 @@ _PROBLEMS = {
     "dict_type": "it is not a table",
     "string_type": "it is not text",
     "bool_type": "it is neither true nor false",
+    "bool_parsing": "it is neither true nor false",
+    "int_type": "it is not a whole number",
+    "int_parsing": "it is not a whole number",
+    "int_from_float": "it is not a whole number",
 }
 
 

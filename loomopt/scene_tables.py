@@ -178,7 +178,8 @@ def limits(raw: Any, job: Job, effects: Mapping[str, Table], origin: str) -> dic
         if name not in limitable:
             raise unknown("figure to limit", name, limitable, origin, f"limits.{name}")
         for other, effect in job.effects.items():
-            if isinstance(effect, Check) and name in effect.quantities and other not in effects:
+            given = isinstance(effect, Check) and name in {*effect.quantities, *effect.rows}
+            if given and other not in effects:
                 remedy = f"Put it on (--with {other}), or take the limit out"
                 raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
     return {name: _limit(inner[name], job, name, origin) for name in inner}

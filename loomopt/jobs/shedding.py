@@ -223,7 +223,7 @@ class Shedding:
             "near_dwell": lambda: values["near_dwell"],
         }
         if "speed" in values:
-            rows |= {"contact_speed": lambda: values["speed"], "cam_period": lambda: 1 / values["speed"]}
+            rows |= {"speed": lambda: values["speed"], "cam_period": lambda: 1 / values["speed"]}
         if isinstance(self.law, Spline):
             rows |= {name: functools.partial(_spline_row, self.law, values, name) for name in spline_rows(self.law)}
         for check in self.checks:

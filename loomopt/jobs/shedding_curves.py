@@ -29,7 +29,7 @@ def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
     pose = physics.pose(maths.numpy(), sampled.given, theta, switches)
     shape = theta.shape
     columns = {
-        "phi [rad]": np.where(theta >= TURN, theta - TURN, theta),
+        "phi [rad]": theta,
         "X [m]": pose.q,
         "X_1 [m/rad]": pose.q1,
         "X_2 [m/rad^2]": pose.q2,

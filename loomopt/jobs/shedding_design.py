@@ -9,8 +9,9 @@ from loomopt.jobs.program import Move, Program, Variable, Wish
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.jobs.shedding import Shedding
 from loomopt.jobs.shedding_law import PREFIX, Spline
+from loomopt.jobs.shedding_limits import CYCLE
 from loomopt.jobs.shedding_pose import DWELLS
-from loomopt.jobs.shedding_program import CYCLE, bounds, named, numbers, today
+from loomopt.jobs.shedding_program import bounds, named, numbers, today
 from loomopt.jobs.shedding_program import model as model_of
 from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_tables import FIGURES, SEGMENTS, VARIABLES

@@ -18,7 +18,7 @@ def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> st
     """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
     size = {name: value or 0.0 for name, value in figures.items()}
     stiffness = show(size["spring_force_max"] / (size["spring_stretch"] or math.inf), scene.unit("K1", "stiffness"), 9)
-    speed = show(size["contact_speed"], scene.unit("speed", "angular speed"), 7)
+    speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
     kept = "keeps the roller on the cam all round"
     if "levels" in [getattr(own, "shape", "") for own in scene.effects.values()]:
         kept = "keeps the roller on the cam in both dwells"

@@ -8,11 +8,12 @@ from loomopt.errors import BadInput
 from loomopt.jobs import numbers as scene_numbers
 from loomopt.jobs import shedding_fault
 from loomopt.jobs.numbers import full_name, words
-from loomopt.jobs.program import Limit, Objective, Program, Variable
+from loomopt.jobs.program import Objective, Program, Variable
 from loomopt.jobs.sampling import Sampler
-from loomopt.jobs.shedding import FOLLOWER, Shedding, spline_rows
+from loomopt.jobs.shedding import Shedding
 from loomopt.jobs.shedding_law import PREFIX, CamLaw, Spline
-from loomopt.jobs.shedding_pose import DWELLS, RETURN_SPRING
+from loomopt.jobs.shedding_limits import Limits
+from loomopt.jobs.shedding_pose import RETURN_SPRING
 from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_sizes import Sizes
 from loomopt.jobs.shedding_tables import SEGMENTS, VARIABLES
@@ -22,17 +23,10 @@ from loomopt.schema import Check, Load
 
 DYNAMIC = ("inertia", "damping", "coil")
 """Effects that read the speed."""
-CYCLE = {
-    "contact_min": "lift",
-    "contact_max": "cam_force",
-    "law_acceleration": "law_acceleration",
-    "pressure_angle_max": "pressure_angle",
-    "curvature_min": "concavity",
-    "curvature_max": "curvature",
-}
-"""Figures that are extremes over the cycle, with their quantities."""
 ROOM = 0.01
 """Share of a bound's width that a start keeps from its ends."""
+SLOWER = 0.9
+"""A start's speed over the one that today's spring survives."""
 SPARE = 1.1
 """A start's stiffness over the least that keeps contact at today's law and preload."""
 
@@ -90,13 +84,13 @@ def demand(scene: Any, target: str) -> None:
                 key=f"effects.{name}",
                 remedy=f"Add the table [effects.{name}], or choose another target.",
             )
-    if target == "speed" and math.isinf(contact_speed(model(scene), numbers(scene), scene.operation["N_min"])):
+    if target == "speed" and (model(scene).is_level or math.isinf(_survived(scene))):
         raise BadInput(
-            "the roller stays on the cam at any speed: nothing limits it",
+            "nothing limits the speed: as the scene stands, the roller stays on the cam at any",
             file=scene.origin,
-            key="effects.inertia.M",
-            value=scene.given("effects.inertia.M"),
-            remedy="Give the moving mass, or choose another target.",
+            key="effects.inertia.M, mechanism.travel, effects.warp_tension.shape",
+            allowed="a moving mass, a travel, and a warp tension that is known in the moves (linear, step)",
+            remedy="Correct them, or choose another target.",
         )
     own = scene.targets["law"]
     fewest, most = shedding_fault.FEWEST, shedding_fault.MOST
@@ -109,6 +103,11 @@ def demand(scene: Any, target: str) -> None:
             allowed=f"{fewest} to {most}, an even number for a symmetric law",
             remedy="Write intervals = 16.",
         )
+
+
+def _survived(scene: Any) -> float:
+    """Return the speed, rad/s, up to which today's spring keeps contact."""
+    return contact_speed(model(scene), numbers(scene), scene.operation["N_min"])
 
 
 def program(scene: Any, target: str) -> Program:
@@ -131,12 +130,17 @@ class _Task:
         self.physics = model(scene, self.law)
         self.sampler = Sampler(self.physics, self.known)
         self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"])
+        self.kept = ["travel", *(["speed"] if set(DYNAMIC) & set(scene.effects) else [])]
+        self.limits = Limits(scene, target, self.physics, self.known, self.limited, self.sizes, self.kept, self.law)
         self.coiled = "coil" in scene.effects
+        self.fastest = 0.0
+        if target == "speed":
+            survived = _survived(scene)
+            self.fastest = survived if 0.0 < survived < math.inf else self.known["speed"]
 
     def program(self) -> Program:
         variables = self._variables()
-        limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures(), *self._coil()]
-        limits += self._law() if self.law else []
+        limits = self.limits.all(variables)
         taken = {variable.name for variable in variables}
         parameters = {name: value for name, value in self.known.items() if name not in taken}
         starts = self._starts(variables)
@@ -152,18 +156,14 @@ class _Task:
         if self.target == "speed":
             ends |= {name: (known[name],) * 2 for name in ends if name.startswith("coil.")}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.coiled else {"K1": (known["K1"],) * 2})
-            ends["speed"] = self.limited.get("speed", (1e-3 * known["speed"], math.inf))
-        for name in self._kept():
+            ends["speed"] = self.limited.get("speed", (1e-3 * self.fastest, math.inf))
+        for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))
         found = [Variable(name, *end, self._size(name, end), self._range(name, end)) for name, end in ends.items()]
         if self.law:
-            most = self._most_acceleration()
+            most = self.limits.most_acceleration
             found += [Variable(name, -math.inf, math.inf, most, (-most, most)) for name in self.law.names]
         return found
-
-    def _kept(self) -> list[str]:
-        """Return the numbers every target keeps."""
-        return ["travel", *(["speed"] if set(DYNAMIC) & set(self.scene.effects) else [])]
 
     def _size(self, name: str, ends: tuple[float, float]) -> float:
         """Return a variable's natural size, SI."""
@@ -171,6 +171,8 @@ class _Task:
             return self.sizes.stiffness
         if name in SEGMENTS:
             return 1.0
+        if name == "speed" and self.fastest:
+            return self.fastest
         finite = [abs(end) for end in (*ends, self.known[name]) if math.isfinite(end)]
         return max(finite) or 1.0
 
@@ -181,107 +183,12 @@ class _Task:
             return least, min(ends[1], 10.0 * self.sizes.needed)
         return ends[0], min(ends[1], 3.0 * self.known[name]) if math.isinf(ends[1]) else ends[1]
 
-    def _bounds(self, variables: list[Variable]) -> list[Limit]:
-        """Return the bounds of variables as limits; a requirement gives way on one side only."""
-        found = []
-        for v in variables:
-            label = v.name.rpartition(".")[2]
-            if v.name.startswith(PREFIX):
-                continue
-            if v.lower == v.upper:
-                sign = -1 if v.name in self._kept() else 1 if self.target == "speed" and v.name in VARIABLES else 0
-                bounded = label in self.scene.bounds or sign
-                found += [Limit(label, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
-                continue
-            own = v.name != "speed" or "speed" in self.limited
-            for sign, value in ((-1, v.lower), (1, v.upper)):
-                if math.isfinite(value):
-                    found.append(Limit(label, sign, v.name, value, v.scale, "variable", relaxable=own and value > 0.0))
-        return found
-
-    def _contact(self) -> list[Limit]:
-        """Return the limit that is the job: contact all round, or where the warp's pull is known."""
-        least, size = self.known["N_min"], self.sizes.force
-        arcs = [(0, float(dwell)) for dwell in DWELLS] if self.physics.is_level else [None]
-        return [Limit("N_min", -1, "lift", least, size, "cycle", where=where) for where in arcs]
-
-    def _angles(self) -> list[Limit]:
-        """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""
-        free = [name for name in SEGMENTS if name in self.scene.bounds and self.scene.bounds[name].free]
-        if not free:
-            return []
-        low, high = self.limited.get("near_dwell", (0.0, math.inf))
-        ends = ((0, low),) if low == high else ((-1, low), (1, high))
-        return [
-            Limit("near_dwell", sign, "near_dwell", value, 1.0, "static", relaxable=value > 0.0)
-            for sign, value in ends
-            if math.isfinite(value)
-        ]
-
-    def _figures(self) -> list[Limit]:
-        """Return the scene's limits on figures."""
-        found = []
-        for name, limit in self.scene.limits.items():
-            if name == "law_acceleration" and self.law:
-                continue
-            ends = [(sign, value) for sign, value in ((-1, limit.min), (1, limit.max)) if value is not None]
-            for sign, value in ends:
-                if name in CYCLE:
-                    self._demand_quantity(name)
-                    size = self.sizes.figure(name, CYCLE[name], value)
-                    # The least of a quantity is the largest of its opposite, which the row then is.
-                    found.append(Limit(name, sign, CYCLE[name], value, size, "cycle"))
-                else:
-                    found.append(Limit(name, sign, name, value, abs(value) or 1.0, "static"))
-        return found
-
-    def _demand_quantity(self, name: str) -> None:
-        if CYCLE[name] not in (*self.physics.quantities, "lift"):
-            raise BadInput(
-                f"nothing in the scene gives the figure {name}",
-                file=self.scene.origin,
-                key=f"limits.{name}",
-                remedy=f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out.",
-            )
-
-    def _coil(self) -> list[Limit]:
-        """Return what the effects that are checks demand of their rows."""
-        found = []
-        for check in self.physics.checks:
-            for each in check.demands:
-                value = each.value if isinstance(each.value, float) else self.known[f"{check.name}.{each.value}"]
-                firm = each.row in self.scene.job.margins or not isinstance(each.value, str)
-                size = self.sizes.margin(self.scene.job.margins.get(each.row, ""), value)
-                found.append(Limit(each.row, each.sign, each.row, value, size, "static", relaxable=not firm))
-        return found
-
-    def _most_acceleration(self) -> float:
-        """Return the largest |s''| a free law may have."""
-        limit = self.scene.limits.get("law_acceleration")
-        return float(limit.max if limit else self.scene.targets["law"].acceleration)
-
-    def _law(self) -> list[Limit]:
-        """Return what makes a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
-        law = self.law
-        assert law is not None
-        most = self._most_acceleration()
-        ends = [("law_end", 1.0), *([] if law.mirrored else [("law_end_slope", 0.0)])]
-        found = [Limit(row, 0, row, value, 1.0, "static", relaxable=False, hidden=True) for row, value in ends]
-        last = law.intervals // 2 if law.mirrored else law.intervals - 1
-        for row in spline_rows(law)[2:]:
-            _, side, knot = row.split("_")
-            if int(knot) <= last and side == "slope":
-                found.append(Limit(row, -1, row, 0.0, 1.0, "static", relaxable=False, hidden=True))
-            elif int(knot) <= last:
-                found.append(Limit("law_acceleration", 1, row, most, most, "static"))
-        return found
-
     def _objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order."""
         if self.target == "force":
             return (Objective("contact_max", "cam_force", "peak", self.sizes.force),)
         if self.target == "speed":
-            return (Objective("contact_speed", "cam_period", "value", 1 / self.known["speed"], power=-1),)
+            return (Objective("speed", "cam_period", "value", 1 / self.fastest, power=-1),)
         least = Objective("K1", "K1", "value", self.sizes.stiffness)
         if not self.coiled:
             return (least,)
@@ -296,6 +203,8 @@ class _Task:
                 width = v.upper - v.lower
                 room = ROOM * width if math.isfinite(width) else 0.0
                 start[v.name] = min(max(self.known[v.name], v.lower + room), v.upper - room)
+                if v.name == "speed" and self.fastest:
+                    start["speed"] = min(max(SLOWER * self.fastest, v.lower), v.upper)
                 if v.name == "X0":
                     start[v.name] = v.lower + preload * width
             stiff = SPARE * self.sizes.stiffness_for(self.known["N_min"], start["X0"])

@@ -11,7 +11,17 @@ from loomopt.effects.coil import MARGINS
 from loomopt.errors import BadInput
 from loomopt.jobs import shedding_fault
 from loomopt.jobs.template import SHEDDING_TEMPLATE
-from loomopt.quantities import Angle, Force, Length, PositiveLength, PositiveNumber, SegmentAngle, Speed, Stiffness
+from loomopt.quantities import (
+    Angle,
+    Force,
+    Length,
+    Numbers,
+    PositiveLength,
+    PositiveNumber,
+    SegmentAngle,
+    Speed,
+    Stiffness,
+)
 from loomopt.schema import Figure, Job, Table, Target
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
@@ -52,7 +62,7 @@ class Frame(Table):
 
     travel: Length
     law: LAW = "cycloidal"
-    law_coefficients: tuple[float, ...] | None = None
+    law_coefficients: Numbers | None = None
     law_table: str | None = None
     rise: SegmentAngle
     far_dwell: SegmentAngle
@@ -95,6 +105,7 @@ FIGURES = {
         Figure("contact_angle", "angle", "cam angle where it is least", sides=()),
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
         Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=()),
+        Figure("speed", "angular speed", "cam shaft speed", sides=()),
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
         Figure("spring_stretch", "length", "largest elongation of the return spring", sides=("max",)),
         Figure("travel", "length", "travel of the heald frame", sides=()),
@@ -112,7 +123,6 @@ FIGURES = {
     )
 }
 
-COIL_FIGURES = tuple(FIGURES)[-7:]
 TARGETS = {
     target.name: target
     for target in (

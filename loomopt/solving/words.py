@@ -20,6 +20,11 @@ def outward(value: float, side: int) -> float:
     return float(f"{(math.ceil if side > 0 else math.floor)(value / step) * step:.6g}")
 
 
+def _grouped(unit: str) -> str:
+    """Return a unit that may stand after a stroke."""
+    return f"({unit})" if "/" in unit else unit
+
+
 class Words:
     """The vocabulary of one scene: kinds and units of its variables and figures."""
 
@@ -73,7 +78,7 @@ class Words:
             value=limit.value,
             text=self.limit(limit),
             worth={figure: worth},
-            unit={figure: f"{self.si(figure)}/{self.si(limit.name)}"},
+            unit={figure: f"{self.si(figure)}/{_grouped(self.si(limit.name))}"},
             reading=f"{amount:.3g}{figure_text} per {per}",
         )
 

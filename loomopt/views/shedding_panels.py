@@ -24,7 +24,14 @@ def panels(scene: Scene, design: Mapping[str, float], columns: Sequence[str]) ->
         points = (Mark(angle, force, f"least {said:.6g} N at {math.degrees(angle):.2f} deg"),)
     least = values["N_min"]
     shown = [
-        Panel((FORCE,), "cam force N", {f"N_min = {least:.6g} N": least}, points, wide=True, today=True),
+        Panel(
+            (FORCE,),
+            "cam force N",
+            {f"N_min = {least:.6g} N; below, contact is lost": least},
+            points,
+            wide=True,
+            today=True,
+        ),
         Panel(tuple(name for name in columns if split(name)[1] == "N" and name != FORCE), "forces"),
         Panel(("X [m]",), "travel X"),
     ]
