@@ -113,14 +113,12 @@ def test_a_bad_line_in_a_file_exits_with_2(cli, place, name):
     assert all(part in err for part in told), err
 
 
-@pytest.mark.xfail(reason="the figure has no row without the effect coil: KeyError", raises=KeyError)
 def test_a_limit_on_the_coils_without_coils_is_refused(cli):
     status, out, err = cli("solve", "shedding", "--set", "limits.shear_stress.max=500 MPa")
     assert (status, out) == (2, "")
     assert "coil" in err
 
 
-@pytest.mark.xfail(reason="the message speaks of a tuple, and not of what to write")
 def test_coefficients_that_are_no_list_of_numbers_are_refused_in_plain_words(cli):
     _, _, err = cli("solve", "shedding", "--set", "mechanism.law=spline", "--set", "mechanism.law_coefficients=5")
     assert "mechanism.law_coefficients" in err

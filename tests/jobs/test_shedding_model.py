@@ -221,7 +221,7 @@ def test_harmonic_acceleration_jumps_at_every_end_of_a_dwell():
     up, down = (math.pi**2 / 2 * 0.0656 / math.radians(beta) ** 2 for beta in (100, 130))
     sides = {0: {0.0, up}, 100: {0.0, -up}, 170: {0.0, -down}, 300: {0.0, down}}
     for corner, expected in sides.items():
-        here = sorted(X_2[np.abs(angle - corner) < 1e-9])
+        here = sorted(X_2[np.abs((angle - corner + 180) % 360 - 180) < 1e-9])
         assert here == pytest.approx(sorted(expected), rel=1e-12, abs=1e-12)
 
 

@@ -30,7 +30,6 @@ HARD = {
     "curved too much": {"limits.curvature_max.max": "20 1/m"},
     "pressure angle": {"limits.pressure_angle_max.max": "20 deg"},
 }
-NOT_TO_BE_HAD = "N_min is relaxed below 0, a pull of the cam that no cam and no scene can give"
 
 
 def solved(scene, target="stiffness"):
@@ -40,14 +39,15 @@ def solved(scene, target="stiffness"):
     return answer
 
 
-def granted(scene, relaxations, more=1e-3):
-    """Return the scene with relaxations granted, each `more` beyond, relative to the limit."""
+def granted(scene, relaxations, target, more=1e-3):
+    """Return the scene with relaxations granted, each `more` beyond; of the spring that target speed takes, itself."""
     changes = {}
     for relaxation in relaxations:
         name, side = relaxation.limit, relaxation.side
         outward = 1 if side == "max" else -1
         value = relaxation.needed + outward * more * max(abs(relaxation.needed), abs(relaxation.value))
         key, unit = KEY.get(name) or (f"limits.{name}.{side}", FIGURE_UNITS.get(name))
+        key = f"mechanism.{name}" if target == "speed" and name in ("K1", "X0") else key
         changes[key] = f"{value!r} {unit}".strip()
     return scene.update(changes)
 
@@ -63,7 +63,7 @@ def assert_helped(scene, answer, target="stiffness"):
     together = [one for one in answer.relaxation if not one.alone]
     sets = [[one] for one in answer.relaxation if one.alone] + ([together] if together else [])
     for relaxations in sets:
-        helped = lo.solve(granted(scene, relaxations), target)
+        helped = lo.solve(granted(scene, relaxations, target), target)
         assert helped.status == "optimal", (relaxations, helped.message)
         assert helped.admissible
 
@@ -78,7 +78,6 @@ def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     assert {one.limit for one in answer.relaxation} <= {*KEY, *FIGURE_UNITS}
 
 
-@pytest.mark.xfail(reason=NOT_TO_BE_HAD)
 @pytest.mark.parametrize(
     ("target", "changes"),
     [("stiffness", {"bounds.K1.max": "8029.14 N/m"}), ("speed", {"mechanism.K1": "5000 N/m"})],
@@ -142,7 +141,6 @@ def test_a_limit_on_the_least_cam_force_is_a_demand(least):
     assert answer.figures["K1"] == pytest.approx(float(plain.least_stiffness(demanded)[0]), rel=1e-9)
 
 
-@pytest.mark.xfail(reason="the sentence tells the speed of bare contact, not the one that keeps the scene's limits")
 def test_a_speed_that_another_limit_stops_is_the_one_that_is_told():
     """With 100 N of least cam force 135.16 rpm, where the spring of 8029.14 N/m is the least one for that demand."""
     scene = lo.load("shedding").set("limits.contact_min.min", "100 N")
@@ -152,7 +150,6 @@ def test_a_speed_that_another_limit_stops_is_the_one_that_is_told():
     assert f"{rpm:.2f}" in answer.message
 
 
-@pytest.mark.xfail(reason="24096050 rad/s is called the optimum; contact in the dwells does not depend on the speed")
 def test_a_speed_that_nothing_limits_is_refused():
     """With the warp's pull known in the dwells only, contact is judged there, where the frame stands still."""
     with pytest.raises(BadInput):
@@ -164,12 +161,7 @@ def test_a_frame_that_stands_still_has_no_highest_speed():
         lo.solve(lo.load("shedding").set("mechanism.travel", "0 mm"), "speed")
 
 
-EXTREME = pytest.mark.xfail(reason="the size of the forces is that of today's speed: prices vanish, then the answer")
-
-
-@pytest.mark.parametrize(
-    "rpm", [0.1, 1.0, 3000.0, 10_000.0, pytest.param(1e-3, marks=EXTREME), pytest.param(1e5, marks=EXTREME)]
-)
+@pytest.mark.parametrize("rpm", [1e-3, 0.1, 1.0, 3000.0, 10_000.0, 1e5])
 def test_the_highest_speed_is_found_from_far_away(rpm):
     answer = solved(lo.load("shedding").set("operation.speed", f"{rpm} rpm"), "speed")
     assert answer.design["speed"] * 30 / math.pi == pytest.approx(144.508702549280, rel=1e-9)

@@ -10,7 +10,7 @@ from shedding_by_hand import LAWS, lopsided, plain, product
 
 import loomopt as lo
 
-FRAMES = 40
+FRAMES = 32
 
 
 def drawn(seed):

@@ -174,7 +174,9 @@ def test_a_jump_of_acceleration_governs_as_a_corner():
     h, beta, omega = 0.0656, math.radians(120), 20 * math.pi
     expected = (369.55 - 83.03 + PAPER.M * math.pi**2 / 2 * h * omega**2 / beta**2) / (h + 0.08)
     assert answer.figures["K1"] == pytest.approx(expected, rel=1e-12)
-    assert math.degrees(answer.figures["contact_angle"]) == pytest.approx(120, abs=1e-9)
+    assert math.degrees(answer.figures["contact_angle"]) == pytest.approx(
+        120, abs=1e-5
+    )  # level there: a root of rounding
 
 
 def test_friction_jumps_where_the_frame_stops():
@@ -183,7 +185,9 @@ def test_friction_jumps_where_the_frame_stops():
     h, beta, omega = 0.0656, math.radians(120), 20 * math.pi
     expected = (369.55 - 83.03 + 20 + PAPER.M * math.pi**2 / 2 * h * omega**2 / beta**2) / (h + 0.08)
     assert answer.figures["K1"] == pytest.approx(expected, rel=1e-12)
-    assert math.degrees(answer.figures["contact_angle"]) == pytest.approx(180, abs=1e-9)
+    assert math.degrees(answer.figures["contact_angle"]) == pytest.approx(
+        180, abs=1e-5
+    )  # level there: a root of rounding
 
 
 def test_at_rest_friction_is_judged_by_its_worst():
