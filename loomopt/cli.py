@@ -47,6 +47,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
 
+def remarked(scene: Any, design: Any) -> None:
+    """Say on stderr what a reader of a design's figures should know."""
+    from loomopt.views import job_views
+
+    for text in job_views.view(scene).remarks(scene, design):
+        remark(f"Remark: {text}.")
+
+
 def printed(found: Evaluation) -> None:
     """Print one JSON object."""
     from loomopt.views import outputs
@@ -144,6 +152,7 @@ def solve(
         )
     if out:
         remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+    remarked(scene, answer.design)
     if as_json:
         printed(answer)
     else:
@@ -164,6 +173,7 @@ def evaluate(
     scene = read_scene(problem, sets, on, off)
     given = read_design(design, scene)
     found = api.evaluate(scene, given)
+    remarked(scene, given)
     if as_json:
         printed(found)
         return
@@ -199,18 +209,20 @@ def simulate(
 @app.command()
 def export(
     problem: Problem,
-    out: Annotated[Path, typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for the joints.")],
+    out: Annotated[Path, typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for joints or profile.")],
     design: Design = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Export the linkage at true scale, for the workshop."""
+    """Export linkage or cam at true scale, for the workshop."""
     from loomopt.views import outputs
 
     scene = read_scene(problem, sets, on, off)
-    outputs.linkage(out, scene, read_design(design, scene))
+    given = read_design(design, scene)
+    outputs.linkage(out, scene, given)
     remark(f"Wrote {out}")
+    remarked(scene, given)
 
 
 @app.command()

@@ -24,8 +24,8 @@ NEEDED = 1e-7
 def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Settings, words: Words) -> Clash:
     """Return the limits that clash and the least relaxations that make a design possible.
 
-    First the least sum over all limits, in natural sizes; then each limit by itself, where that suffices. Empty when
-    a design needs none (the limits do not clash after all) or when no relaxation was found.
+    First the least sum over all limits, in natural sizes; then each other limit by itself, where that suffices. Empty
+    when a design needs none (the limits do not clash after all) or when no relaxation was found.
     """
     together = _least(program, starts, settings)
     if together is None:
@@ -33,7 +33,8 @@ def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Set
     point, needs = together
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     groups = dict.fromkeys((limit.name, limit.sign) for limit in program.limits if limit.relaxable)
-    for group in groups if len(needs) > 1 else ():
+    known = {(program.limits[k].name, program.limits[k].sign) for k in needs} if len(needs) == 1 else set()
+    for group in (group for group in groups if needs and group not in known):
         single = _least(_only(program, *group), starts[:2], settings)
         if single and len(single[1]) == 1:
             found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single[1].items()]

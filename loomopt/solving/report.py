@@ -115,8 +115,9 @@ def without_optimum(
     """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
     if found.relaxations:
         together = ", ".join(r.text for r in found.relaxations if not r.alone) or found.relaxations[0].text
-        alone = [r.text for r in found.relaxations if r.alone] if len(found.relaxations) > 1 else []
-        single = f" By itself, any one of these would do: {'; '.join(alone)}." if alone else ""
+        alone = [r.text for r in found.relaxations if r.alone and r.text != together]
+        also = " too" if found.relaxations[0].alone else ""
+        single = f" By itself, any one of these would do{also}: {'; '.join(alone)}." if alone else ""
         message = (
             f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
             f"The least relaxation that helps: {together}.{single} {explanation}"

@@ -27,9 +27,11 @@ def product(case):
         {
             "mechanism.travel": f"{case.travel!r} m",
             "mechanism.law": case.law,
+            "effects.weight.G": f"{case.G!r} N",
+            "effects.inertia.M": f"{case.M!r} kg",
             "operation.N_min": f"{case.N_min!r} N",
             "operation.speed": f"{case.rpm!r} rpm",
-            "effects.warp_tension.shape": case.shape,
+            "effects.warp_tension": {"T1": f"{case.T1!r} N", "T2": f"{case.T2!r} N", "shape": case.shape},
             **changes,
         }
     )

@@ -85,7 +85,7 @@ def test_a_drive_that_is_fixed_altogether_is_told_its_own_stroke():
     fixed = {f"bounds.{name}": scene.given(f"mechanism.{name}") for name in scene.bounds if scene.bounds[name].free}
     answer = lo.solve(scene.update(fixed))
     assert answer.status == "infeasible"
-    (relaxation,) = answer.relaxation
+    relaxation = answer.relaxation[0]
     assert relaxation.limit == "stroke"
     assert relaxation.needed == pytest.approx(lo.evaluate(scene).figures["stroke"], rel=1e-9)
 
