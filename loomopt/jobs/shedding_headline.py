@@ -1,7 +1,7 @@
 """One sentence of what an optimum reached, and one of what today's spring does."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from loomopt.effects.coil import INDEX
@@ -46,10 +46,11 @@ def today(scene: Any) -> str:
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
 
 
-def explain(scene: Any, target: str) -> str:
-    """Say why coils that surge late enough are stressed too much, and what helps; "" where none are sought."""
+def explain(scene: Any, clash: Sequence[str]) -> str:
+    """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes."""
     own = scene.effects.get("coil")
-    if own is None or target == "speed":
+    named = {limit.split()[0] for limit in clash}
+    if own is None or "surge_ratio" not in named or not named & {"shear_share", "bending_share"}:
         return ""
     known, limited = shedding_program.numbers(scene), shedding_program.bounds(scene)
     stretch = limited["X0"][1] + known["travel"]
@@ -58,6 +59,8 @@ def explain(scene: Any, target: str) -> str:
     surge = own.surge_ratio * known["speed"] / (2 * math.pi)
     least = 2 * slimmest.wahl * stretch * surge * math.sqrt(2 * own.shear_modulus * own.density)
     most = own.shear_share * strength(FLOAT, thinnest, own.strength, own.strength_exponent)
+    if least <= most:
+        return ""
     return (
         f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
         f"{1e3 * stretch:.4g} mm carry at least {1e-6 * least:.4g} MPa of shear, whatever their size "

@@ -23,7 +23,7 @@ from loomopt.jobs.sampling import Sampler
 Numbers = Mapping[str, float]
 
 
-def _nothing(scene: Any, target: str) -> str:
+def _nothing(scene: Any, clash: Sequence[str]) -> str:
     return ""
 
 
@@ -42,7 +42,7 @@ class Task:
     figures(scene, design): every figure. sampler(scene, design): the design's cycle.
     curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
     sizes(scene): the freed variables that come in sizes only → those sold, ascending.
-    explain(scene, target): what physics says of why no design is admissible; "" where it says nothing.
+    explain(scene, clash): what physics says of why the limits `clash` (phrases) do; "" where it says nothing.
     """
 
     demand: Callable[[Any, str], None]
@@ -57,7 +57,7 @@ class Task:
     sampler: Callable[[Any, Numbers], Sampler]
     curves: Callable[[Any, Numbers], dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
-    explain: Callable[[Any, str], str] = _nothing
+    explain: Callable[[Any, Sequence[str]], str] = _nothing
     sizes: Callable[[Any], Mapping[str, Sequence[float]]] = _any
 
 

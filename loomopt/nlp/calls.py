@@ -53,10 +53,10 @@ class Calls:
         lower = np.array([v.lower / v.scale for v in variables])
         upper = np.array([v.upper / v.scale for v in variables])
         if self.elastic:
-            bounded = {limit.row for limit in self.program.limits if limit.family == "variable"}
-            open_ended = np.array([v.name in bounded for v in variables])
-            lower = np.where(open_ended, np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
-            upper = np.where(open_ended, np.inf, upper)
+            sides = [(limit.row, limit.sign) for limit in self.program.limits if limit.family == "variable"]
+            down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
+            lower = np.where([v.name in down for v in variables], np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
+            upper = np.where([v.name in up for v in variables], np.inf, upper)
         equal = [limit.sign == 0 for limit in nlp.static] + [False] * (nlp.nlp["g"].numel() - len(nlp.static))
         scaled = np.array([x[v.name] / v.scale for v in variables])
         return {

@@ -266,7 +266,7 @@ class _Search:
                 solver["iterations"] = sum(point.iterations for point in self.points)
             design = task.design(program, found.x) if found.x else task.today(scene)
             here = report.evaluation(scene, task, program, design)
-            return report.without_optimum(target, here, found, solver, before, task.explain(scene, target))
+            return report.without_optimum(target, here, found, solver, before, task.explain(scene, found.limits))
         same = [p for p in self.points if p.reached and self._compare(p, self.best) == 0]
         solver |= {
             "status": self.best.status,

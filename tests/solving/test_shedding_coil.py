@@ -189,7 +189,6 @@ def test_slower_cams_of_the_long_travel_have_coils(rpm):
     assert answer.design["wire"] in WIRES
 
 
-@pytest.mark.xfail(strict=True, reason="the stress bound is told of every scene with coils, broken or not")
 def test_the_stress_bound_is_told_only_where_it_is_broken():
     """At 200 rpm coils carry 491.8 MPa of 915.8 at least: here it is the space that is short."""
     answer = coiled("shedding", operation__speed="200 rpm", effects__coil__spring_length="100 mm")
@@ -271,7 +270,6 @@ def test_the_highest_speed_of_todays_coils_is_where_contact_ends_or_they_surge(r
     )
 
 
-@pytest.mark.xfail(strict=True, reason="the least relaxation lets today's preload fall and the travel grow for nothing")
 def test_at_too_great_a_stress_no_speed_will_do():
     """6 mm wire drawn by 94.5 mm: the hooks carry 1.9 GPa, whatever the speed."""
     answer = coiled(target="speed", effects__coil__initial_tension="200 N")
