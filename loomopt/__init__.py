@@ -8,7 +8,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from loomopt.api import Answer, evaluate, load, scene, simulate, solve
+    from loomopt.api import Answer, evaluate, load, prove, scene, simulate, solve
     from loomopt.errors import BadInput
     from loomopt.scenes import Scene
     from loomopt.solving.solution import Evaluation
@@ -22,12 +22,13 @@ _HOMES = {
     "Scene": "loomopt.scenes",
     "evaluate": "loomopt.api",
     "load": "loomopt.api",
+    "prove": "loomopt.api",
     "scene": "loomopt.api",
     "simulate": "loomopt.api",
     "solve": "loomopt.api",
 }
 
-__all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "scene", "simulate", "solve"]
+__all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
 
 
 def __getattr__(name: str) -> Any:

@@ -14,7 +14,9 @@ from loomopt.solving.solution import Evaluation, Solution
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Answer", "Scene", "evaluate", "load", "scene", "simulate", "solve"]
+    from loomopt.solving.proof import Proofs
+
+__all__ = ["Answer", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
 
 
 @dataclass(frozen=True)
@@ -47,13 +49,15 @@ def solve(
     starts: int = 1,
     seed: int = 0,
     near: Solution | None = None,
+    prove: bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
 ) -> Answer:
     """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
 
     accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts: the job's own first, then random ones drawn
-    with `seed`. near: an answer to the same structure, from which the solve starts warm. on_iteration(number),
+    with `seed`. near: an answer to the same structure, from which the solve starts warm. prove: whether every limit is proven at every
+    crank angle too. on_iteration(number),
     on_start(number, of): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     found = engine.solve(
@@ -63,6 +67,7 @@ def solve(
         starts=starts,
         seed=seed,
         near=near,
+        prove=prove,
         on_iteration=on_iteration,
         on_start=on_start,
     )
@@ -73,6 +78,19 @@ def solve(
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None) -> Evaluation:
     """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput."""
     return engine.evaluate(scene, designs.checked(design, scene) if design else None)
+
+
+def prove(
+    scene: Scene, design: Mapping[str, Any] | None = None, target: str | None = None, *, slack: float = 1e-8
+) -> "Proofs":
+    """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
+
+    target: whose limits, the job's default without one. slack: what binding limits leave open, relative to each
+    quantity's largest magnitude over the cycle. Raises BadInput.
+    """
+    from loomopt.solving import proof
+
+    return proof.prove(scene, designs.checked(design, scene) if design else {}, target, slack)
 
 
 def simulate(scene: Scene, design: Mapping[str, float] | None = None) -> "pd.DataFrame":

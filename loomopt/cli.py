@@ -134,6 +134,7 @@ def solve(
     off: Without = None,
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
     starts: Annotated[str, typer.Option(metavar="N", help="How many starts to try.")] = "1",
+    proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
     as_json: Json = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
@@ -148,7 +149,7 @@ def solve(
         outputs.check_folder(out)
     with Progress() as progress:
         answer = api.solve(
-            scene, target, **settings, on_start=lambda number, of: progress.say(f"start {number} of {of}")
+            scene, target, **settings, prove=proven, on_start=lambda number, of: progress.say(f"start {number} of {of}")
         )
     if out:
         remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
@@ -180,6 +181,29 @@ def evaluate(
     from loomopt.views import layout, terminal
 
     layout.show(*terminal.evaluation(found, scene, api.evaluate(scene) if given else None))
+
+
+@app.command()
+def prove(
+    problem: Problem,
+    design: Design = None,
+    target: Annotated[str | None, typer.Option(help="Whose limits; the job's default without it.")] = None,
+    slack: Annotated[str, typer.Option(metavar="R", help="What binding limits leave open, relative.")] = "1e-8",
+    sets: Set = None,
+    on: With = None,
+    off: Without = None,
+    as_json: Json = False,
+) -> None:
+    """Prove that limits and claimed peaks hold at every crank angle, or show where they fail."""
+    from loomopt.views import layout, outputs, terminal
+
+    scene = read_scene(problem, sets, on, off)
+    found = api.prove(scene, read_design(design, scene), target, slack=read_number("--slack", slack, float))
+    if as_json:
+        print(outputs.json_text(found.as_dict()))
+    else:
+        layout.show(*terminal.proofs(found))
+    raise typer.Exit(0 if found.passed else DIFFERS)
 
 
 @app.command()

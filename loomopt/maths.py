@@ -89,12 +89,18 @@ ORDER = 3
 def balls() -> Maths:
     """Arb's balls, and truncated Taylor series of them: every result encloses the true one.
 
-    atan2 is of balls only: there is no series of it.
+    What cannot be enclosed (a ball around zero in a denominator, the angle of nothing) raises ValueError.
     """
     flint = importlib.import_module("flint")
+    arb, series = flint.arb, flint.arb_series
 
     def atan2(y: Number, x: Number) -> Number:
-        return flint.arb.atan2(flint.arb(y), flint.arb(x))
+        if not isinstance(y, series) and not isinstance(x, series):
+            return arb.atan2(arb(y), arb(x))
+        whole = series([0, 0], ORDER)
+        y, x = whole + y, whole + x
+        slope = (x * y.derivative() - y * x.derivative()) / (x * x + y * y)
+        return arb.atan2(y[0], x[0]) + slope.integral()
 
     return Maths(
         "balls",
@@ -102,8 +108,8 @@ def balls() -> Maths:
         lambda x: x.cos(),
         lambda x: x.sqrt(),
         atan2,
-        flint.arb.pi(),
-        flint.arb,
+        arb.pi(),
+        arb,
         lambda place, values: values[int(float(place))],
     )
 

@@ -72,6 +72,11 @@ class Beatup:
         return frozenset()
 
     @property
+    def assembly(self) -> dict[str, tuple[str, float]]:
+        """The dyad's triangle closes: the square of its base B to D over what the links span, inside 1."""
+        return {"B to D < l2 + l3": ("span_far", 1.0), "B to D > |l2 - l3|": ("span_near", 1.0)}
+
+    @property
     def bounded(self) -> frozenset[str]:
         """None yet."""
         return frozenset()
@@ -108,7 +113,11 @@ class Beatup:
 
     def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
         """Return a whole-cycle quantity, SI, at crank angle φ, rad."""
+        if name in ("span_far", "span_near"):
+            return crank_rocker.span(maths, given.values["lengths"], phi, name == "span_far")
         pose = self.pose(maths, given, phi)
+        if name == "obliquity":
+            return pose.joints.obliquity
         if name == "peak_torque":
             return balance.crank_torque(maths, self.loads, pose, given, switches)
         if name == "M3_square":

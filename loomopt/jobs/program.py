@@ -57,6 +57,10 @@ class Model(Protocol):
         """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
 
     @property
+    def assembly(self) -> Mapping[str, tuple[str, float]]:
+        """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
+
+    @property
     def integrals(self) -> tuple[Integral, ...]:
         """The means over part of the cycle this model knows."""
 

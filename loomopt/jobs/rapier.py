@@ -112,6 +112,13 @@ class Rapier:
         return frozenset()
 
     @property
+    def assembly(self) -> dict[str, tuple[str, float]]:
+        """Both dyads' triangles close: the square of their base over what the links span, inside 1."""
+        five_bar = {"five-bar: C to B2 < l5 + l6": "span_far", "five-bar: C to B2 > |l5 - l6|": "span_near"}
+        sley = {"sley: A to B0 < l2 + l3": "sley_span_far", "sley: A to B0 > |l2 - l3|": "sley_span_near"}
+        return {name: (quantity, 1.0) for name, quantity in (five_bar | sley).items()}
+
+    @property
     def bounded(self) -> frozenset[str]:
         """None yet."""
         return frozenset()
@@ -197,6 +204,8 @@ class Rapier:
             return pose.joints.obliquity
         if name in ("span_far", "span_near"):
             return self._span(values, pose.joints, name)
+        if name in ("sley_span_far", "sley_span_near"):
+            return crank_rocker.span(maths, _sley(values), phi + values["beta"], name == "sley_span_far")
         force = balance.output_force(maths, self.loads, pose, given, switches[: len(self.loads)])
         return force if name == "tape_force" else force * pose.q1
 

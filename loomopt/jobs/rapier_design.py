@@ -72,4 +72,9 @@ def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
     return found
 
 
-__all__ = ["design", "figures", "moves", "sampler", "tidy", "today", "values", "wish"]
+def peaks(model: Any) -> dict[str, str]:
+    """Return the figures that are extremes over the cycle, with their quantities."""
+    return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
+
+
+__all__ = ["design", "figures", "moves", "peaks", "sampler", "tidy", "today", "values", "wish"]

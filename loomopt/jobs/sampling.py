@@ -79,7 +79,7 @@ class Sampler:
     """One design, ready to be sampled over its cycle."""
 
     def __init__(self, model: Model, values: Mapping[str, float]) -> None:
-        self.model = model
+        self.model, self.values = model, dict(values)
         self.given: Given = model.given(maths.FLOAT, values)
         self.hints = dict(model.hints(self.given))
         if self.hints:

@@ -5,6 +5,7 @@ must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning 
 """
 
 import functools
+import math
 from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -81,7 +82,13 @@ class Shedding:
     @property
     def signed(self) -> frozenset[str]:
         """Forces and curvatures count with their sign."""
-        return frozenset(("lift", "cam_force", "curvature", "concavity"))
+        return frozenset(("lift", "cam_force", "curvature", "concavity", "law_fall"))
+
+    @property
+    def assembly(self) -> dict[str, tuple[str, float]]:
+        """The arm stays short of the centre line's far side; the law never falls."""
+        arm = {"the arm stays below 180 deg": ("arm_angle", math.pi)} if self.has_follower else {}
+        return {**arm, "the cam law never falls": ("law_fall", 0.0)}
 
     @property
     def bounded(self) -> frozenset[str]:
@@ -200,7 +207,11 @@ class Shedding:
             return -force if name == "lift" else force
         if name == "law_acceleration":
             return maths.choose(pose.segment, (pose.law.s2, 0, pose.law.s2, 0))
+        if name == "law_fall":
+            return maths.choose(pose.segment, (-pose.law.s1, 0, -pose.law.s1, 0))
         contact = pose.contact(self.follower(given.values))
+        if name == "arm_angle":
+            return contact.angle
         if name == "pressure_angle":
             return contact.pressure_angle
         return contact.curvature if name == "curvature" else -contact.curvature

@@ -11,8 +11,9 @@ from loomopt.jobs.shedding import Shedding
 from loomopt.jobs.shedding_law import PREFIX, Spline
 from loomopt.jobs.shedding_limits import CYCLE
 from loomopt.jobs.shedding_pose import DWELLS
-from loomopt.jobs.shedding_program import bounds, named, numbers, today
+from loomopt.jobs.shedding_program import bounds, named, numbers
 from loomopt.jobs.shedding_program import model as model_of
+from loomopt.jobs.shedding_program import today as today
 from loomopt.jobs.shedding_reading import contact_speed
 from loomopt.jobs.shedding_tables import FIGURES, SEGMENTS, VARIABLES
 
@@ -78,6 +79,21 @@ def values_of(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     return known | {(name if name.startswith(PREFIX) else full_name(known, name)): v for name, v in design.items()}
 
 
+def adopted(scene: Any, design: Mapping[str, Any]) -> Any:
+    """Return the scene with a design's own cam law."""
+    intervals = named(design)
+    if not intervals:
+        return scene
+    law = [float(design[f"{PREFIX}{k}"]) for k in range(intervals + 1)]
+    return scene.update({"mechanism.law": "spline", "mechanism.law_coefficients": law})
+
+
+def peaks(model: Any) -> dict[str, str]:
+    """Return the figures that are extremes over the cycle, with their quantities."""
+    found = {name: quantity for name, quantity in CYCLE.items() if quantity in ("lift", *model.quantities)}
+    return {name: quantity for name, quantity in found.items() if not (model.is_level and name == "contact_min")}
+
+
 def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
     """Return a design ready to be sampled."""
     return Sampler(model(scene, design), values_of(scene, design))
@@ -109,6 +125,3 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     size = max(abs(extreme.value) for extreme in found)
     alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
-
-
-__all__ = ["design", "figures", "model", "moves", "sampler", "tidy", "today", "values", "values_of", "wish"]

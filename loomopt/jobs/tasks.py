@@ -31,6 +31,14 @@ def _any(scene: Any) -> dict[str, Sequence[float]]:
     return {}
 
 
+def _quantities(model: Any) -> dict[str, str]:
+    return {name: name for name in model.quantities} | {"mu_min": "obliquity"}
+
+
+def _same(scene: Any, design: Mapping[str, Any]) -> Any:
+    return scene
+
+
 @dataclass(frozen=True)
 class Task:
     """A job at work; all numbers SI.
@@ -41,6 +49,8 @@ class Task:
     tidy(program, x): x without what is only rounding. moves(program), wish(scene, move, x): the silent levels.
     figures(scene, design): every figure. sampler(scene, design): the design's cycle.
     curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
+    peaks(model): figures that are extremes over the cycle → their quantities.
+    adopted(scene, design): the scene whose own are the lists of a design.
     sizes(scene): the freed variables that come in sizes only → those sold, ascending.
     explain(scene, clash): what physics says of why the limits `clash` (phrases) do; "" where it says nothing.
     """
@@ -57,6 +67,8 @@ class Task:
     sampler: Callable[[Any, Numbers], Sampler]
     curves: Callable[[Any, Numbers], dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
+    peaks: Callable[[Any], Mapping[str, str]] = _quantities
+    adopted: Callable[[Any, Mapping[str, Any]], Any] = _same
     explain: Callable[[Any, Sequence[str]], str] = _nothing
     sizes: Callable[[Any], Mapping[str, Sequence[float]]] = _any
 
@@ -89,6 +101,7 @@ TASKS = {
         sampler=rapier_design.sampler,
         curves=rapier_curves.curves,
         marks=rapier_curves.marks,
+        peaks=rapier_design.peaks,
     ),
     "shedding": Task(
         demand=shedding_program.demand,
@@ -105,6 +118,8 @@ TASKS = {
         marks=shedding_curves.marks,
         explain=shedding_headline.explain,
         sizes=shedding_program.sizes,
+        peaks=shedding_design.peaks,
+        adopted=shedding_design.adopted,
     ),
 }
 """Job name → its functions."""

@@ -48,6 +48,11 @@ class Contact:
     phi_1: Number
     phi_2: Number
 
+    @property
+    def angle(self) -> Number:
+        """Angle between arm and centre line, rad."""
+        return self._angle
+
     @functools.cached_property
     def _angle(self) -> Number:
         """Angle b between arm and centre line, rad."""

@@ -86,6 +86,13 @@ class Pose:
         return dyad.second_rate_1(self.dyad, self.crank, *self._rates, self.lengths.l3)
 
     @functools.cached_property
+    def obliquity(self) -> Number:
+        """By how much the transmission angle at C falls short of a right angle, rad; negative where it exceeds."""
+        dyad_at_c = self.dyad
+        across = self.lengths.side * dyad_at_c.area4 / 2
+        return self.maths.atan2(dyad.dot(dyad_at_c.link1, dyad_at_c.link2), across)
+
+    @functools.cached_property
     def cos_crank_rod(self) -> Number:
         """Cosine of the angle from rod to crank."""
         return dyad.dot(self.crank, self.dyad.link1) / (self.lengths.l1 * self.lengths.l2)
@@ -95,6 +102,15 @@ class Pose:
         """Sine of the angle from rod to crank."""
         rod, crank = self.dyad.link1, self.crank
         return (rod.x * crank.y - rod.y * crank.x) / (self.lengths.l1 * self.lengths.l2)
+
+
+def span(maths: Maths, lengths: Lengths, phi: Number, far: bool) -> Number:
+    """Return the square of B to D over that of l2 + l3 (far), or of |l2 − l3| over it: 1 where the dyad just closes.
+
+    phi: crank angle, rad, any shape. The base is written so that nothing cancels near change points.
+    """
+    base = (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * maths.sin(phi / 2) ** 2
+    return base / (lengths.l2 + lengths.l3) ** 2 if far else (lengths.l2 - lengths.l3) ** 2 / base
 
 
 def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats", "Floats", "Floats"]:

@@ -5,14 +5,19 @@ bound is too coarse the box is halved. The formulas are the model's own, run in 
 inside the balls.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from loomopt import maths
+from loomopt.jobs.program import Integral
 from loomopt.jobs.sampling import Sampler
 
 MOST_BOXES = 20_000
+STRIPS = 512
+"""Boxes of one piece over which a mean is enclosed."""
 
 
 CycleRow = tuple[str, float, tuple[int, float] | None]
@@ -31,11 +36,11 @@ class Bound:
 class Boxes:
     """One design, ready to be bounded: its numbers as balls."""
 
-    def __init__(self, sampler: Sampler, values: Mapping[str, float]) -> None:
+    def __init__(self, sampler: Sampler) -> None:
         self.sampler, self.model = sampler, sampler.model
         system = maths.balls()
         self.maths = system
-        exact = {name: system.number(value) for name, value in {**values, **sampler.hints}.items()}
+        exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         self.given = self.model.given(system, exact)
         corners = [corner for of_load in self.model.corners(system, self.given) for corner in of_load]
         turns = [2 * system.pi * turn + corners[index] for index, turn in sampler.cycle.order]
@@ -62,12 +67,32 @@ class Boxes:
                     boxes += [((low + high) / 2, high), (low, (low + high) / 2)]
         return Bound("proven", used)
 
+    def mean(self, integral: Integral) -> Any:
+        """Return a ball around an integral's mean over the pieces where its load's switch is 1.
+
+        On each box the Taylor polynomial is integrated, what is left of it enclosed.
+        """
+        cycle, half = self.sampler.cycle, 0.5 / STRIPS
+        total, width = self.maths.number(0.0), self.maths.number(0.0)
+        for piece in np.flatnonzero(cycle.switches[:, integral.load] == 1.0):
+            length = self.starts[piece + 1] - self.starts[piece]
+            width = width + length
+            for strip in range(STRIPS):
+                centre = (2 * strip + 1) * half
+                value = self._series(integral.quantity, int(piece), centre, 0.0)[0]
+                bend = self._series(integral.quantity, int(piece), centre, half)[2]
+                total = total + length * 2 * half * (value + bend * half**2 / 3)
+        return total / width
+
     def _judge(self, name: str, sign: float, limit: float, piece: int, centre: float, half: float) -> bool | None:
         """Return True where the box keeps the limit, False where its centre breaks it, None where that is open."""
-        here = self._series(name, piece, centre, 0.0)
+        try:
+            here, around = (self._series(name, piece, centre, radius) for radius in (0.0, half))
+        except (ValueError, ZeroDivisionError):
+            return None
         if sign * here[0] > limit:
             return False
-        slope, bend = sign * here[1], sign * self._series(name, piece, centre, half)[2]
+        slope, bend = sign * here[1], sign * around[2]
         rise = abs(slope).upper() * half
         if bend < 0:
             # The parabola's own top, wherever it lies: what touches its bound from below is proven in a wide box.
@@ -87,7 +112,7 @@ class Boxes:
         return maths.ball_series(0.0, 0.0) * 0 + value
 
 
-def judged(sampler: Sampler, values: Mapping[str, float], rows: Sequence[CycleRow], accuracy: float) -> str:
+def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
     """Return "proven" where boxes bound the refined peak of every row, "violated" where one is exceeded.
 
     accuracy: what a peak may be exceeded by, in the row's natural size. "undecided" where boxes run out, and where a
@@ -95,7 +120,7 @@ def judged(sampler: Sampler, values: Mapping[str, float], rows: Sequence[CycleRo
     """
     if not rows or not {name for name, _, _ in rows} <= sampler.model.bounded:
         return "undecided"
-    boxes = Boxes(sampler, values)
+    boxes = Boxes(sampler)
     found = []
     for name, scale, where in rows:
         peak = sampler.peak(name, where) + accuracy * scale

@@ -144,8 +144,7 @@ class _Trial:
         violation = self._between_points()
         if not violation <= self.accuracy:
             reasons.append(f"a whole-cycle value is exceeded by {violation:.2g} between refined points")
-        values = {**self.program.parameters, **self.x}
-        bound = judged(self.sampler, values, self._cycle_rows(), self.accuracy)
+        bound = judged(self.sampler, self._cycle_rows(), self.accuracy)
         if bound == "violated":
             reasons.append("a whole-cycle value is exceeded somewhere between refined points")
         levels = []

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from loomopt import designs
 from loomopt.errors import BadInput
 from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import TASKS, Task
@@ -50,6 +51,7 @@ def solve(
     starts: int = 1,
     seed: int = 0,
     near: Solution | None = None,
+    prove: bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
 ) -> Solution:
@@ -57,6 +59,7 @@ def solve(
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
     near: an answer to start warm from (one of another structure is no help and is left alone);
+    prove: whether to prove every limit of the answer at every crank angle;
     on_iteration: called with each iteration's number;
     on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
@@ -74,9 +77,24 @@ def solve(
     for name, sizes in task.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
+    answer = _proven(scene, target, answer) if prove and answer.certificate else answer
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
     return replace(answer, time={**times, "certify_s": search.certified, "total_s": total})
+
+
+def _proven(scene: Any, target: str, answer: Solution) -> Solution:
+    """Return an answer whose certificate says that everything is proven, or why it is not."""
+    from loomopt.solving.proof import prove
+
+    found = prove(scene, designs.flat(answer.design), target)
+    assert answer.certificate is not None
+    if found.passed:
+        return replace(answer, certificate=replace(answer.certificate, by="proven"))
+    reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
+    certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
+    message = f"A design was reached but not proven: {'; '.join(reasons)}."
+    return replace(answer, certificate=certificate, status="uncertified", message=message)
 
 
 def _target(scene: Any, target: str | None) -> str:

@@ -22,7 +22,12 @@ DRAWINGS = (".svg", ".dxf", ".csv")
 
 def document(found: Evaluation) -> str:
     """Return an evaluation or an answer as one JSON object; what is undefined is null."""
-    return json.dumps(_speakable({"loomopt": __version__, **found.as_dict()}), indent=1, allow_nan=False)
+    return json_text({"loomopt": __version__, **found.as_dict()})
+
+
+def json_text(data: Mapping[str, Any]) -> str:
+    """Return data as one JSON object; what is undefined is null."""
+    return json.dumps(_speakable(data), indent=1, allow_nan=False)
 
 
 def _speakable(data: Any) -> Any:

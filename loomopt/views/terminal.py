@@ -1,5 +1,6 @@
 """What a person sees of an answer: a sentence, short tables, the certificate in one line."""
 
+import math
 from typing import Any
 
 from loomopt.solving.solution import Evaluation, Solution
@@ -143,3 +144,22 @@ def _starts(answer: Solution, scene: Any) -> str:
         for figures, count in answer.optima[1:]
     ]
     return text + (f". Other optima: {'; '.join(others)}" if others else "")
+
+
+def proofs(found: Any) -> list[str | Grid]:
+    """Return the parts of a proof: a sentence, and what was shown of each limit."""
+    missed = dict.fromkeys(proof.limit for proof in found.proofs if proof.status != "proven")
+    said = f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
+    lines = tuple(
+        (
+            joined(proof.text),
+            proof.status,
+            f"{proof.margin:.3g}",
+            f"{proof.slack:.1g}",
+            str(proof.boxes),
+            "" if proof.angle is None else f"{math.degrees(proof.angle):.4f}",
+        )
+        for proof in found.proofs
+    )
+    head = ("limit", "status", "margin [SI]", "up to [SI]", "boxes", "fails at [deg]")
+    return [f"{found.problem}, {found.target}: {said}", Grid("", head, lines, right=(2, 3, 4, 5))]

@@ -1,0 +1,164 @@
+"""Proof over the whole cycle: every limit, the assembly and every claimed peak, for all crank angles.
+
+Whole-cycle rows are bounded on boxes of crank angle, single values enclosed, in Arb's ball arithmetic. What binds
+touches its limit, so it is proven up to a slack: a share of the quantity's largest magnitude over the cycle.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from loomopt.errors import BadInput
+from loomopt.jobs.program import Limit, Program
+from loomopt.jobs.sampling import Sampler
+from loomopt.jobs.tasks import TASKS, Task
+from loomopt.solving.bounded import Boxes
+from loomopt.solving.words import Words
+
+SLACK = 1e-8
+LEAST_SLACK, MOST_SLACK = 1e-13, 0.1
+RANK = {"proven": 0, "undecided": 1, "violated": 2}
+"""Statuses from best to worst."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is shown of one limit, SI.
+
+    margin: by how much the refined value stays clear of the limit, negative where it exceeds it; slack: what is left
+    open; boxes: how many it took; angle: a crank angle, rad, where the limit fails.
+    """
+
+    limit: str
+    text: str
+    status: str
+    margin: float
+    slack: float
+    boxes: int
+    angle: float | None = None
+
+
+@dataclass(frozen=True)
+class Proofs:
+    """All proofs of one design."""
+
+    problem: str
+    target: str
+    proofs: tuple[Proof, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is proven."""
+        return all(proof.status == "proven" for proof in self.proofs)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `prove --json` prints."""
+        return {"problem": self.problem, "target": self.target, "proofs": [dict(vars(proof)) for proof in self.proofs]}
+
+
+def prove(scene: Any, design: Mapping[str, float], target: str | None = None, slack: float = SLACK) -> Proofs:
+    """Return the proofs of a design's limits (SI; what it does not name is today's).
+
+    slack: what is left open, relative to each quantity's largest magnitude over the cycle. Raises BadInput.
+    """
+    if not LEAST_SLACK <= slack <= MOST_SLACK:
+        allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
+        remedy = "Write --slack 1e-8, or leave it out."
+        raise BadInput("the slack is out of range", key="--slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
+    task, name = TASKS[scene.job.name], target or scene.job.default_target
+    full = {**task.today(scene), **design}
+    own = task.adopted(scene, full)
+    program = task.program(own, name)
+    court = _Court(own, task, program, full, slack)
+    return Proofs(scene.name, name, tuple(_merged(list(court.proofs()))))
+
+
+def _merged(found: list[Proof]) -> Iterator[Proof]:
+    """Yield one proof for all rows of one limit: the worst status, the least margin, all boxes."""
+    groups: dict[tuple[str, str], list[Proof]] = {}
+    for proof in found:
+        groups.setdefault((proof.limit, proof.text), []).append(proof)
+    for rows in groups.values():
+        worst = max(rows, key=lambda proof: (RANK[proof.status], -proof.margin))
+        yield replace(worst, boxes=sum(proof.boxes for proof in rows))
+
+
+class _Court:
+    """One design, its program, and its numbers as balls."""
+
+    def __init__(self, scene: Any, task: Task, program: Program, design: Mapping[str, float], slack: float) -> None:
+        self.scene, self.task, self.program, self.slack = scene, task, program, slack
+        self.words = Words(scene)
+        full = {v.name.rpartition(".")[2]: v.name for v in program.variables}
+        chosen = {full.get(name, name): value for name, value in design.items()}
+        values = {**program.parameters, **task.values(program, chosen)}
+        self.sampler = Sampler(program.model, values)
+        self.boxes = Boxes(self.sampler)
+        self.whole = task.sampler(scene, design)
+        self.whole_boxes = Boxes(self.whole)
+
+    def proofs(self) -> Iterator[Proof]:
+        """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
+        kept: dict[tuple[str, int, Any], Limit] = {}
+        for limit in self.program.limits:
+            if limit.family != "variable" and not (limit.hidden and limit.family == "static"):
+                kept.setdefault((limit.name, limit.sign, (limit.row, limit.where)), limit)
+        for limit in kept.values():
+            yield self._cycle(limit) if limit.family == "cycle" else self._static(limit)
+        for name, (quantity, most) in self.whole.model.assembly.items():
+            peak = self.whole.peak(quantity)
+            yield self._row(self.whole, self.whole_boxes, name, name, quantity, most, peak)
+        for figure, quantity in self.task.peaks(self.whole.model).items():
+            peak = self.whole.peak(quantity)
+            if math.isfinite(peak):
+                text = f"{figure} as claimed"
+                yield self._row(self.whole, self.whole_boxes, f"peak {figure}", text, quantity, peak, peak)
+
+    def _cycle(self, limit: Limit) -> Proof:
+        text = limit.name if limit.hidden else self.words.limit(limit)
+        peak = self.sampler.peak(limit.row, limit.where)
+        return self._row(self.sampler, self.boxes, limit.name, text, limit.row, limit.bound, peak, limit.where)
+
+    def _row(
+        self,
+        sampler: Sampler,
+        boxes: Boxes,
+        name: str,
+        text: str,
+        quantity: str,
+        bound: float,
+        peak: float,
+        where: tuple[int, float] | None = None,
+    ) -> Proof:
+        """Bound one quantity on boxes; both signs where its magnitude counts."""
+        slack = self.slack * _largest(sampler, quantity)
+        signs = (1.0,) if quantity in sampler.model.signed else (1.0, -1.0)
+        found = [boxes.bound(quantity, sign, bound + slack, where) for sign in signs]
+        worst = max(found, key=lambda each: RANK[each.status])
+        count = sum(each.boxes for each in found)
+        angle = None if worst.angle is None else worst.angle % (2 * math.pi)
+        return Proof(name, text, worst.status, bound - peak, slack, count, angle)
+
+    def _static(self, limit: Limit) -> Proof:
+        """Enclose one value of the design alone."""
+        maths, given = self.boxes.maths, self.boxes.given
+        known = {**given.values, **self.program.model.static(maths, given, self.sampler.front)}
+        for integral in self.program.model.integrals:
+            if {integral.name, integral.root} & {limit.row}:
+                known[integral.name] = self.boxes.mean(integral)
+                known[integral.root] = known[integral.name].sqrt()
+        residual = limit.residual(known, maths.number(limit.value)) + maths.number(0.0)
+        size = max(abs(float(known[limit.row])), abs(limit.value), limit.scale)
+        excess = abs(residual) if limit.sign == 0 else residual
+        slack = self.slack * size
+        status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
+        return Proof(limit.name, self.words.limit(limit), status, -float(excess.mid()), slack, 1)
+
+
+def _largest(sampler: Sampler, quantity: str) -> float:
+    """Return a quantity's largest magnitude over the cycle, as sampled."""
+    pieces, u = sampler.grid()
+    return float(np.abs(sampler.at(quantity, pieces, u)).max())
