@@ -56,9 +56,9 @@ def solve(
     """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
 
     accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts: the job's own first, then random ones drawn
-    with `seed`. near: an answer to the same structure, from which the solve starts warm. prove: whether every limit is proven at every
-    crank angle too. on_iteration(number),
-    on_start(number, of): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    with `seed`. near: an answer to the same structure, from which the solve starts warm. prove: whether every
+    limit is proven at every crank angle too. on_iteration(number), on_start(number, of): progress. Raises BadInput,
+    and KeyboardInterrupt on Ctrl-C.
     """
     found = engine.solve(
         scene,

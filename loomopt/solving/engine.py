@@ -7,21 +7,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from loomopt import designs
-from loomopt.errors import BadInput
 from loomopt.jobs.program import Program
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings, sampler_at
 from loomopt.solving import report
+from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, Certificate, certify
+from loomopt.solving.proof import proven
 from loomopt.solving.settle import settle
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 
-ACCURACY = 1e-8
-TIGHTEST = 1e-11
 MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified."""
 SAME = 1e-7
@@ -65,9 +63,9 @@ def solve(
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     began = time.perf_counter()
-    task, target = TASKS[scene.job.name], _target(scene, target)
+    task, target = TASKS[scene.job.name], target_name(scene, target)
     task.demand(scene, target)
-    _check_numbers(accuracy, starts)
+    check_numbers(accuracy, starts)
     imported = _import_solver()
     program = task.program(scene, target)
     search = _Search(scene, task, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
@@ -77,59 +75,10 @@ def solve(
     for name, sizes in task.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
-    answer = _proven(scene, target, answer) if prove and answer.certificate else answer
+    answer = proven(scene, target, answer) if prove and answer.certificate else answer
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
     return replace(answer, time={**times, "certify_s": search.certified, "total_s": total})
-
-
-def _proven(scene: Any, target: str, answer: Solution) -> Solution:
-    """Return an answer whose certificate says that everything is proven, or why it is not."""
-    from loomopt.solving.proof import prove
-
-    found = prove(scene, designs.flat(answer.design), target)
-    assert answer.certificate is not None
-    if found.passed:
-        return replace(answer, certificate=replace(answer.certificate, by="proven"))
-    reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
-    certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
-    message = f"A design was reached but not proven: {'; '.join(reasons)}."
-    return replace(answer, certificate=certificate, status="uncertified", message=message)
-
-
-def _target(scene: Any, target: str | None) -> str:
-    """Return the target's name, the job's default without one."""
-    name = target or scene.job.default_target
-    if name not in scene.job.targets:
-        raise BadInput(
-            f"job {scene.job.name} has no target {name}",
-            file=scene.origin,
-            key="--target",
-            value=name,
-            allowed=", ".join(scene.job.targets),
-            remedy="Choose one of them.",
-        )
-    return name
-
-
-def _check_numbers(accuracy: float, starts: int) -> None:
-    """Raise BadInput for settings outside what can be kept."""
-    if not TIGHTEST <= accuracy <= 0.1:
-        raise BadInput(
-            "the accuracy is out of range",
-            key="--accuracy",
-            value=f"{accuracy:g}",
-            allowed=f"{TIGHTEST:g} to 0.1",
-            remedy="Write --accuracy 1e-8, or leave it out.",
-        )
-    if not 1 <= starts <= 10_000:
-        raise BadInput(
-            "the number of starts is out of range",
-            key="--starts",
-            value=str(starts),
-            allowed="1 to 10000",
-            remedy="Write --starts 20, or leave it out.",
-        )
 
 
 def _import_solver() -> float:

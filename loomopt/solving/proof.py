@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from loomopt import designs
 from loomopt.errors import BadInput
 from loomopt.jobs.program import Limit, Program
 from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.solving.bounded import Boxes
+from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
 
 SLACK = 1e-8
@@ -162,3 +164,15 @@ def _largest(sampler: Sampler, quantity: str) -> float:
     """Return a quantity's largest magnitude over the cycle, as sampled."""
     pieces, u = sampler.grid()
     return float(np.abs(sampler.at(quantity, pieces, u)).max())
+
+
+def proven(scene: Any, target: str, answer: Solution) -> Solution:
+    """Return an answer whose certificate says that everything is proven, or why it is not."""
+    found = prove(scene, designs.flat(answer.design), target)
+    assert answer.certificate is not None
+    if found.passed:
+        return replace(answer, certificate=replace(answer.certificate, by="proven"))
+    reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
+    certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
+    message = f"A design was reached but not proven: {'; '.join(reasons)}."
+    return replace(answer, certificate=certificate, status="uncertified", message=message)

@@ -1,0 +1,43 @@
+"""What a solve is asked for, checked before anything is computed."""
+
+from typing import Any
+
+from loomopt.errors import BadInput
+
+ACCURACY = 1e-8
+TIGHTEST = 1e-11
+
+
+def target_name(scene: Any, target: str | None) -> str:
+    """Return the target's name, the job's default without one."""
+    name = target or scene.job.default_target
+    if name not in scene.job.targets:
+        raise BadInput(
+            f"job {scene.job.name} has no target {name}",
+            file=scene.origin,
+            key="--target",
+            value=name,
+            allowed=", ".join(scene.job.targets),
+            remedy="Choose one of them.",
+        )
+    return name
+
+
+def check_numbers(accuracy: float, starts: int) -> None:
+    """Raise BadInput for settings outside what can be kept."""
+    if not TIGHTEST <= accuracy <= 0.1:
+        raise BadInput(
+            "the accuracy is out of range",
+            key="--accuracy",
+            value=f"{accuracy:g}",
+            allowed=f"{TIGHTEST:g} to 0.1",
+            remedy="Write --accuracy 1e-8, or leave it out.",
+        )
+    if not 1 <= starts <= 10_000:
+        raise BadInput(
+            "the number of starts is out of range",
+            key="--starts",
+            value=str(starts),
+            allowed="1 to 10000",
+            remedy="Write --starts 20, or leave it out.",
+        )
