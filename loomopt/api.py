@@ -9,6 +9,7 @@ from loomopt import designs
 from loomopt.jobs import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
+from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def solve(
     scene: Scene,
     target: str | None = None,
     *,
-    accuracy: float = engine.ACCURACY,
+    accuracy: float = ACCURACY,
     starts: int = 1,
     seed: int = 0,
     near: Solution | None = None,

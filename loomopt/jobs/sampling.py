@@ -16,7 +16,7 @@ from loomopt.jobs.program import Integral, Model
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
 SAMPLES = 720
-"""Samples of one turn from which extremes are refined; no piece gets fewer than SAMPLES/8."""
+"""Samples of one turn from which extremes are refined; no piece gets fewer than an eighth of them."""
 CLOSER = 1 / 8
 """Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
 GAUSS_NODES = 32
@@ -75,11 +75,17 @@ def _vertex(values: Floats) -> Floats:
     return np.asarray(np.minimum(np.maximum(shift, -middle), middle), dtype=np.float64)
 
 
-class Sampler:
-    """One design, ready to be sampled over its cycle."""
+class Tally:
+    """How many positions of mechanisms were evaluated so far, by samples, nodes and boxes."""
 
-    def __init__(self, model: Model, values: Mapping[str, float]) -> None:
-        self.model, self.values = model, dict(values)
+    positions = 0
+
+
+class Sampler:
+    """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined."""
+
+    def __init__(self, model: Model, values: Mapping[str, float], samples: int = SAMPLES) -> None:
+        self.model, self.values, self.samples = model, dict(values), samples
         self.given: Given = model.given(maths.FLOAT, values)
         self.hints = dict(model.hints(self.given))
         if self.hints:
@@ -116,6 +122,7 @@ class Sampler:
     def at(self, name: str, pieces: NDArray[np.intp], u: Floats) -> Floats:
         """Return a quantity at nodes (pieces, u), SI."""
         result = np.empty(u.shape)
+        Tally.positions += len(u)
         for begin in range(0, len(u), CHUNK):
             part = slice(begin, begin + CHUNK)
             angles = self.cycle.angles(pieces[part], u[part])
@@ -124,8 +131,9 @@ class Sampler:
                 result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
         return result
 
-    def grid(self, samples: int = SAMPLES) -> tuple[NDArray[np.intp], Floats]:
-        """Return nodes spread evenly over the turn, both ends of every piece included."""
+    def grid(self, samples: int = 0) -> tuple[NDArray[np.intp], Floats]:
+        """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
+        samples = samples or self.samples
         widths = np.diff(self.cycle.starts)
         counts = [max(samples // 8, int(np.ceil(samples * width / TURN))) + 1 for width in widths]
         return _grid(tuple(counts))

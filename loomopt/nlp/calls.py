@@ -9,7 +9,7 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Extreme, Sampler
-from loomopt.nlp.point import Settings
+from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
 
 FIRST_SLOTS = 6
@@ -25,6 +25,10 @@ class Calls:
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
         self.built = 0.0
 
+    def sampler(self, x: Mapping[str, float]) -> Sampler | None:
+        """Return the sampler of variables x (SI), or None where the linkage has no real position."""
+        return sampler_at(self.program, x, self.settings.sampled)
+
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
         """Return the local extremes of each family's quantity."""
         return [sampler.extremes(family.row, family.where) for family in self.families]
@@ -36,7 +40,7 @@ class Calls:
             slots *= 2
         began = time.perf_counter()
         nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
-        nlp.solver(warm, self.settings.callback)
+        nlp.solver(warm, self.settings)
         self.built += time.perf_counter() - began if fresh else 0.0
         return nlp
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from loomopt.cycle import Cycle, Floats
 from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.jobs.sampling import Extreme, Sampler, Tally
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.follow import follow, polish
 from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
@@ -51,11 +51,13 @@ class _Run:
         followed = follow(calls, warm) if warm and warm.reached else None
         if followed:
             return followed
-        sampler = sampler_at(self.program, x)
+        sampler = self.calls.sampler(x)
         if sampler is None:
             return Point(x, "Not_Assembled", False)
         peaks = calls.peaks(sampler)
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
+        if self.settings.uniform:
+            nodes = [_uniform(sampler, family.row, self.settings.uniform) for family in calls.families]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
         last = raw
         status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None
@@ -66,14 +68,14 @@ class _Run:
             if status not in SUCCESS and not cold:
                 status, x, extra, raw = self._solve(nlp, sampler, before, None, peaks, nodes, {})
             last = raw
-            order, here = sampler.cycle, sampler_at(self.program, x)
+            order, here = sampler.cycle, self.calls.sampler(x)
             if here is None:
                 return Point(x, "Invalid_Number_Detected", False, self.iterations)
             sampler = here
             if sampler.cycle.order != order.order:
                 nodes, raw = [[_moved(e, order, sampler) for e in of] for of in nodes], {}
             peaks = calls.peaks(sampler)
-            violation = self._extend(nodes, peaks, extra)
+            violation = 0.0 if self.settings.uniform else self._extend(nodes, peaks, extra)
             reached = status in SUCCESS or self._stands(nlp, sampler, x, extra, nodes)
             if not reached or violation <= self.settings.excess:
                 break
@@ -82,7 +84,7 @@ class _Run:
                 return followed
         kept = tuple(map(tuple, nodes))
         point = Point(x, status, reached, self.iterations, kept, violation, last, calls.built)
-        if extra is None or not reached:
+        if extra is None or not reached or not self.settings.polished:
             return point
         if self.elastic:
             return replace(point, reached=violation <= STANDS, relaxed=self._relaxed(extra))
@@ -98,7 +100,7 @@ class _Run:
         They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
         extremes it creeps.
         """
-        if self.elastic or point.status not in SUCCESS or not point.raw:
+        if self.elastic or point.status not in SUCCESS or not point.raw or not self.settings.polished:
             return None
         prices = point.raw["lam_g"][-len(nodes) * nlp.slots :].reshape(len(nodes), nlp.slots)
         pairs = zip(nodes, prices, strict=True)
@@ -141,13 +143,15 @@ class _Run:
             return "Not_Enough_Degrees_Of_Freedom", dict(x), extra, {}
         if raw:
             arguments |= {"lam_x0": raw["lam_x"], "lam_g0": _padded(raw["lam_g"], len(arguments["lbg"]))}
-        solver = nlp.solver(bool(raw), self.settings.callback)
+        solver = nlp.solver(bool(raw), self.settings)
         answer = solver(**arguments)
         stats = solver.stats()
         status = str(stats["return_status"])
         if status in {"NonIpopt_Exception_Thrown", "User_Requested_Stop"}:
             raise KeyboardInterrupt
         self.iterations += int(stats.get("iter_count", 0))
+        calls = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
+        Tally.positions += calls * max(1, sum(map(len, nodes)))
         flat = np.asarray(answer["x"]).ravel()
         extra = flat[len(self.program.variables) :]
         keep = {
@@ -173,6 +177,14 @@ class _Run:
         limits = self.program.limits
         needs = {k: extra[2 * g] - extra[2 * g + 1] * (limits[k].sign == 0) for k, g in self.program.soft.items()}
         return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
+
+
+def _uniform(sampler: Sampler, row: str, count: int) -> list[Extreme]:
+    """Return equal nodes of one turn for a row: both signs of it where its magnitude counts."""
+    places = [sampler.cycle.located(2 * math.pi * k / count) for k in range(count)]
+    if row in sampler.model.signed:
+        return [Extreme(*place, 0.0, signed=True) for place in places]
+    return [Extreme(*place, sign) for place in places for sign in (1.0, -1.0)]
 
 
 def _moved(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:

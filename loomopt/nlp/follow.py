@@ -10,7 +10,7 @@ from loomopt.cycle import Floats
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.calls import FIRST_SLOTS, Calls
 from loomopt.nlp.pivot import bound_by, reach
-from loomopt.nlp.point import Point, sampler_at
+from loomopt.nlp.point import Point
 from loomopt.nlp.polish import BINDING, binding, met
 
 TOUCHING, SETTLED, POLISHES, POLISH = 1e-8, 1e-8, 3, 1e-6
@@ -33,7 +33,7 @@ def polish(
     """
     touching: Nodes = ()
     for _ in range(POLISHES):
-        sampler = sampler_at(calls.program, x)
+        sampler = calls.sampler(x)
         if sampler is None:
             return x, touching
         touching = [
@@ -45,7 +45,7 @@ def polish(
             return x, touching
         flat, step = reached
         x, extra = calls.design(flat), flat[len(calls.program.variables) :]
-        moved = sampler_at(calls.program, x)
+        moved = calls.sampler(x)
         if moved is None or step <= SETTLED:
             return x, touching
         peaks = calls.peaks(moved)
@@ -59,12 +59,12 @@ def follow(calls: Calls, warm: Point) -> Point | None:
     """
     point: Point | None = warm
     found: Nodes = warm.nodes
-    sampler = sampler_at(calls.program, warm.x)
+    sampler = calls.sampler(warm.x)
     order = sampler.cycle.order if sampler else ()
     nearest, idle, last = math.inf, 0, None
     for _ in range(FOLLOW_ROUNDS):
         point = _pivoted(calls, sampler, point, found) if sampler and point else None
-        sampler = sampler_at(calls.program, point.x) if point else None
+        sampler = calls.sampler(point.x) if point else None
         if sampler is None or point is None or sampler.cycle.order != order:
             return None
         found = tuple(map(tuple, calls.peaks(sampler)))

@@ -7,10 +7,15 @@ from typing import Any
 
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.jobs.sampling import SAMPLES, Extreme, Sampler
 
 PENALTY = 1000.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
+SAMPLED = ((1e-3, 180), (1e-6, 360))
+"""Samples of one turn that are enough for an accuracy."""
+CHECKED, MOST_CHECKED = 1.6384, 65536
+"""16384 points for the usual 1e-8."""
+NEAR = 1e-8
 ROUNDING = 1e-12
 """A whole-cycle value cannot be told closer, relative to its size."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -18,16 +23,40 @@ SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 
 @dataclass(frozen=True)
 class Settings:
-    """How to solve: accuracy of whole-cycle rows relative to their size; weight between levels; progress callback."""
+    """How to solve.
+
+    accuracy: of whole-cycle rows, relative to their size: samples and tolerance follow from it where they are not
+    given; penalty: weight between levels; callback: progress. For studies of methods: samples: of one turn; tolerance:
+    IPOPT's; hessian: "exact" or IPOPT's own "limited-memory"; polished: whether Newton's method ends a solve; uniform:
+    so many equal nodes of a turn instead of the exchange.
+    """
 
     accuracy: float = 1e-8
     penalty: float = PENALTY
     callback: Any = None
+    samples: int = 0
+    tolerance: float = 0.0
+    hessian: str = "exact"
+    polished: bool = True
+    uniform: int = 0
+
+    @property
+    def sampled(self) -> int:
+        """Samples of one turn: from 180 where a percent is asked to 720."""
+        return self.samples or next((count for least, count in SAMPLED if self.accuracy >= least), SAMPLES)
+
+    @property
+    def checked(self) -> int:
+        """Points of one turn on which refined values are checked again: what is missed between them falls as 1/n²."""
+        return min(max(math.ceil(CHECKED / math.sqrt(self.accuracy)), 2 * self.sampled), MOST_CHECKED)
 
     @property
     def excess(self) -> float:
-        """Largest excess of a whole-cycle row, relative to its size, that is left alone: two decades tighter."""
-        return max(self.accuracy / 100, ROUNDING)
+        """Largest excess of a whole-cycle row, relative to its size, that is left alone: two decades tighter.
+
+        Newton's method, which ends a solve, must start near.
+        """
+        return max(min(self.accuracy / 100, NEAR), ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -55,10 +84,10 @@ class Point:
     """Elastic solves only: limit's place → excess it needs, SI."""
 
 
-def sampler_at(program: Program, x: Mapping[str, float]) -> Sampler | None:
+def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES) -> Sampler | None:
     """Return the design's sampler, or None where the linkage has no real position."""
     try:
-        sampler = Sampler(program.model, {**program.parameters, **x})
+        sampler = Sampler(program.model, {**program.parameters, **x}, samples)
         return sampler if all(map(math.isfinite, sampler.static.values())) else None
     except (ValueError, ZeroDivisionError, FloatingPointError):
         return None

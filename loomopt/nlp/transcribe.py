@@ -17,6 +17,7 @@ from loomopt.cycle import Floats, node_angle
 from loomopt.jobs.program import Integral, Program
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.layout import Layout
+from loomopt.nlp.point import Settings
 
 CACHE_SIZE = 32
 IPOPT = {
@@ -91,14 +92,15 @@ class Transcription:
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
 
-    def solver(self, warm: bool, callback: Any = None) -> Any:
+    def solver(self, warm: bool, settings: Settings) -> Any:
         """Return IPOPT for this NLP, from scratch or from a solution nearby."""
         import casadi as ca
 
-        name = (warm, callback)
+        callback = settings.callback
+        name = (warm, callback, settings.tolerance, settings.hessian)
         if name not in self._solvers:
             options: dict[str, Any] = {
-                "ipopt": IPOPT | (WARM if warm else {}),
+                "ipopt": IPOPT | (WARM if warm else {}) | _asked(settings),
                 "print_time": False,
                 "show_eval_warnings": False,
                 "calc_lam_p": False,
@@ -273,6 +275,16 @@ class Transcription:
             idle = [[0.0, 1.0, *self.node(sampler, 0, 0.5)]] * (self.slots - len(used))
             write(p, f"family {k}", used + idle)
         return p
+
+
+def _asked(settings: Settings) -> dict[str, Any]:
+    """Return IPOPT's options that a study of methods changes."""
+    found: dict[str, Any] = {}
+    if settings.tolerance:
+        found |= dict.fromkeys(("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol"), settings.tolerance)
+    if settings.hessian != "exact":
+        found["hessian_approximation"] = settings.hessian
+    return found
 
 
 def families(program: Program, elastic: bool = False) -> list[Family]:

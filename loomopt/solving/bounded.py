@@ -13,7 +13,7 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.jobs.program import Integral
-from loomopt.jobs.sampling import Sampler
+from loomopt.jobs.sampling import Sampler, Tally
 
 MOST_BOXES = 20_000
 STRIPS = 512
@@ -56,6 +56,7 @@ class Boxes:
             while boxes:
                 low, high = boxes.pop()
                 used += 1
+                Tally.positions += 2
                 holds = self._judge(name, sign, limit, piece, (low + high) / 2, (high - low) / 2)
                 if holds is False:
                     middle = (low + high) / 2

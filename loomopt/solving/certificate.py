@@ -12,6 +12,7 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Limit, Objective, Program
 from loomopt.jobs.sampling import Sampler
+from loomopt.nlp.point import Settings
 from loomopt.solving.bounded import CycleRow, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.nnls import nnls
@@ -22,9 +23,10 @@ ACTIVE = 1e-7
 POSITIVE = 1e-8
 """Multipliers above this, in natural sizes, bind."""
 FLAT = 1e-7
+ROUNDING = 1e-15
+"""Nothing is known better, relative to its natural size."""
 CURVED, CORRECTED = 1e-5, 1e-10
 """Curvature that Newton's step may follow, and the slope it need not mind."""
-DENSE = 16384
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,11 @@ class Certificate:
     """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
 
     @property
+    def error(self) -> float:
+        """Estimate of the relative error of what the answer says: the largest of all that was found amiss."""
+        return max(self.feasibility, self.violation, self.residual, ROUNDING)
+
+    @property
     def residual(self) -> float:
         """The largest KKT residual of all levels."""
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
@@ -86,15 +93,17 @@ def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
 
 def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
     """Return the certificate of variables x (SI) as an optimum of the program's target."""
-    sampler = Sampler(program.model, {**program.parameters, **x})
-    return _Trial(program, dict(x), sampler, accuracy).verdict()
+    settings = Settings(accuracy)
+    sampler = Sampler(program.model, {**program.parameters, **x}, settings.sampled)
+    return _Trial(program, dict(x), sampler, settings).verdict()
 
 
 class _Trial:
     """One design before the court: rows, gradients, and what the levels have settled so far."""
 
-    def __init__(self, program: Program, x: dict[str, float], sampler: Sampler, accuracy: float) -> None:
-        self.program, self.x, self.sampler, self.accuracy = program, x, sampler, accuracy
+    def __init__(self, program: Program, x: dict[str, float], sampler: Sampler, settings: Settings) -> None:
+        self.program, self.x, self.sampler, self.accuracy = program, x, sampler, settings.accuracy
+        self.checked = settings.checked
         self.excess = excesses(program, sampler)
         self.limits = [row for k, limit in enumerate(program.limits) for row in self._limit_rows(k, limit)]
         self.pieces = [self._pieces(objective) for objective in program.objectives]
@@ -182,7 +191,7 @@ class _Trial:
 
     def _between_points(self) -> float:
         """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
-        pieces, u = self.sampler.grid(DENSE)
+        pieces, u = self.sampler.grid(self.checked)
         worst = 0.0
         for name, scale, where in self._cycle_rows():
             on = np.ones(len(u), dtype=bool)

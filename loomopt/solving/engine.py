@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from loomopt.jobs.program import Program
+from loomopt.jobs.sampling import Tally
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
-from loomopt.nlp.point import Point, Settings, sampler_at
+from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
 from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
@@ -62,7 +63,7 @@ def solve(
     on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
-    began = time.perf_counter()
+    began, evaluated = time.perf_counter(), Tally.positions
     task, target = TASKS[scene.job.name], target_name(scene, target)
     task.demand(scene, target)
     check_numbers(accuracy, starts)
@@ -78,7 +79,10 @@ def solve(
     answer = proven(scene, target, answer) if prove and answer.certificate else answer
     total = time.perf_counter() - began
     times = {"import_s": imported, "build_s": search.built, "solve_s": search.spent - search.built}
-    return replace(answer, time={**times, "certify_s": search.certified, "total_s": total})
+    solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
+    if answer.certificate:
+        solver["error_estimate"] = answer.certificate.error
+    return replace(answer, solver=solver, time={**times, "certify_s": search.certified, "total_s": total})
 
 
 def _import_solver() -> float:
@@ -178,7 +182,8 @@ class _Search:
         began = time.perf_counter()
         self.x, self.certificate = self._judged(point.x)
         for _ in range(CORRECTIONS):
-            if not self.certificate.correction or self.certificate.residual <= PRECISE:
+            precise = max(min(PRECISE, self.settings.accuracy), ROUNDING)
+            if not self.certificate.correction or self.certificate.residual <= precise:
                 break
             x, better = self._judged(self._corrected(self.x, self.certificate.correction))
             if better.residual >= self.certificate.residual or better.feasibility > FEASIBILITY:

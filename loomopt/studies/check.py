@@ -13,6 +13,7 @@ from loomopt.jobs import load
 from loomopt.jobs.tasks import TASKS
 from loomopt.packaged import problem_names, results_path
 from loomopt.solving import engine
+from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def reference(found: Solution, scene: Any) -> "pd.DataFrame":
         columns["objectives"] = " | ".join(level.objective for level in found.certificate.levels)
         columns["unique"] = found.certificate.unique
     frame = pd.DataFrame([columns])
-    frame.attrs.update(tables.provenance(scene, target=found.target, accuracy=engine.ACCURACY))
+    frame.attrs.update(tables.provenance(scene, target=found.target, accuracy=ACCURACY))
     return frame
 
 

@@ -32,7 +32,7 @@ def put(program, elastic=False):
     calls = Calls(program, Settings(), elastic)
     nodes = [found[:2] for found in calls.peaks(sampler)]
     nlp, _ = transcribe(program, sampler, 6, elastic)
-    nlp.solver(False)
+    nlp.solver(False, Settings())
     extra = calls.first_extra(nlp, sampler, calls.peaks(sampler))
     return nlp, calls.arguments(nlp, sampler, x, extra, nodes), sampler, nodes, extra
 

@@ -14,7 +14,7 @@ from shedding_cases import flat, freed, plain
 import loomopt as lo
 from loomopt import maths
 from loomopt.jobs.sampling import Sampler
-from loomopt.jobs.shedding_design import sampler, values_of
+from loomopt.jobs.shedding_design import sampler
 from loomopt.jobs.shedding_program import model, numbers
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like
@@ -31,7 +31,7 @@ flint = importlib.import_module("flint")
 def boxed(scene, design):
     """Return a design's sampler and its boxes."""
     sampled = sampler(scene, design)
-    return sampled, Boxes(sampled, values_of(scene, design))
+    return sampled, Boxes(sampled)
 
 
 def tried(sampled, boxes, name, sign, share):
@@ -171,7 +171,7 @@ def said(wave, kind=Bounded):
     made = program(wave, kind)
     sampled = Sampler(made.model, {"x": 0.0})
     assert sampled.peak("wave") < 1.0 + 1e-6, "the spike is not missed: it stands 0.54 higher than the samples see"
-    return judged(sampled, {"x": 0.0}, [("wave", 1.0, None)], ACCURACY), certify(made, {"x": 0.0}, ACCURACY)
+    return judged(sampled, [("wave", 1.0, None)], ACCURACY), certify(made, {"x": 0.0}, ACCURACY)
 
 
 @pytest.mark.parametrize("wave", [spiked, sunk])
@@ -186,7 +186,7 @@ def test_a_spike_between_the_samples_is_refuted_and_the_certificate_says_so(wave
 
 def test_the_angle_of_the_spike_is_found():
     made = program(spiked)
-    found = Boxes(Sampler(made.model, {"x": 0.0}), {"x": 0.0}).bound("wave", 1.0, 1.2)
+    found = Boxes(Sampler(made.model, {"x": 0.0})).bound("wave", 1.0, 1.2)
     assert found.status == "violated"
     assert found.angle == pytest.approx(PLACE, abs=2e-5)
 
