@@ -1,6 +1,6 @@
 """What the hard cases are measured with: 120 digits, the condition of a value, angles by triangles alone.
 
-"n ulp times condition" is |error| ≤ n · 2⁻⁵² · (|f| + Σ|x ∂f/∂x|) over all data x, the derivatives by differences in 120
+"n ulp times condition" is |error| ≤ n · 2⁻⁵² · (|f| + Σ|x ∂f/∂x|) over all data x, derivatives by differences in 120
 digits. No formula that reads float64 can promise less than n ≈ 1: its data are rounded already.
 """
 
