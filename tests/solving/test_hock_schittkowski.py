@@ -2,9 +2,11 @@
 
 import math
 from math import sqrt
+from types import SimpleNamespace
 
 import hock_schittkowski
 import hock_schittkowski_larger
+import numpy as np
 import pytest
 import toy
 
@@ -182,6 +184,34 @@ def test_equations_that_contradict_each_other_are_told():
     answer = toy.solve(_plane(rows, (("c", 0, 17.0), ("p", 0, 9.0)), 2, 1))
     assert answer.status == "infeasible", answer.message
     assert answer.relaxation
+
+
+def along(t):
+    """Return the designs of HS55's one free direction: x4 = t from 0 to 1."""
+    return dict(zip(HS55, (1 - t, (5 - t) / 3, (1 + 4 * t) / 3, t, (1 + t) / 3, (5 - 4 * t) / 3), strict=True))
+
+
+def test_equalities_that_depend_on_each_other_get_prices_of_measure():
+    """The book's failures end with multipliers of 2e16; both ends of the free direction are local optima."""
+    for t, least in ((0.0, 20 / 3), (1.0, 19 / 3)):
+        certificate = certify(_hs55(), along(t), ACCURACY)
+        assert certificate.passed, certificate.reasons
+        assert sum(binding.worth for binding in certificate.binding) < 1e2
+        assert _hs55().model.static(None, SimpleNamespace(values=along(t)), ())["f"] == pytest.approx(least, rel=1e-12)
+
+
+@pytest.mark.parametrize(("t", "reason"), [(0.5, "f can still fall"), (1 - 1e-6, "f can still fall"), (None, "second")])
+def test_between_its_ends_dependent_equalities_hide_nothing(t, reason):
+    """df/dt = 2/3 − 2 t + t (1 − t) (1 − 2 t) vanishes once between the ends: there f is largest."""
+    top = min(np.roots([2, -3, -1, 2 / 3]), key=lambda root: abs(root - 0.5))
+    certificate = certify(_hs55(), along(float(top.real) if t is None else t), ACCURACY)
+    assert not certificate.passed
+    assert any(reason in said for said in certificate.reasons), certificate.reasons
+
+
+def test_the_books_start_breaks_the_first_equality():
+    program = _hs55()
+    assert "limit h1 is exceeded by 1 of its size" in certify(program, program.starts[0], ACCURACY).reasons
 
 
 # Whole cycles, magnitudes, levels ---------------------------------------------------------------------------------

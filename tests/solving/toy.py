@@ -127,10 +127,7 @@ def solve(toy, **options):
         curves=None,
         marks=None,
     )
-    kinds = defaultdict(lambda: "number")
-    kinds |= dict.fromkeys([*(v.name for v in toy.variables), *(limit.name for limit in toy.limits)], "number")
-    kinds |= dict.fromkeys([o.figure for o in toy.objectives], "number")
-    kinds |= dict.fromkeys(figures(None, toy.starts[0]), "number")
+    kinds = dict.fromkeys(figures(None, toy.starts[0]), "number")
     job = SimpleNamespace(
         name="toy",
         targets={"least": None},

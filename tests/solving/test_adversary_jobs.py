@@ -1,0 +1,110 @@
+"""The certificate against wrong answers of the real jobs, each a millionth from an optimum."""
+
+import functools
+
+import pytest
+
+import loomopt as lo
+from loomopt import designs
+from loomopt.jobs.tasks import TASKS
+from loomopt.nlp.point import sampler_at
+from loomopt.solving.certificate import certify
+
+ACCURACY = 1e-8
+MILLIONTH = 1e-6
+OPTIMA = {
+    "beatup 600": ("beatup", "balance", {"operation.M0": "600 N*m"}),
+    "beatup 745": ("beatup", "balance", {}),
+    "beatup 900": ("beatup", "balance", {"operation.M0": "900 N*m"}),
+    "beatup pulse": ("beatup", "pulse", {}),
+    "beatup torque": ("beatup", "torque", {}),
+    "rapier stroke-dwell": ("rapier", "stroke-dwell", {}),
+    "rapier dwell": ("rapier", "dwell", {}),
+    "shedding stiffness": ("shedding", "stiffness", {}),
+    "shedding speed": ("shedding", "speed", {}),
+    "shedding force": ("shedding", "force", {}),
+    "shedding law": ("shedding", "law", {"targets.law.intervals": 8}),
+}
+each_optimum = pytest.mark.parametrize("name", OPTIMA)
+
+
+@functools.cache
+def optimum(name):
+    """Return the program of a case and its optimum, SI."""
+    job, target, changes = OPTIMA[name]
+    scene = lo.load(job).update(changes)
+    answer, program = lo.solve(scene, target), TASKS[job].program(scene, target)
+    assert answer.status == "optimal", answer.message
+    return program, TASKS[job].values(program, designs.flat(answer.design))
+
+
+def objectives(program, x):
+    """Return a design's objectives, in order, in their natural sizes."""
+    sampler = sampler_at(program, x)
+    assert sampler is not None
+    found = []
+    for o in program.objectives:
+        value = sampler.peak(o.row) if o.form == "peak" else sampler.figures[o.row]
+        found.append((abs(value) if o.form == "magnitude" else value) / o.scale)
+    return found
+
+
+def nudged(program, x, name, share):
+    """Return x with one variable off by a share of itself, or of its natural size where it is 0."""
+    size = next(v.scale for v in program.variables if v.name == name)
+    return x | {name: x[name] + share * (abs(x[name]) or size)}
+
+
+@each_optimum
+def test_the_optimum_itself_passes(name):
+    program, x = optimum(name)
+    assert certify(program, x, ACCURACY).passed
+
+
+@each_optimum
+@pytest.mark.parametrize("share", [MILLIONTH, -MILLIONTH, 1e-4, -1e-4])
+def test_one_variable_off_is_refused_or_no_better(name, share):
+    """What passes is as good, level by level, to rounding: the counterweight's radius, for which its mass makes up."""
+    program, x = optimum(name)
+    best, passed = objectives(program, x), []
+    for variable in program.variables:
+        moved = nudged(program, x, variable.name, share)
+        certificate = certify(program, moved, ACCURACY)
+        assert certificate.passed or certificate.reasons
+        if certificate.passed:
+            passed.append(variable.name)
+            assert objectives(program, moved) == pytest.approx(best, rel=1e-12, abs=1e-12)
+    assert set(passed) <= {"r4e"}
+
+
+@each_optimum
+@pytest.mark.parametrize("size", [1e-5, 1e-3])
+def test_an_optimum_stretched_in_all_variables_is_refused(name, size):
+    """By turns up and down, so that no common scale of the lengths is hit."""
+    program, x = optimum(name)
+    for sign in (1, -1):
+        moved = x
+        for k, variable in enumerate(program.variables):
+            moved = nudged(program, moved, variable.name, sign * size * (-1) ** k * (1 + k / 7))
+        certificate = certify(program, moved, ACCURACY)
+        assert not certificate.passed
+        assert certificate.reasons
+
+
+@pytest.mark.parametrize("name", ["shedding stiffness", "shedding law"])
+def test_a_spring_a_millionth_too_soft_lets_the_roller_off(name):
+    program, x = optimum(name)
+    soft = certify(program, nudged(program, x, "K1", -MILLIONTH), ACCURACY)
+    assert not soft.passed
+    assert any("limit N_min is exceeded" in said for said in soft.reasons), soft.reasons
+    stiff = certify(program, nudged(program, x, "K1", MILLIONTH), ACCURACY)
+    assert not stiff.passed
+    assert any("K1 can still fall" in said for said in stiff.reasons), stiff.reasons
+
+
+def test_a_machine_a_millionth_too_fast_lets_the_roller_off():
+    program, x = optimum("shedding speed")
+    fast = certify(program, nudged(program, x, "speed", MILLIONTH), ACCURACY)
+    assert any("limit N_min is exceeded" in said for said in fast.reasons), fast.reasons
+    slow = certify(program, nudged(program, x, "speed", -MILLIONTH), ACCURACY)
+    assert any("speed can still fall" in said for said in slow.reasons), slow.reasons
