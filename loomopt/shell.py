@@ -11,6 +11,9 @@ from loomopt.jobs import load
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 
+DIFFERS = 1
+"""Exit status where a comparison or a proof does not come out as it should."""
+
 
 class Progress:
     """One line on a terminal's stderr that comes after a second and goes at the end."""

@@ -29,7 +29,7 @@ ROOMS = (
     "tables",
     "studies",
     "views",
-    "api shell cli",
+    "api shell commands cli",
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}
