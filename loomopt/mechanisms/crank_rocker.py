@@ -249,11 +249,16 @@ def assembly_margins(lengths: Lengths) -> dict[str, Number]:
     }
 
 
+TELLING = 1e-15
+"""Share of the links' sum below which a margin cannot be told from rounding: the linkage is at its change point."""
+
+
 def fault(l1: float, l2: float, l3: float, l4: float) -> str:
     """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one."""
     if min(l1, l2, l3, l4) <= 0:
         return "every length must be greater than 0"
-    failed = [text for text, margin in assembly_margins(Lengths(l1, l2, l3, l4)).items() if not margin > 0]
+    least = TELLING * (l1 + l2 + l3 + l4)
+    failed = [text for text, margin in assembly_margins(Lengths(l1, l2, l3, l4)).items() if not margin > least]
     if not failed:
         return ""
     sides = {"l1": l1, "l2": l2, "l3": l3, "l4": l4}

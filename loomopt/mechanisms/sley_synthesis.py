@@ -16,4 +16,5 @@ def sley(maths: Maths, theta: Number, swing: Number, l3: Number, l71: Number) ->
     y = maths.sqrt(l71**2 - x**2)
     far = maths.sqrt((x - along) ** 2 + (y + half) ** 2)
     near = maths.sqrt((x - along) ** 2 + (y - half) ** 2)
-    return (far - near) / 2, (far + near) / 2
+    # Not (far − near)/2: nothing is lost for a small swing.
+    return 2 * y * half / (far + near), (far + near) / 2

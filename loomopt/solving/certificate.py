@@ -4,6 +4,7 @@ One KKT system per level, on gradients of the true extremes in 40 digits, with m
 least squares). A limit with a positive multiplier at one level is an equality of free sign at the next.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -16,6 +17,7 @@ from loomopt.nlp.point import Settings
 from loomopt.solving.bounded import CycleRow, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.nnls import nnls
+from loomopt.solving.second_order import Lagrangian, least_on_cone
 
 FEASIBILITY, STATIONARITY, COMPLEMENTARITY = 1e-9, 1e-6, 1e-8
 ACTIVE = 1e-7
@@ -23,6 +25,10 @@ ACTIVE = 1e-7
 POSITIVE = 1e-8
 """Multipliers above this, in natural sizes, bind."""
 FLAT = 1e-7
+FAINT = 1e-4
+"""Curvature up to which a direction is looked along, for what higher orders do there."""
+MEASURE, FARTHEST = 1e6, 1e8
+"""Largest multiplier that is a price, and largest variable that is a design, in natural sizes."""
 ROUNDING = 1e-15
 """Nothing is known better, relative to its natural size."""
 CURVED, CORRECTED = 1e-5, 1e-10
@@ -31,12 +37,17 @@ CURVED, CORRECTED = 1e-5, 1e-10
 
 @dataclass(frozen=True)
 class Level:
-    """The KKT residuals of one objective; held: the multiplier of the objectives before it."""
+    """The KKT residuals of one objective; held: the multiplier of the objectives before it.
+
+    price: the largest multiplier of a limit, dearest: that limit's name.
+    """
 
     objective: str
     stationarity: float
     complementarity: float
     held: float
+    price: float = 0.0
+    dearest: str = ""
 
 
 @dataclass(frozen=True)
@@ -94,8 +105,12 @@ def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
 def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
     """Return the certificate of variables x (SI) as an optimum of the program's target."""
     settings = Settings(accuracy)
-    sampler = Sampler(program.model, {**program.parameters, **x}, settings.sampled)
-    return _Trial(program, dict(x), sampler, settings).verdict()
+    try:
+        sampler = Sampler(program.model, {**program.parameters, **x}, settings.sampled)
+        return _Trial(program, dict(x), sampler, settings).verdict()
+    except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
+        reason = f"a value or a slope is no number here ({type(error).__name__})"
+        return Certificate(False, (reason,), (), math.inf, math.inf, False, False)
 
 
 class _Trial:
@@ -112,6 +127,8 @@ class _Trial:
         self.gradients = self.exact.gradients()
         self.multipliers: list[Floats] = []
         self.minimum, self.unique = True, True
+        self.falling = ""
+        """The objective that falls where second order does not decide."""
         self.correction: dict[str, float] = {}
         self.settled_alone = False
         """Whether the levels so far leave a single design: then later ones have nothing to choose, and no KKT point."""
@@ -128,7 +145,7 @@ class _Trial:
             return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)]
         found = self.sampler.extremes(limit.row, limit.where)
         touching = [e for e in found if e.height >= limit.bound - ACTIVE * limit.scale]
-        return [Row(limit.name, limit.scale, e.sign, limit=limit, node=e) for e in touching]
+        return [Row(limit.name, limit.scale, e.sign, limit=limit, node=e, place=k) for e in touching]
 
     def _pieces(self, objective: Objective) -> list[Row]:
         """Return the smooth pieces whose largest is the objective's value."""
@@ -146,6 +163,9 @@ class _Trial:
     def verdict(self) -> Certificate:
         """Judge the levels in order."""
         reasons = []
+        sizes = {v.name: v.scale for v in self.program.variables}
+        if max((abs(self.x[name]) / size for name, size in sizes.items() if name in self.x), default=0.0) > FARTHEST:
+            reasons.append("the design is out of all proportion: slopes cannot be trusted here")
         feasibility = float(max(0.0, *self.excess.values()))
         if not feasibility <= FEASIBILITY:
             worst = max(self.excess, key=lambda k: self.excess[k])
@@ -167,7 +187,13 @@ class _Trial:
             if not level.stationarity <= STATIONARITY:
                 reasons.append(f"{objective.figure} can still fall: stationarity {level.stationarity:.2g}")
             if not level.complementarity <= COMPLEMENTARITY:
-                reasons.append(f"a limit that does not touch carries a price: {level.complementarity:.2g}")
+                reasons.append(f"a limit that is not met exactly carries a price: {level.complementarity:.2g}")
+            if level.price > MEASURE:
+                reasons.append(
+                    f"the price of limit {level.dearest} is without measure: {level.price:.2g}, no KKT point"
+                )
+        if self.falling:
+            reasons.append(f"second order does not decide: {self.falling} falls along a direction without curvature")
         if not self.minimum:
             reasons.append("second order fails: along some direction the objective falls (a saddle or a maximum)")
         return Certificate(
@@ -213,6 +239,19 @@ class _Trial:
     def _level(self, place: int, objective: Objective) -> Level:
         """Solve one level's KKT system and judge its curvature."""
         pieces, inequalities, equal = self._columns(place)
+        found, residual = self._multipliers(pieces, inequalities, equal)
+        self.multipliers.append(found)
+        held = sum(abs(found[k]) for k in equal if k >= len(self.limits))
+        if not (objective.form == "magnitude" and len(pieces) == 2):
+            found = self._bent(place, pieces, inequalities, equal, found, float(residual))
+        limits = [k for k in inequalities + equal if k < len(self.limits)]
+        slack = [abs(found[k] * self._slack(k)) for k in limits]
+        dearest = max(limits, key=lambda k: abs(found[k]), default=None)
+        price, name = (0.0, "") if dearest is None else (float(abs(found[dearest])), self.rows[dearest].name)
+        return Level(objective.figure, float(residual), float(max(slack, default=0.0)), float(held), price, name)
+
+    def _multipliers(self, pieces: list[int], inequalities: list[int], equal: list[int]) -> tuple[Floats, float]:
+        """Return one level's multipliers of all rows, and the slope they leave."""
         signed = [(k, 1.0) for k in pieces + inequalities + equal] + [(k, -1.0) for k in equal]
         size = self.gradients.shape[1]
         matrix = np.zeros((size + 1, len(signed)))
@@ -225,13 +264,33 @@ class _Trial:
         found = np.zeros(len(self.rows))
         for (k, sign), value in zip(signed, solution, strict=True):
             found[k] += sign * value
-        self.multipliers.append(found)
-        residual = np.abs(matrix @ solution - target).max()
-        slack = [abs(found[k]) * max(0.0, -self._slack(k)) for k in inequalities]
-        held = sum(abs(found[k]) for k in equal if k >= len(self.limits))
-        if not (objective.form == "magnitude" and len(pieces) == 2):
-            self._curve(pieces, equal, found)
-        return Level(objective.figure, float(residual), float(max(slack, default=0.0)), float(held))
+        return found, float(np.abs(matrix @ solution - target).max())
+
+    def _bent(
+        self,
+        place: int,
+        pieces: list[int],
+        inequalities: list[int],
+        equal: list[int],
+        found: Floats,
+        residual: float,
+    ) -> Floats:
+        """Judge one level's curvature; returns the multipliers that it holds for, where several share the slopes."""
+        before = self.minimum
+        self._curve(place, pieces, equal, found, residual)
+        judged = self.minimum, self.unique
+        if not before or all(judged):
+            return found
+        for k in (k for k in inequalities if found[k] > POSITIVE):
+            other, left = self._multipliers(pieces, [j for j in inequalities if j != k], equal)
+            if left <= STATIONARITY:
+                self.minimum = True
+                self._curve(place, pieces, equal, other, left)
+                if (self.minimum, self.unique) > judged:
+                    self.multipliers[-1] = other
+                    return other
+        self.minimum, self.unique = judged
+        return found
 
     def _slack(self, k: int) -> float:
         """Return a limit row's residual in its natural size."""
@@ -241,7 +300,7 @@ class _Trial:
             return (row.node.height - row.limit.bound) / row.limit.scale
         return self.excess[row.place]
 
-    def _curve(self, pieces: list[int], equal: list[int], multipliers: Floats) -> None:
+    def _curve(self, place: int, pieces: list[int], equal: list[int], multipliers: Floats, residual: float) -> None:
         """Judge the Lagrangian's curvature along the directions that no binding row forbids.
 
         Binding are limits with a multiplier, equalities, and the differences between pieces that share the objective.
@@ -263,17 +322,41 @@ class _Trial:
             self._correct(back, free, np.zeros(0), multipliers)
             return
         curved = self.exact.curvatures(free)
-        values, vectors = np.linalg.eigh(np.tensordot(multipliers, curved, axes=1))
+        hessian = np.tensordot(multipliers, curved, axes=1)
+        values, vectors = np.linalg.eigh(hessian)
         self.settled_alone = bool(values.min() > FLAT)
         self._correct(back, free @ vectors[:, values > CURVED], values[values > CURVED], multipliers)
         weak = [k for k in range(len(self.limits)) if k not in rows]
+        slopes = self.gradients[weak] @ free
+        slopes = slopes[np.abs(slopes).max(axis=1, initial=0.0) > FLAT]
+        if values.min() < -FLAT and least_on_cone(hessian, slopes) < -FLAT:
+            self.minimum = self.unique = False
+            return
+        ways = []
         for value, vector in zip(values, vectors.T, strict=True):
-            slopes = self.gradients[weak] @ (free @ vector) if weak else np.zeros(0)
-            blocked = bool(np.any(slopes > FLAT) and np.any(slopes < -FLAT))
-            if value <= FLAT and not blocked:
-                self.unique = False
-            if value < -FLAT and not blocked:
-                self.minimum = False
+            open_ways = [way for way in (vector, -vector) if np.max(slopes @ way, initial=-np.inf) <= FLAT]
+            self.unique &= value > FLAT or not open_ways
+            ways += open_ways if value <= FAINT else []
+        self._probe(place, multipliers, [free @ way for way in ways], residual)
+
+    def _probe(self, place: int, multipliers: Floats, ways: list[Floats], residual: float) -> None:
+        """Look where second order does not decide: whether the Lagrangian falls along directions without curvature."""
+        prices: dict[int, float] = {}
+        for k, row in enumerate(self.limits):
+            if abs(multipliers[k]) > POSITIVE:
+                prices[row.place] = prices.get(row.place, 0.0) + float(multipliers[k])
+        held: dict[int, float] = {}
+        for k in range(len(self.limits), len(self.rows)):
+            earlier = next(i for i, o in enumerate(self.program.objectives) if o is self.rows[k].objective)
+            if earlier < place and multipliers[k]:
+                held[earlier] = held.get(earlier, 0.0) + float(multipliers[k])
+        lagrangian = Lagrangian(self.program, self.x, place, prices, held)
+        sizes = {v.name: v.scale for v in self.program.variables}
+        for way in ways:
+            direction = {name: float(part) * sizes[name] for name, part in zip(self.exact.names, way, strict=True)}
+            if lagrangian.falls(direction, residual):
+                self.falling = self.program.objectives[place].figure
+                return
 
     def _missed(self, k: int) -> float:
         """Return by how much a binding row is missed, with its sign; 0 for an objective held where it stands."""

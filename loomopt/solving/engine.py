@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Tally
+from loomopt.jobs.program import Objective, Program
+from loomopt.jobs.sampling import Sampler, Tally
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
@@ -276,5 +276,12 @@ def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[flo
     sampler = sampler_at(program, dict(x))
     if sampler is None:
         return (math.inf,) * len(program.objectives)
-    values = (sampler.peak(o.row) if o.form == "peak" else abs(sampler.figures[o.row]) for o in program.objectives)
-    return tuple(value / o.scale for value, o in zip(values, program.objectives, strict=True))
+    return tuple(_reached(sampler, objective) / objective.scale for objective in program.objectives)
+
+
+def _reached(sampler: Sampler, objective: Objective) -> float:
+    """Return what an objective's row is worth, SI."""
+    if objective.form == "peak":
+        return sampler.peak(objective.row)
+    value = sampler.figures[objective.row]
+    return abs(value) if objective.form == "magnitude" else value

@@ -70,10 +70,10 @@ class Exact:
 
     def gradients(self) -> Floats:
         """Return (rows, variables): first derivatives; at an extreme, those of the extreme's value."""
-        step = self.number(STEP)
         base = self._rows(self.base)
         columns = []
         for k in range(len(self.base)):
+            step = self.number(STEP) * max(1, abs(self.base[k]))
             moved = self._rows([x + step * (k == place) for place, x in enumerate(self.base)])
             columns.append([float((after - before) / step) for after, before in zip(moved, base, strict=True)])
         return np.array(columns).T.reshape(len(self.rows), len(self.base))

@@ -212,34 +212,31 @@ def test_touching_limits_that_close_every_way_down_keep_a_minimum():
     assert judged(plane(both, (("a", 1, 0.0), ("b", 1, 0.0))), xy(0, 0)).passed
 
 
-# What is passed and should not be, refused and should not be -------------------------------------------------------
+# What second order and singular systems hide -------------------------------------------------------
 
-UNMEASURED = "multipliers without measure pass: what a limit may give way by times its multiplier is not counted"
-LEVEL = "a direction without curvature passes: a cubic or quartic fall along it is not looked for"
-CONE = "directions are judged one by one: one between two that touching limits close stays open"
-CHOSEN = "where multipliers are not unique only one choice of them is judged"
+CURVED = "what falls along a curve only, and rises along every line, is not looked for"
 HELD = "a first level with its minimum inside does not hold the next one"
 PEANO = f(lambda x, y: (y - x**2) * (y - 2 * x**2))
 FALSELY_PASSED = {
-    **{f"HS13 beyond its cusp by {e:g}": (HS13, xy(1 + e, 0), UNMEASURED) for e in (1e-4, 5e-4, 9e-4)},
-    **{f"cubic contact, off by {e:g}": (CUBIC, xy(-e, 0), UNMEASURED) for e in (1e-4, 9e-4)},
-    "the level stretch of a cubic": (plane(f(lambda x, y: x**3 + y**2)), xy(0, 0), LEVEL),
-    "a quartic maximum": (plane(f(lambda x, y: y**2 - x**4)), xy(0, 0), LEVEL),
-    "Peano's surface: least along every line, no minimum": (plane(PEANO), xy(0, 0), LEVEL),
+    **{f"HS13 beyond its cusp by {e:g}": (HS13, xy(1 + e, 0), "") for e in (1e-4, 5e-4, 9e-4)},
+    **{f"cubic contact, off by {e:g}": (CUBIC, xy(-e, 0), "") for e in (1e-4, 9e-4)},
+    "the level stretch of a cubic": (plane(f(lambda x, y: x**3 + y**2)), xy(0, 0), ""),
+    "a quartic maximum": (plane(f(lambda x, y: y**2 - x**4)), xy(0, 0), ""),
+    "Peano's surface: least along every line, no minimum": (plane(PEANO), xy(0, 0), CURVED),
     "a square and a cube, as in HS47": (
-        plane(f(lambda x, y: x**2 + (x - y) ** 3), (("x", -1, -1.0),)), xy(0, 0), LEVEL,
+        plane(f(lambda x, y: x**2 + (x - y) ** 3), (("x", -1, -1.0),)), xy(0, 0), "",
     ),
     "a hill left open between two limits": (
         plane(
             f(lambda x, y: y**2 / 100 - x**2, a=lambda x, y: x - 2 * y, b=lambda x, y: -x - 2 * y),
             (("a", 1, 0.0), ("b", 1, 0.0)),
         ),
-        xy(0, 0), CONE,
+        xy(0, 0), "",
     ),
 }  # fmt: skip
 FALSELY_REFUSED = {
     "HS30-like, two limits with one slope": (
-        plane(f(lambda x, y: x**2 + y**2 / 2, **RADIUS), (("x", -1, 1.0), ("g", -1, 1.0))), xy(1, 0), CHOSEN,
+        plane(f(lambda x, y: x**2 + y**2 / 2, **RADIUS), (("x", -1, 1.0), ("g", -1, 1.0))), xy(1, 0), "",
     ),
     "a first level with its minimum inside": (
         plane(f(lambda x, y: x**2, b=lambda x, y: (x - 1) ** 2 + (y - 2) ** 2), (), ("f", "b")), xy(0, 2), HELD,
@@ -247,19 +244,19 @@ FALSELY_REFUSED = {
 }  # fmt: skip
 
 
-def wrong_today(cases):
+def told_apart(cases):
     return [
-        pytest.param(program, x, marks=pytest.mark.xfail(strict=True, reason=reason), id=name)
+        pytest.param(program, x, marks=pytest.mark.xfail(strict=True, reason=reason) if reason else (), id=name)
         for name, (program, x, reason) in cases.items()
     ]
 
 
-@pytest.mark.parametrize(("program", "x"), wrong_today(FALSELY_PASSED))
+@pytest.mark.parametrize(("program", "x"), told_apart(FALSELY_PASSED))
 def test_what_only_looks_optimal_to_second_order_is_refused(program, x):
     assert not judged(program, x).passed
 
 
-@pytest.mark.parametrize(("program", "x"), wrong_today(FALSELY_REFUSED))
+@pytest.mark.parametrize(("program", "x"), told_apart(FALSELY_REFUSED))
 def test_a_true_optimum_with_a_singular_system_passes(program, x):
     certificate = judged(program, x)
     assert certificate.passed, certificate.reasons
@@ -267,7 +264,6 @@ def test_a_true_optimum_with_a_singular_system_passes(program, x):
 
 # Numbers that are none --------------------------------------------------------------------------------------------
 
-NOT_NUMBERS = "what has no value or no slope raises instead of being refused"
 ROOT = toy.program("xy", formulas={"f": lambda m, v: m.sqrt(1 - v["x"]) + v["y"] ** 2}, limits=(("x", 1, 1.0),))
 NONE = {
     "a point that is no number": (plane(f(lambda x, y: x**2)), xy(math.nan, 0)),
@@ -278,7 +274,6 @@ NONE = {
 }
 
 
-@pytest.mark.xfail(strict=True, reason=NOT_NUMBERS)
 @pytest.mark.parametrize("name", NONE)
 def test_what_has_no_value_or_no_slope_is_refused(name):
     program, x = NONE[name]
@@ -288,7 +283,6 @@ def test_what_has_no_value_or_no_slope_is_refused(name):
     assert certificate.reasons
 
 
-@pytest.mark.xfail(strict=True, reason=NOT_NUMBERS)
 def test_a_solve_that_ends_where_an_objective_does_is_answered():
     assert toy.solve(ROOT).status in ("optimal", "uncertified")
 
@@ -309,6 +303,5 @@ def test_the_tip_of_a_cone_has_no_slope_and_is_refused():
     assert_refused(judged(FAR, xy(0, 0)), FALLS)
 
 
-@pytest.mark.xfail(strict=True, reason="the step of the differences vanishes beside variables of 1e20 and more")
 def test_a_slope_is_seen_however_far_out():
     assert_refused(judged(FAR, xy(1.0, 1e22)), FALLS)
