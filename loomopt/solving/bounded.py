@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.jobs.program import Integral
+from loomopt.jobs.program import Integral, Program
 from loomopt.jobs.sampling import Sampler, Tally
 
 MOST_BOXES = 20_000
@@ -128,3 +128,23 @@ def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
         signs = (1.0,) if name in sampler.model.signed else (1.0, -1.0)
         found += [boxes.bound(name, sign, peak, where).status for sign in signs]
     return next((status for status in ("violated", "undecided") if status in found), "proven")
+
+
+def cycle_rows(program: Program) -> list[CycleRow]:
+    """Return each whole-cycle quantity of a program that counts, with its natural size and the pieces it counts on."""
+    found: list[CycleRow] = [(o.row, o.scale, None) for o in program.objectives if o.form == "peak"]
+    found += [(limit.row, limit.scale, limit.where) for limit in program.limits if limit.family == "cycle"]
+    return list(dict.fromkeys(found))
+
+
+def between_points(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> float:
+    """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
+    pieces, u = sampler.grid(points)
+    worst = 0.0
+    for name, scale, where in rows:
+        on = np.ones(len(u), dtype=bool)
+        if where:
+            on = sampler.cycle.switches[pieces, where[0]] == where[1]
+        highest = float(sampler.heights(name, sampler.at(name, pieces[on], u[on])).max(initial=-np.inf))
+        worst = max(worst, (highest - sampler.peak(name, where)) / scale)
+    return worst

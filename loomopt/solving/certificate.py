@@ -6,7 +6,7 @@ least squares). A limit with a positive multiplier at one level is an equality o
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from loomopt.cycle import Floats
 from loomopt.jobs.program import Limit, Objective, Program
 from loomopt.jobs.sampling import Sampler
 from loomopt.nlp.point import Settings
-from loomopt.solving.bounded import CycleRow, judged
+from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.nnls import nnls
 from loomopt.solving.second_order import Lagrangian, least_on_cone
+from loomopt.solving.verdict import Binding, Certificate, Level
 
 FEASIBILITY, STATIONARITY, COMPLEMENTARITY = 1e-9, 1e-6, 1e-8
 ACTIVE = 1e-7
@@ -29,63 +30,8 @@ FAINT = 1e-4
 """Curvature up to which a direction is looked along, for what higher orders do there."""
 MEASURE, FARTHEST = 1e6, 1e8
 """Largest multiplier that is a price, and largest variable that is a design, in natural sizes."""
-ROUNDING = 1e-15
-"""Nothing is known better, relative to its natural size."""
 CURVED, CORRECTED = 1e-5, 1e-10
 """Curvature that Newton's step may follow, and the slope it need not mind."""
-
-
-@dataclass(frozen=True)
-class Level:
-    """The KKT residuals of one objective; held: the multiplier of the objectives before it.
-
-    price: the largest multiplier of a limit, dearest: that limit's name.
-    """
-
-    objective: str
-    stationarity: float
-    complementarity: float
-    held: float
-    price: float = 0.0
-    dearest: str = ""
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A limit that binds, and the fall of the first objective it moves per unit it is loosened (SI)."""
-
-    limit: Limit
-    side: int
-    objective: Objective
-    worth: float
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """What was verified of a design; reasons say why it did not pass."""
-
-    passed: bool
-    reasons: tuple[str, ...]
-    levels: tuple[Level, ...]
-    feasibility: float
-    violation: float
-    minimum: bool
-    unique: bool
-    binding: tuple[Binding, ...] = ()
-    by: str = "refined"
-    settled: tuple[str, ...] = field(default=())
-    correction: Mapping[str, float] = field(default_factory=dict)
-    """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
-
-    @property
-    def error(self) -> float:
-        """Estimate of the relative error of what the answer says: the largest of all that was found amiss."""
-        return max(self.feasibility, self.violation, self.residual, ROUNDING)
-
-    @property
-    def residual(self) -> float:
-        """The largest KKT residual of all levels."""
-        return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
 def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
@@ -170,10 +116,11 @@ class _Trial:
         if not feasibility <= FEASIBILITY:
             worst = max(self.excess, key=lambda k: self.excess[k])
             reasons.append(f"limit {self.program.limits[worst].name} is exceeded by {feasibility:.2g} of its size")
-        violation = self._between_points()
+        rows = cycle_rows(self.program)
+        violation = between_points(self.sampler, rows, self.checked)
         if not violation <= self.accuracy:
             reasons.append(f"a whole-cycle value is exceeded by {violation:.2g} between refined points")
-        bound = judged(self.sampler, self._cycle_rows(), self.accuracy)
+        bound = judged(self.sampler, rows, self.accuracy)
         if bound == "violated":
             reasons.append("a whole-cycle value is exceeded somewhere between refined points")
         levels = []
@@ -208,24 +155,6 @@ class _Trial:
             by="bounded" if bound == "proven" else "refined",
             correction=self.correction,
         )
-
-    def _cycle_rows(self) -> list[CycleRow]:
-        """Return each whole-cycle quantity that counts, with its natural size and the pieces it counts on."""
-        found: list[CycleRow] = [(o.row, o.scale, None) for o in self.program.objectives if o.form == "peak"]
-        found += [(limit.row, limit.scale, limit.where) for limit in self.program.limits if limit.family == "cycle"]
-        return list(dict.fromkeys(found))
-
-    def _between_points(self) -> float:
-        """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
-        pieces, u = self.sampler.grid(self.checked)
-        worst = 0.0
-        for name, scale, where in self._cycle_rows():
-            on = np.ones(len(u), dtype=bool)
-            if where:
-                on = self.sampler.cycle.switches[pieces, where[0]] == where[1]
-            highest = float(self.sampler.heights(name, self.sampler.at(name, pieces[on], u[on])).max(initial=-np.inf))
-            worst = max(worst, (highest - self.sampler.peak(name, where)) / scale)
-        return worst
 
     def _columns(self, place: int) -> tuple[list[int], list[int], list[int]]:
         """Return the rows of this level: its pieces, the inequalities, and those held as equalities."""

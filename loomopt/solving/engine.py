@@ -15,10 +15,11 @@ from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
 from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
-from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, Certificate, certify
+from loomopt.solving.certificate import FEASIBILITY, STATIONARITY, certify
 from loomopt.solving.proof import proven
 from loomopt.solving.settle import settle
 from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
 
 MORE_STARTS = 8

@@ -7,8 +7,9 @@ from loomopt import designs
 from loomopt.jobs.program import Program
 from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import Task
-from loomopt.solving.certificate import FEASIBILITY, Certificate
+from loomopt.solving.certificate import FEASIBILITY
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
+from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt.frozen import freeze
-from loomopt.solving.certificate import Certificate
+from loomopt.solving.verdict import Certificate
 
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",

@@ -5,8 +5,8 @@ from typing import Any
 
 from loomopt.jobs.program import Limit
 from loomopt.quantities import SI_UNIT, factor, kind_of, show
-from loomopt.solving.certificate import Binding
 from loomopt.solving.solution import Price, Relaxation
+from loomopt.solving.verdict import Binding
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
 SIDES = {-1: "min", 0: "equal", 1: "max"}

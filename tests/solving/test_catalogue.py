@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from loomopt.solving.catalogue import FARTHEST, fitted
-from loomopt.solving.certificate import Certificate, Level
 from loomopt.solving.solution import Solution
+from loomopt.solving.verdict import Certificate, Level
 
 MM = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 SIZES = tuple(float(f"{size:g}e-3") for size in MM)
