@@ -17,7 +17,7 @@ from loomopt.nlp.calls import Calls
 from loomopt.nlp.follow import follow, polish
 from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
 from loomopt.nlp.polish import BINDING
-from loomopt.nlp.transcribe import Transcription
+from loomopt.nlp.transcribe import Family, Transcription
 
 ROUNDS, ELASTIC_ROUNDS, LEADING = 16, 32, 4
 STANDS = 1e-7
@@ -57,7 +57,7 @@ class _Run:
         peaks = calls.peaks(sampler)
         nodes = [list(kept) for kept in warm.nodes] if warm else [found[:LEADING] for found in peaks]
         if self.settings.uniform:
-            nodes = [_uniform(sampler, family.row, self.settings.uniform) for family in calls.families]
+            nodes = [_uniform(sampler, family, self.settings.uniform) for family in calls.families]
         raw: Mapping[str, Floats] = warm.raw if warm else {}
         last = raw
         status, reached, violation, extra = "Maximum_Rounds_Exceeded", False, math.inf, None
@@ -179,10 +179,13 @@ class _Run:
         return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
 
 
-def _uniform(sampler: Sampler, row: str, count: int) -> list[Extreme]:
-    """Return equal nodes of one turn for a row: both signs of it where its magnitude counts."""
+def _uniform(sampler: Sampler, family: Family, count: int) -> list[Extreme]:
+    """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
     places = [sampler.cycle.located(2 * math.pi * k / count) for k in range(count)]
-    if row in sampler.model.signed:
+    if family.where:
+        switch, value = family.where
+        places = [(piece, u) for piece, u in places if sampler.cycle.switches[piece, switch] == value]
+    if family.row in sampler.model.signed:
         return [Extreme(*place, 0.0, signed=True) for place in places]
     return [Extreme(*place, sign) for place in places for sign in (1.0, -1.0)]
 

@@ -17,6 +17,7 @@ from loomopt.nlp.point import Settings
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.nnls import nnls
+from loomopt.solving.prices import priced
 from loomopt.solving.second_order import Lagrangian, least_on_cone
 from loomopt.solving.verdict import Binding, Certificate, Level
 
@@ -316,16 +317,6 @@ class _Trial:
         for k, row in enumerate(self.limits):
             for objective, multipliers in zip(self.program.objectives, self.multipliers, strict=True):
                 if abs(multipliers[k]) > POSITIVE and row.limit and not row.limit.hidden:
-                    found.append(self._priced(row.limit, objective, float(multipliers[k])))
+                    found.append(priced(self.sampler, row.limit, objective, float(multipliers[k])))
                     break
         return tuple(found)
-
-    def _priced(self, limit: Limit, objective: Objective, multiplier: float) -> Binding:
-        """Return a binding limit with its multiplier in SI units of objective per limit."""
-        weight = {**self.sampler.given.values, **self.sampler.figures}[limit.weight] if limit.weight else 1.0
-        worth = abs(multiplier) * objective.scale / limit.scale * weight
-        if objective.power != 1:
-            figure = self.sampler.figures[objective.figure]
-            worth /= abs(objective.power * figure ** (objective.power - 1))
-        side = limit.sign or (1 if multiplier > 0 else -1)
-        return Binding(limit, side, objective, worth)
