@@ -53,7 +53,6 @@ def test_the_sleys_synthesis_as_the_time_ratio_goes_to_1(theta, swing):
     assert [float(found[0] - MP.mpf(theta)), float(found[1] - MP.mpf(swing))] == pytest.approx([0, 0], abs=1e-14)
 
 
-@pytest.mark.xfail(reason="l1 is half a difference of two long distances: 1e-5 off at 1e-12 rad", strict=True)
 def test_the_sleys_crank_keeps_its_digits_as_the_swing_goes_to_0():
     l1, l2 = sley_synthesis.sley(maths.FLOAT, 0.0, 1e-12, 0.684, 0.773)
     found = seen_under(*exact(l1, l2, 0.684, 0.773))[1]

@@ -3,6 +3,7 @@
 Told one by one in docs/hard-cases.md.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -75,12 +76,11 @@ CASES = {
 def draws(name, cases=None):
     """Yield crank-rockers of a case with a crank angle each: where it is hardest, and from 1e-10 to 1 rad off."""
     make, argument, _ = (cases or CASES)[name]
-    random, found = np.random.default_rng(5), 0
-    while found < DRAWS:
-        sides, place = make(random, argument)
-        if not turns(*sides) or crank_rocker.fault(*sides):
-            continue
-        found += 1
+    random = np.random.default_rng(5)
+    tried = (make(random, argument) for _ in range(100 * DRAWS))
+    chosen = list(itertools.islice(((sides, place) for sides, place in tried if turns(*sides)), DRAWS))
+    assert len(chosen) == DRAWS
+    for number, (sides, place) in enumerate(chosen):
         lengths = Lengths(*map(float, sides), int(random.choice([-1, 1])))
         if place == "dead centre":
             stands = dead_centres(maths.FLOAT, lengths)
@@ -88,7 +88,7 @@ def draws(name, cases=None):
         elif place is None:
             yield lengths, float(random.uniform(0, 2 * math.pi))
         else:
-            yield lengths, place + (found % 3 > 0) * float(random.choice([-1, 1]) * 10 ** random.uniform(-10, 0))
+            yield lengths, place + (number % 3 > 0) * float(random.choice([-1, 1]) * 10 ** random.uniform(-10, 0))
 
 
 def sides_of(lengths):
@@ -142,15 +142,13 @@ def test_the_branch_never_flips(name):
 
 @pytest.mark.parametrize("gap", [1e-9, 1e-12, 1e-15])
 def test_nothing_is_nan_all_round_next_to_a_change_point(gap):
-    random, found = np.random.default_rng(7), 0
-    while found < 5:
-        sides, _ = stretched(random, gap)
-        if turns(*sides) and not crank_rocker.fault(*sides):
-            found += 1
+    random = np.random.default_rng(7)
+    for sides, _ in (stretched(random, gap) for _ in range(40)):
+        if turns(*sides):
             assert np.isfinite(crank_rocker.curves(Lengths(*sides), np.linspace(0, 2 * math.pi, 721))).all()
 
 
-def test_transmission_angle_180_less_1e_8_deg_is_beyond_float64_and_told_by_its_condition():
+def test_transmission_angle_180_less_1e_8_is_beyond_float64_and_told_by_its_condition():
     """The gap is 1e-17 of the frame: rounding of any length moves it by itself. What comes out is finite and tiny."""
     random = np.random.default_rng(3)
     for _ in range(DRAWS):
@@ -176,7 +174,6 @@ def test_an_exact_change_point_is_refused_and_named(mm):
 ROUNDED = {"parallelogram": (100, 300, 100, 300), "tenths of mm": (36.9, 57, 106.2, 126.3)}
 
 
-@pytest.mark.xfail(reason="the margin is compared in float64: 0.3 + 0.1 - 0.1 - 0.3 > 0", strict=True)
 @pytest.mark.parametrize("mm", ROUNDED.values(), ids=ROUNDED)
 def test_an_exact_change_point_is_refused_also_where_rounding_hides_it(mm):
     changes = {f"mechanism.l{k + 1}": f"{value} mm" for k, value in enumerate(mm)}
