@@ -4,6 +4,7 @@ q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md 
 """
 
 import functools
+import math
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,9 +13,12 @@ from loomopt import balance
 from loomopt.balance import Given
 from loomopt.jobs.beatup_poses import FrontPose, ReedPose
 from loomopt.jobs.program import Integral
-from loomopt.maths import Maths, Number
+from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.schema import Check, Load, Values
+
+HAIR = 5e-4
+"""Share by which a dyad's triangle closes, below which peaks stand so close to it that even samples miss them."""
 
 ASSEMBLY_MARGIN = 1.001
 """The dyad's triangle must close with this factor to spare at both ends."""
@@ -56,6 +60,15 @@ class Beatup:
     def hints(self, given: Given) -> dict[str, float]:
         """Return nothing: every corner has a formula."""
         return {}
+
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return the crank angles, rad, 0 and π, where the dyad comes within a hair of folding or stretching."""
+        lengths = given.values["lengths"]
+        near = [
+            crank_rocker.span(FLOAT, lengths, angle, far) > (1 - HAIR) ** 2
+            for angle, far in ((0.0, False), (0.0, True), (math.pi, False), (math.pi, True))
+        ]
+        return (*((0.0,) if any(near[:2]) else ()), *((math.pi,) if any(near[2:]) else ()))
 
     def implied(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return nothing: no variable follows from the others."""

@@ -73,6 +73,9 @@ class Model(Protocol):
     def hints(self, given: Given) -> Mapping[str, float]:
         """Return where corners that no formula gives lie, by name of value: what `corners` starts from."""
 
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return the crank angles, rad, where the mechanism comes within a hair of a singular position."""
+
     def implied(self, values: Mapping[str, float]) -> Mapping[str, float]:
         """Return the variables that follow from the others at a start; raises ValueError where it cannot move."""
 

@@ -9,9 +9,12 @@ from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
+
 from loomopt import balance, maths
 from loomopt.balance import Given
-from loomopt.jobs import rapier_reading
+from loomopt.jobs import rapier_reading, spikes
+from loomopt.jobs.beatup import HAIR
 from loomopt.jobs.program import Integral
 from loomopt.jobs.sampling import Sampler
 from loomopt.maths import Maths, Number
@@ -23,6 +26,8 @@ ASSEMBLY_MARGIN = 1.001
 """Every dyad's triangle must close with this factor to spare at both ends."""
 DIMENSIONS = tuple(entry.name for entry in fields(rapier_drive.Dimensions))
 SLEY = ("l1", "l2", "l3", "l71")
+SAMPLED = 2 * math.pi / 360
+"""rad; where a singular position is sought between samples."""
 BEFORE, AFTER = -1.0, 1.0
 """Switch of the dwell arcs on either side of front dead centre."""
 TURN = "turn."
@@ -169,6 +174,21 @@ class Rapier:
             return {}
         turns = rapier_reading.turns(lambda phi: self.pose(maths.numpy(), given, phi))
         return {f"{TURN}{k}": angle for k, angle in enumerate(turns)}
+
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return the crank angles, rad, where a dyad comes within a hair of folding or stretching."""
+        angles = np.linspace(0.0, 2 * math.pi, 361)
+        found = []
+        for name in ("span_far", "span_near", "sley_span_far", "sley_span_near"):
+
+            def height(at: Any, name: str = name) -> Any:
+                return np.asarray(self.quantity(maths.numpy(), given, name, at, []))
+
+            top = float(angles[int(np.argmax(height(angles)))])
+            if height(np.array([top]))[0] > 1 - 10 * HAIR:
+                top = spikes.sectioned(height, top - SAMPLED, top + SAMPLED)
+                found += [top] if height(np.array([top]))[0] > (1 - HAIR) ** 2 else []
+        return tuple(found)
 
     def implied(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from loomopt import cycle, maths
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Cycle, Floats
+from loomopt.jobs import spikes
 from loomopt.jobs.program import Integral, Model
 
 CHUNK = 8192
@@ -159,8 +160,34 @@ class Sampler:
         left[1:], right[:-1] = size[:-1], size[1:]
         left[first] = right[last] = -np.inf
         peaks = np.flatnonzero((size > left) & (size >= right))
-        found = self._refine(name, pieces, u, values, peaks)
+        found = self._refine(name, pieces, u, values, peaks) + self._spikes(name)
         return sorted(found, key=lambda extreme: -extreme.height)
+
+    @functools.cached_property
+    def singular(self) -> tuple[float, ...]:
+        """Crank angles, rad, where the mechanism comes very near to a singular position."""
+        return self.model.singular(self.given)
+
+    def _spikes(self, name: str) -> list[Extreme]:
+        """Return the extremes beside singular positions that even samples may miss."""
+
+        def heights(angles: Floats) -> Floats:
+            return self.heights(name, self._at_angles(name, angles))
+
+        found = []
+        for angle in (peak for centre in self.singular for peak in spikes.peaks(heights, centre)):
+            value = float(self._at_angles(name, np.array([angle]))[0])
+            found.append(Extreme(*self.cycle.located(angle), value, signed=name in self.model.signed))
+        return found
+
+    def _at_angles(self, name: str, angles: Floats) -> Floats:
+        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
+        Tally.positions += len(angles)
+        pieces = [self.cycle.located(float(angle))[0] for angle in angles]
+        switches = list(self.cycle.switches[pieces].T)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values = self.model.quantity(maths.numpy(), self.given, name, angles, switches)
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
     def heights(self, name: str, values: Floats) -> Floats:
         """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""

@@ -177,6 +177,10 @@ class Shedding:
         back = [values["begin.near"] - _part(values["return"], share) for share in shares]
         return (*rise, *back)
 
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return nothing: a cam has no singular position that its follower's check lets pass."""
+        return ()
+
     def implied(self, values: Values) -> dict[str, float]:
         """Return nothing: every variable stands for itself."""
         return {}

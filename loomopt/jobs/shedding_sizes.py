@@ -13,7 +13,7 @@ MEGA = 1e6
 
 
 class Sizes:
-    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what answers it.
+    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
 
     sampler: the frame today; stretch: the largest elongation its spring may have, m.
     """
@@ -30,13 +30,14 @@ class Sizes:
         self.others: Floats = np.sum(parts, axis=0) if parts else np.zeros(u.shape)
         least = float(given.values.get("N_min", 0.0))
         self.force = float(np.sum(np.abs(parts), axis=0).max() if parts else 0.0) + least or 1.0
-        self.stiffness = self.force / stretch if stretch > 0.0 else 1.0
         self.stretch = stretch
-        self.needed = self.stiffness_for(least, stretch - float(given.values["travel"])) or self.stiffness
+        preload = stretch - float(given.values["travel"])
+        self.needed = self.stiffness_for(least, preload) or (self.force / stretch if stretch > 0.0 else 1.0)
+        self.stiffness = self.needed
 
     def stiffness_for(self, least: float, preload: float) -> float:
         """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
-        elongated = np.maximum(self.travelled + preload, LEAST_STRETCH * (self.stretch or 1.0))
+        elongated = np.maximum(self.travelled + preload, min(LEAST_STRETCH * self.stretch, preload) or LEAST_STRETCH)
         return float(max(0.0, np.max((least - self.others) / elongated)))
 
     def figure(self, name: str, quantity: str, value: float) -> float:

@@ -265,7 +265,7 @@ class _Trial:
         ways = []
         for value, vector in zip(values, vectors.T, strict=True):
             open_ways = [way for way in (vector, -vector) if np.max(slopes @ way, initial=-np.inf) <= FLAT]
-            self.unique &= value > FLAT or not open_ways
+            self.unique = self.unique and (bool(value > FLAT) or not open_ways)
             ways += open_ways if value <= FAINT else []
         self._probe(place, multipliers, [free @ way for way in ways], residual)
 

@@ -34,6 +34,9 @@ class Wave:
     def hints(self, given):
         return {}
 
+    def singular(self, given):
+        return ()
+
     def implied(self, values):
         return {}
 

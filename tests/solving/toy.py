@@ -46,6 +46,9 @@ class Toy:
     def hints(self, given):
         return {}
 
+    def singular(self, given):
+        return ()
+
     def implied(self, values):
         return {}
 

@@ -1,0 +1,33 @@
+"""Extremes beside a singular position: spikes narrower than any even samples, sought on nodes graded toward it."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from loomopt.cycle import Floats
+
+WIDEST, HALVINGS = 0.02, 44
+"""rad from the singular position, and how often that is halved."""
+GOLDEN, SECTIONS = (5**0.5 - 1) / 2, 90
+
+
+def peaks(heights: Callable[[Floats], Floats], centre: float) -> list[float]:
+    """Return the angles, rad, of the local maxima of heights(angles) near `centre` that graded nodes show, refined."""
+    offsets = WIDEST * 0.5 ** np.arange(HALVINGS)
+    angles = np.concatenate([centre - offsets, [centre], centre + offsets[::-1]])
+    values = heights(angles)
+    if not np.all(np.isfinite(values)):
+        return []
+    inner = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])) + 1
+    return [sectioned(heights, float(angles[k - 1]), float(angles[k + 1])) for k in inner]
+
+
+def sectioned(heights: Callable[[Floats], Floats], low: float, high: float) -> float:
+    """Return where a function with one maximum between low and high is highest, by golden sections."""
+    for _ in range(SECTIONS):
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        if not low < left < right < high:
+            break
+        at_left, at_right = heights(np.array([left, right]))
+        low, high = (low, right) if at_left >= at_right else (left, high)
+    return (low + high) / 2
