@@ -42,12 +42,10 @@ def seen_under(l1, l2, l3, l71):
     return centres(1)(l1, l2, l3, l71)[2:4]
 
 
-@pytest.mark.parametrize("theta", THETAS)
+@pytest.mark.parametrize("theta", [theta for theta in THETAS if abs(theta) < 0.05])
 @pytest.mark.parametrize("swing", [0.1, 0.227, 0.5])
 def test_the_sleys_synthesis_as_the_time_ratio_goes_to_1(theta, swing):
     """Back through the dead centres in 120 digits: θ and swing to 1e-14 rad, and no time ratio of 1 is singular."""
-    if abs(theta) > 0.05:
-        return
     l1, l2 = sley_synthesis.sley(maths.FLOAT, theta, swing, 0.684, 0.773)
     found = seen_under(*exact(l1, l2, 0.684, 0.773))
     assert [float(found[0] - MP.mpf(theta)), float(found[1] - MP.mpf(swing))] == pytest.approx([0, 0], abs=1e-14)
