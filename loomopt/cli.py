@@ -92,6 +92,41 @@ for _name, _command in commands.OF_A_DESIGN.items():
 
 
 @app.command()
+def accuracy(
+    problem: Problem,
+    sets: Set = None,
+    on: With = None,
+    off: Without = None,
+    full: Annotated[bool, typer.Option("--full", help="More settings, more repeats: minutes.")] = False,
+    as_json: Json = False,
+    out: Annotated[
+        list[Path] | None, typer.Option(metavar="F", help="Write the figure (.png, .svg, .pdf) or the table (.csv).")
+    ] = None,
+) -> None:
+    """Show what accuracy costs in time, method by method."""
+    from loomopt.studies import accuracy as study
+    from loomopt.views import accuracy_figure, layout, outputs
+
+    for path in out or ():
+        accuracy_figure.check(path)
+    scene = read_scene(problem, sets, on, off)
+    climbs: list[study.Climb] = []
+    try:
+        with Progress() as progress:
+            climbs.extend(study.climbs(scene, full, progress.say))
+    finally:
+        if climbs:
+            found = study.concluded(scene, climbs, full)
+            if as_json:
+                print(outputs.json_text(found.as_dict()))
+            else:
+                layout.show(*accuracy_figure.parts(found))
+    for path in out or ():
+        accuracy_figure.write(found, path)
+        remark(f"Wrote {path}")
+
+
+@app.command()
 def check(
     problems: Annotated[list[str] | None, typer.Argument(help="Packaged scenes; all of them without a name.")] = None,
     write: Annotated[Path | None, typer.Option(metavar="DIR", help="Write new reference tables there instead.")] = None,

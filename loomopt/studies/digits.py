@@ -1,0 +1,253 @@
+"""References in many digits: a design's single values and peaks, and the optimum of a target, from the same formulas.
+
+Each whole-cycle value stands on its own extreme, found by Newton's method in these digits.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from loomopt import maths
+from loomopt.cycle import Cycle, Floats
+from loomopt.jobs.program import Model, Program
+from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.nlp.point import Point
+from loomopt.nlp.polish import BINDING
+
+DIGITS = 40
+STEP, SLOPE_STEP = "1e-12", "1e-20"
+"""Steps of central differences in u, and of one-sided ones in the design."""
+NEWTON, FAR = 4, 1e-3
+"""Newton steps toward an extreme, and the largest that is one."""
+TIED = 1e-9
+"""Extremes this close to the highest, relative, are each looked at."""
+ROUNDS, MET = 6, 1e-28
+"""Newton steps onto what binds, and where they have arrived, in natural sizes."""
+RANK = 1e-9
+"""Directions that what binds moves by less than this share are open."""
+TURNS, FLAT = 3, 1e-7
+"""Newton steps along open directions, and the curvature below which nothing changes along one, in natural sizes."""
+
+
+class Precise:
+    """One design in mpmath; values: numbers by name, SI, floats or mpmath; cycle: its pieces in float64."""
+
+    def __init__(self, model: Model, values: Mapping[str, Any], cycle: Cycle, digits: int = DIGITS) -> None:
+        self.maths, self.model, self.cycle = maths.mpmath(digits), model, cycle
+        number: Callable[[Any], Any] = self.maths.number
+        self.given = model.given(self.maths, {name: number(value) for name, value in values.items()})
+        corners = [angle for of in model.corners(self.maths, self.given) for angle in of]
+        turn = 2 * self.maths.pi
+        self.starts = [corners[place] + turn * turns for place, turns in cycle.order] or [number(0.0)]
+        self.starts.append(self.starts[0] + turn)
+
+    def static(self, front: Sequence[float], names: Sequence[str]) -> dict[str, Any]:
+        """Return single values by name: numbers of the scene, and what follows from them alone."""
+        return {**self.given.values, **self.model.static(self.maths, self.given, front, names)}
+
+    def at(self, name: str, piece: int, u: Any) -> Any:
+        """Return a quantity at a node."""
+        start, end = self.starts[piece : piece + 2]
+        switches = list(self.cycle.switches[piece])
+        return self.model.quantity(self.maths, self.given, name, start + u * (end - start), switches)
+
+    def extreme(self, name: str, near: Extreme) -> Any:
+        """Return a quantity at the extreme near one found in float64; an extreme at a piece's end stays there."""
+        number: Callable[[Any], Any] = self.maths.number
+        u, step = number(near.u), number(STEP)
+        for _ in range(NEWTON if 0.0 < near.u < 1.0 else 0):
+            low, mid, high = (self.at(name, near.piece, u + k * step) for k in (-1, 0, 1))
+            bend = (high - 2 * mid + low) / step**2
+            shift = -(high - low) / (2 * step * bend) if bend else 0 * u
+            if abs(shift) > FAR:
+                break
+            u += shift
+        return self.at(name, near.piece, u)
+
+
+def precise(sampler: Sampler, digits: int = DIGITS) -> Precise:
+    """Return a sampled design in many digits."""
+    return Precise(sampler.model, {**sampler.values, **sampler.hints}, sampler.cycle, digits)
+
+
+def peak(sampler: Sampler, name: str, signed: bool = False) -> Any:
+    """Return the largest |quantity| over the cycle (of a signed one, value; signed: take it so) in 40 digits."""
+    exact = precise(sampler)
+    found = sampler.extremes(name)
+    plain = signed or name in sampler.model.signed
+    heights = [extreme.value if plain else abs(extreme.value) for extreme in found]
+    top = max(heights)
+    near = [e for e, height in zip(found, heights, strict=True) if height >= top - TIED * max(abs(top), 1e-300)]
+    values = [exact.extreme(name, extreme) for extreme in near]
+    return max(value if plain else abs(value) for value in values)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """An optimum in many digits: its variables, SI; its objectives, SI, each as the program states it.
+
+    Relative, in natural sizes: uncertainty of the last objective, design_uncertainty of the variables, apart from
+    directions in which nothing changes at all; flat: how many of these there are.
+    """
+
+    x: Mapping[str, Any]
+    objectives: tuple[Any, ...]
+    uncertainty: float
+    design_uncertainty: float
+    flat: int
+
+
+class _Rows:
+    """What binds at a solved point, as functions of the free variables and the peaks, all of natural size."""
+
+    def __init__(self, program: Program, point: Point, x: Mapping[str, float], digits: int) -> None:
+        self.program, self.point = program, point
+        self.number: Callable[[Any], Any] = maths.mpmath(digits).number
+        self.digits, self.fixed = digits, {}
+        prices = point.raw["lam_x"]
+        self.free = []
+        for k, variable in enumerate(program.variables):
+            end = variable.upper if prices[k] > BINDING else variable.lower if prices[k] < -BINDING else None
+            if end is not None or variable.lower == variable.upper:
+                self.fixed[variable.name] = self.number(variable.lower if end is None else end)
+            else:
+                self.free.append(variable)
+        self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
+        self.sampler = Sampler(program.model, {**program.parameters, **x})
+        static = [limit for limit in program.limits if limit.family == "static"]
+        rows = point.raw["lam_g"]
+        self.static = [limit for k, limit in enumerate(static) if limit.sign == 0 or abs(rows[k]) > BINDING]
+        magnitudes = [o for o in program.objectives if o.form == "magnitude"]
+        pairs = np.abs(rows[len(static) : len(static) + 2 * len(magnitudes)]).reshape(-1, 2)
+        self.zero = [o for o, pair in zip(magnitudes, pairs, strict=True) if pair.min() > BINDING]
+        self.peaks = [o for o in program.objectives if o.form == "peak"]
+        limits = [limit for limit in program.limits if limit.family == "cycle"]
+        self.families: list[tuple[str, float, float]] = [(o.row, 0.0, o.scale) for o in self.peaks]
+        self.families += [(limit.row, limit.bound, limit.scale) for limit in limits]
+
+    def variables(self, unknown: Sequence[Any]) -> dict[str, Any]:
+        """Return every variable, SI."""
+        pairs = zip(self.free, unknown, strict=False)
+        return self.fixed | {v.name: value * self.number(v.scale) for v, value in pairs}
+
+    def design(self, unknown: Sequence[Any]) -> Precise:
+        """Return the design of the unknowns."""
+        values = {**self.program.parameters, **self.sampler.hints, **self.variables(unknown)}
+        return Precise(self.program.model, values, self.sampler.cycle, self.digits)
+
+    def names(self) -> list[str]:
+        """Return the single values that rows and objectives read."""
+        read = {name for limit in self.static for name in (limit.row, limit.weight) if name}
+        return sorted(read | {o.row for o in self.program.objectives})
+
+    def values(self, unknown: Sequence[Any]) -> list[Any]:
+        """Return every row: 0 where it is met."""
+        exact, number = self.design(unknown), self.number
+        single = exact.static(self.sampler.front, self.names())
+        found = [limit.residual(single, number(limit.value)) / number(limit.scale) for limit in self.static]
+        found += [single[o.row] / number(o.scale) for o in self.zero]
+        tops = unknown[len(self.free) :]
+        for k, ((name, limit, scale), binding) in enumerate(zip(self.families, self.point.binding, strict=True)):
+            bound = tops[k] if k < len(self.peaks) else number(limit) / number(scale)
+            for node in binding:
+                found.append(number(node.sign) * exact.extreme(name, node) / number(scale) - bound)
+        return found
+
+    def slopes(self, unknown: Sequence[Any]) -> Floats:
+        """Return (rows, unknowns): first derivatives by one-sided differences."""
+        step, base = self.number(SLOPE_STEP), self.values(unknown)
+        columns = []
+        for place in range(len(unknown)):
+            moved = self.values(moved_by(unknown, place, step))
+            columns.append([float((after - before) / step) for after, before in zip(moved, base, strict=True)])
+        return np.array(columns, dtype=float).T.reshape(len(base), len(unknown))
+
+    def objective(self, unknown: Sequence[Any]) -> Any:
+        """Return the last objective, to which the earlier ones leave what they do not decide."""
+        last = self.program.objectives[-1]
+        if last.form == "peak":
+            return unknown[-1]
+        return self.design(unknown).static(self.sampler.front, [last.row])[last.row] / self.number(last.scale)
+
+    def gradient(self, unknown: Sequence[Any]) -> Floats:
+        """Return the last objective's first derivatives."""
+        step, base = self.number(SLOPE_STEP), self.objective(unknown)
+        moved = (moved_by(unknown, place, step) for place in range(len(unknown)))
+        return np.array([float((self.objective(each) - base) / step) for each in moved])
+
+    def moved(self, unknown: Sequence[Any], by: Floats, size: Any) -> list[Any]:
+        """Return the unknowns after a step, size · by."""
+        return [value + self.number(float(part)) * size for value, part in zip(unknown, by, strict=True)]
+
+
+def moved_by(unknown: Sequence[Any], place: int, step: Any) -> list[Any]:
+    """Return the unknowns with one of them changed."""
+    return [value + step * (k == place) for k, value in enumerate(unknown)]
+
+
+def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int = DIGITS) -> Optimum:
+    """Return the optimum near a certified one: x (SI) moved until all that binds is met to many digits.
+
+    Along directions that what binds leaves open, Newton's method on the Lagrangian, its slope in float64: the
+    objective's own error is the square of what is left.
+    """
+    rows = _Rows(program, point, x, digits)
+    tops = [rows.sampler.peak(o.row) / o.scale for o in rows.peaks]
+    unknown, missed = _met(rows, [*rows.start, *map(rows.number, tops)])
+    step, curved, flat = 0.0, 0.0, 0
+    for _ in range(TURNS):
+        way, step, curved, flat = _open(rows, unknown)
+        if not step:
+            break
+        unknown, missed = _met(rows, rows.moved(unknown, way, rows.number(1.0)))
+    single = rows.design(unknown).static(rows.sampler.front, rows.names())
+    reached = iter(unknown[len(rows.free) :])
+    objectives = tuple(
+        next(reached) * rows.number(o.scale) if o.form == "peak" else single[o.row] for o in program.objectives
+    )
+    return Optimum(rows.variables(unknown), objectives, missed + curved * step**2, missed + step, flat)
+
+
+def _met(rows: _Rows, unknown: list[Any]) -> tuple[list[Any], float]:
+    """Return the unknowns moved, least change, onto what binds, and the largest row that is still not met."""
+    back = np.linalg.pinv(rows.slopes(unknown), rcond=RANK)
+    residual = rows.values(unknown)
+    missed = rows.number(0.0)
+    for _ in range(ROUNDS):
+        missed = max((abs(value) for value in residual), default=missed)
+        if missed <= MET:
+            break
+        scaled = np.array([float(value / missed) for value in residual])
+        unknown = rows.moved(unknown, -(back @ scaled), missed)
+        residual = rows.values(unknown)
+    return unknown, float(max((abs(value) for value in residual), default=missed))
+
+
+def _open(rows: _Rows, unknown: Sequence[Any]) -> tuple[Floats, float, float, int]:
+    """Return Newton's step along what is left open, its size, the largest curvature, and how many ways are flat."""
+    slopes, gradient = rows.slopes(unknown), rows.gradient(unknown)
+    _, sizes, basis = np.linalg.svd(slopes.reshape(-1, len(unknown)))
+    free = basis[int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0)))) :]
+    if not len(free):
+        return np.zeros(len(unknown)), 0.0, 0.0, 0
+    prices = np.linalg.lstsq(slopes.T, -gradient, rcond=None)[0]
+    step = rows.number(STEP)
+
+    def lagrangian(by: Floats) -> Any:
+        at = rows.moved(unknown, by, step)
+        priced = zip(prices.tolist(), rows.values(at), strict=True)
+        return rows.objective(at) + sum(rows.number(price) * value for price, value in priced)
+
+    here, ahead = lagrangian(0.0 * free[0]), [lagrangian(way) for way in free]
+    bends = np.zeros((len(free), len(free)))
+    for i in range(len(free)):
+        for j in range(i + 1):
+            bend = (lagrangian(free[i] + free[j]) - ahead[i] - ahead[j] + here) / step**2
+            bends[i, j] = bends[j, i] = float(bend)
+    values, vectors = np.linalg.eigh(bends)
+    curved = values > FLAT
+    ways = vectors[:, curved].T @ free
+    way = -(ways @ gradient / values[curved]) @ ways
+    return way, float(np.abs(way).max()), float(values.max()), int(np.sum(~curved))

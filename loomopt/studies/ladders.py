@@ -1,0 +1,218 @@
+"""A ladder: one method at settings from coarse to fine, its errors against a far tighter reference, and its cost.
+
+A new method is one more ladder. What a run gives is read, and compared, only after its time was taken.
+"""
+
+import itertools
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from loomopt.errors import BadInput
+from loomopt.jobs.sampling import Tally
+
+Setting = float | int | str
+TIGHTER = 100.0
+"""A reference must be known this many times better than the error it judges."""
+EPSILON = float(np.finfo(float).eps)
+FLOOR = 100 * EPSILON
+"""Errors below this are rounding: no order is read from them."""
+STILL = 2.0
+"""Errors within this factor of the least one have stopped falling."""
+SPREAD = 1.25
+"""Slopes from row to row within this factor of the middle one are one order."""
+LEAST_ORDER = 0.25
+"""An error that falls more slowly does not converge."""
+BUDGET = 0.3
+"""Seconds after which a run is not repeated once more."""
+FAILURES = (ArithmeticError, ValueError, RuntimeError, BadInput, np.linalg.LinAlgError)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a quantity truly is: a number or an array of any number system.
+
+    uncertainty: of the value, relative to `size`; size: what errors are relative to, the value itself without one.
+    """
+
+    value: Any
+    uncertainty: float = 0.0
+    size: float = 0.0
+
+    def error(self, value: Any) -> float:
+        """Return the largest relative error of a value."""
+        pairs = list(zip(_each(value), _each(self.value), strict=True))
+        size = self.size or max(abs(true) for _, true in pairs)
+        worst = max(abs(found - true) for found, true in pairs)
+        return float(worst / size) if size else float(worst)
+
+
+def _each(value: Any) -> list[Any]:
+    """Return the numbers of a value; Python's own where they are NumPy's, so that every number system takes them."""
+    if isinstance(value, np.ndarray):
+        return list(value.astype(float).ravel().tolist())
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run gave: quantity → value (none where it failed), and how it ended in the method's own words."""
+
+    values: Mapping[str, Any]
+    status: str = "done"
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """One method.
+
+    settings: coarse to fine. run(setting): what is timed. read(setting, result): the values it gave, not timed.
+    reference(quantity): what they are compared with, None where there is none tight enough. step(setting): what the
+    error may be a power of; None for settings that are no sizes.
+    """
+
+    method: str
+    quantities: tuple[str, ...]
+    settings: tuple[Setting, ...]
+    run: Callable[[Any], Any]
+    read: Callable[[Any, Any], Outcome]
+    reference: Callable[[str], Reference | None]
+    step: Callable[[Any], float] | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity by one method at one setting.
+
+    error: relative, None where there is none to tell; seconds: least of the repeats after a warm-up; evaluations:
+    positions of the mechanism that a run looked at.
+    """
+
+    quantity: str
+    method: str
+    setting: Setting
+    error: float | None
+    seconds: float | None
+    evaluations: int
+    status: str
+
+
+def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None = None) -> Iterator[Row]:
+    """Yield a ladder's rows, setting by setting; a run that fails is a row too."""
+    for setting in ladder.settings:
+        if on_run:
+            on_run(f"{ladder.method} {told(setting)}")
+        before = Tally.positions
+        try:
+            result = ladder.run(setting)
+            seconds, evaluations = _cost(ladder, setting, repeats)
+            outcome = ladder.read(setting, result)
+        except FAILURES as error:
+            spent = Tally.positions - before
+            words = " ".join(str(error).split()) or type(error).__name__
+            for quantity in ladder.quantities:
+                yield Row(quantity, ladder.method, setting, None, None, spent, f"failed: {words}")
+            continue
+        for quantity in ladder.quantities:
+            error_, status = _judged(ladder, quantity, outcome)
+            yield Row(quantity, ladder.method, setting, error_, seconds, evaluations, status)
+
+
+def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
+    """Return the least time of the repeats, which end where they have taken long enough, and a run's evaluations."""
+    least, spent, evaluations = math.inf, 0.0, 0
+    for _ in range(repeats):
+        before, began = Tally.positions, time.perf_counter()
+        ladder.run(setting)
+        took, evaluations = time.perf_counter() - began, Tally.positions - before
+        least, spent = min(least, took), spent + took
+        if spent > BUDGET:
+            break
+    return least, evaluations
+
+
+def _judged(ladder: Ladder, quantity: str, outcome: Outcome) -> tuple[float | None, str]:
+    """Return a quantity's error, None where it cannot be told, and the status that says why."""
+    if quantity not in outcome.values:
+        return None, outcome.status
+    reference = ladder.reference(quantity)
+    if reference is None:
+        return None, f"{outcome.status}; no reference that is {TIGHTER:g} times tighter"
+    error = reference.error(outcome.values[quantity])
+    if not math.isfinite(error):
+        return None, f"{outcome.status}; no number"
+    if 0.0 < error < TIGHTER * reference.uncertainty:
+        return None, f"{outcome.status}; nearer than the reference can tell"
+    return error, outcome.status
+
+
+def told(setting: Setting) -> str:
+    """Return a setting as a person writes it."""
+    if isinstance(setting, str | int):
+        return str(setting)
+    return f"{setting:.0e}".replace("e-0", "e-").replace("e+00", "")
+
+
+def grouped(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Return the rows of each ladder and quantity, "quantity, method" → rows from coarse to fine."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(f"{row.quantity}, {row.method}", []).append(row)
+    return found
+
+
+def order(rows: Sequence[Row], step: Callable[[Any], float]) -> float | None:
+    """Return the measured order of a ladder's rows: the middle one of all slopes, log error over log step.
+
+    Read from the longest run of at least three rows where errors fall alike from row to row and are no rounding, of
+    equally long ones the one where they fall most alike; None where that is less than half of the rows that fall.
+    """
+    best, found = (0, 0.0), None
+    for falling in _falling(rows, step):
+        least = max(3, math.ceil(len(falling) / 2))
+        for begin, end in itertools.combinations(range(len(falling) + 1), 2):
+            if end - begin < least:
+                continue
+            slopes = _slopes(itertools.pairwise(falling[begin:end]))
+            rank = end - begin, -max(slopes) / max(min(slopes), LEAST_ORDER)
+            if _alike(slopes) and rank > best:
+                best, found = rank, statistics.median(_slopes(itertools.combinations(falling[begin:end], 2)))
+    return found
+
+
+def _falling(rows: Sequence[Row], step: Callable[[Any], float]) -> list[list[tuple[float, float]]]:
+    """Return the stretches (log step, log error) on which errors above rounding fall from row to row."""
+    stretches: list[list[tuple[float, float]]] = [[]]
+    for row in rows:
+        point = None
+        if row.error is not None and row.error > FLOOR:
+            point = math.log(step(row.setting)), math.log(row.error)
+        if point is None or (stretches[-1] and point[1] >= stretches[-1][-1][1]):
+            stretches.append([])
+        if point is not None:
+            stretches[-1].append(point)
+    return stretches
+
+
+def _slopes(pairs: Iterable[tuple[tuple[float, float], tuple[float, float]]]) -> list[float]:
+    return [(after[1] - before[1]) / (after[0] - before[0]) for before, after in pairs]
+
+
+def _alike(slopes: Sequence[float]) -> bool:
+    """Say whether errors fall by one power of the step, and one that counts."""
+    middle = statistics.median(slopes)
+    return min(slopes) >= max(middle / SPREAD, LEAST_ORDER) and max(slopes) <= SPREAD * middle
+
+
+def knee(rows: Sequence[Row]) -> Setting | None:
+    """Return the first setting from which on the error has stopped falling; None without two errors."""
+    known = [row for row in rows if row.error is not None]
+    if len(known) < 2:
+        return None
+    least = min(row.error for row in known if row.error is not None)
+    return next(row.setting for row in known if row.error is not None and row.error <= STILL * least)

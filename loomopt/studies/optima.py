@@ -1,0 +1,207 @@
+"""Ladders of solves: points on the cycle, IPOPT's tolerance, its Hessian, and the intervals of a free cam law."""
+
+import functools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from loomopt.jobs.sampling import Sampler
+from loomopt.nlp import exchange
+from loomopt.nlp.calls import Calls
+from loomopt.nlp.point import Point, Settings
+from loomopt.solving import engine
+from loomopt.solving.solution import Solution
+from loomopt.studies import digits, limit_law
+from loomopt.studies.ladders import Ladder, Outcome, Reference, Setting
+from loomopt.studies.subject import Subject, Target
+
+EXCHANGE, UNIFORM, TOLERANCE, HESSIAN, INTERVALS = (
+    "exchange",
+    "uniform points",
+    "IPOPT tolerance",
+    "Hessian",
+    "spline intervals",
+)
+CLAIM = "claimed peak"
+"""Whole-cycle rows as the solver states them, against the same rows true over the whole cycle."""
+
+
+@dataclass(frozen=True)
+class Amount:
+    """Settings of the solve ladders; fewer for a quick study."""
+
+    accuracies: tuple[float, ...]
+    points: tuple[int, ...]
+    tolerances: tuple[float, ...]
+    intervals: tuple[int, ...]
+
+
+QUICK = Amount((1e-2, 1e-3, 1e-6, 1e-9, 1e-11), (12, 24, 48, 96), (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), (8, 16, 32))
+FULL = Amount(
+    tuple(10.0**-k for k in range(2, 12)),
+    (12, 24, 48, 96, 192),
+    tuple(10.0**-k for k in range(2, 13)),
+    (8, 16, 32, 64),
+)
+
+
+def ladders(subject: Subject, amount: Amount) -> Iterator[Ladder]:
+    """Yield the ladders of every target of a scene."""
+    for target in subject.targets:
+        yield _exchange(target, amount.accuracies)
+        yield _uniform(target, amount.points)
+        yield _tolerance(target, amount.tolerances)
+        yield _hessian(target)
+        if target.name == "law":
+            yield _intervals(target, amount.intervals)
+
+
+def _reference(target: Target, quantity: str) -> Reference | None:
+    """Return what a reading of a solve is compared with."""
+    if quantity == target.quantity(CLAIM):
+        return Reference(0.0, size=1.0)
+    return target.reference("design" if quantity == target.quantity("design") else target.figure)
+
+
+def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
+    """Return what a designer gets by `solve --accuracy`: refined points, Newton's last steps, the certificate."""
+
+    def read(setting: float, answer: Solution) -> Outcome:
+        if answer.status != "optimal":
+            return Outcome({}, answer.status)
+        x = target.variables(answer)
+        sampler = Sampler(target.program.model, {**target.program.parameters, **x}, Settings(setting).sampled)
+        values = {
+            target.quantity(target.figure): answer.figures[target.figure],
+            target.quantity("design"): target.placed(x),
+            target.quantity(CLAIM): _unrefined(target, sampler),
+        }
+        return Outcome(values, answer.status)
+
+    return Ladder(
+        EXCHANGE,
+        tuple(target.quantity(what) for what in (target.figure, CLAIM, "design")),
+        tuple(accuracies),
+        lambda setting: engine.solve(target.scene, target.name, accuracy=setting),
+        read,
+        functools.partial(_reference, target),
+        float,
+    )
+
+
+def _unrefined(target: Target, sampler: Sampler) -> float:
+    """Return by how much refined peaks, as a certificate reads them, miss those of 40 digits, in natural sizes."""
+    program, worst = target.program, 0.0
+    rows = {o.row: o.scale for o in program.objectives if o.form == "peak"}
+    rows |= {limit.row: limit.scale for limit in program.limits if limit.family == "cycle"}
+    for name, scale in rows.items():
+        worst = max(worst, abs(float(digits.peak(sampler, name) - sampler.peak(name)) / scale))
+    return worst
+
+
+def _solved(target: Target, settings: Settings) -> Point:
+    """Return the first point that one of the job's own starts leads to; the first failure where none does."""
+    first = None
+    for start in exchange.starts(target.program, len(target.program.starts)):
+        point = exchange.solve(target.program, start, settings)
+        if point.reached:
+            return point
+        first = first or point
+    if first is None:
+        raise ValueError("no start assembles")
+    return first
+
+
+def _solves(
+    target: Target,
+    method: str,
+    settings: tuple[Setting, ...],
+    asked: Callable[[Any], Settings],
+    step: Callable[[Any], float] | None,
+    claims: bool = False,
+) -> Ladder:
+    """Return a ladder of bare solves, without the Newton steps that end one otherwise."""
+    figure, design, claim = (target.quantity(what) for what in (target.figure, "design", CLAIM))
+
+    def read(setting: Any, point: Point) -> Outcome:
+        status = f"{point.status}, {point.iterations} iterations"
+        if not point.reached:
+            return Outcome({}, status)
+        values: dict[str, Any] = {figure: target.merit(point.x), design: target.placed(point.x)}
+        return Outcome(values | ({claim: _excess(target, point, asked(setting))} if claims else {}), status)
+
+    quantities = (figure, claim, design) if claims else (figure, design)
+    return Ladder(
+        method,
+        quantities,
+        settings,
+        lambda setting: _solved(target, asked(setting)),
+        read,
+        functools.partial(_reference, target),
+        step,
+    )
+
+
+def _excess(target: Target, point: Point, settings: Settings) -> float:
+    """Return by how much true whole-cycle rows exceed what the solver holds for true at its points."""
+    calls = Calls(target.program, settings, elastic=False)
+    sampler = calls.sampler(point.x)
+    if sampler is None:
+        return math.nan
+    extra = point.raw["extra"]
+    found = zip(calls.families, calls.peaks(sampler), strict=True)
+    return max((calls.excess(family, e, extra) for family, of in found for e in of), default=0.0)
+
+
+def _uniform(target: Target, points: Sequence[int]) -> Ladder:
+    """Return solves on equal points of the turn: what is between them is not seen."""
+
+    def asked(count: int) -> Settings:
+        return Settings(uniform=count, polished=False)
+
+    return _solves(target, UNIFORM, tuple(points), asked, lambda count: 1 / count, claims=True)
+
+
+def _tolerance(target: Target, tolerances: Sequence[float]) -> Ladder:
+    """Return solves to ever smaller tolerances of IPOPT."""
+
+    def asked(tolerance: float) -> Settings:
+        return Settings(tolerance=tolerance, polished=False)
+
+    return _solves(target, TOLERANCE, tuple(tolerances), asked, float)
+
+
+def _hessian(target: Target) -> Ladder:
+    """Return solves with second derivatives, and with IPOPT's own guesses of them."""
+
+    def asked(hessian: str) -> Settings:
+        return Settings(hessian=hessian, polished=False)
+
+    return _solves(target, HESSIAN, ("limited-memory", "exact"), asked, None)
+
+
+def _intervals(target: Target, intervals: Sequence[int]) -> Ladder:
+    """Return free cam laws of more and more intervals, against the limit over all laws."""
+    quantity = target.quantity(target.figure)
+
+    def law(count: int) -> Any:
+        return target.scene.set("targets.law.intervals", count)
+
+    def run(count: int) -> tuple[Target, Point]:
+        own = Target(law(count), target.name)
+        return own, _solved(own, Settings())
+
+    def read(count: int, result: tuple[Target, Point]) -> Outcome:
+        own, point = result
+        status = f"{point.status}, {point.iterations} iterations"
+        return Outcome({quantity: own.merit(point.x)} if point.reached else {}, status)
+
+    @functools.cache
+    def reference(_: str) -> Reference | None:
+        if target.optimum is None:
+            return None
+        value = limit_law.least_stiffness(target.scene, float(target.optimum.x["K1"]))
+        return None if value is None else Reference(value)
+
+    return Ladder(INTERVALS, (quantity,), tuple(intervals), run, read, reference, lambda count: 1 / count)

@@ -1,0 +1,129 @@
+"""An accuracy study for people: its table in the terminal, and the log-log figure of error over cost."""
+
+import functools
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from loomopt import tables
+from loomopt.store import atomically, suffix
+from loomopt.studies.accuracy import Study, in_time
+from loomopt.studies.ladders import Row, grouped, told
+from loomopt.studies.readings import NUMBERS
+from loomopt.views import outputs
+from loomopt.views.figure import _COLOURS, _figure, _own_style, _save
+from loomopt.views.layout import Grid, joined
+
+FORMATS = (".png", ".svg", ".pdf", ".csv")
+LEAST = 1e-17
+"""Errors below this, zero among them, are drawn here."""
+COLUMNS = 2
+MARKS = "os^Dv"
+
+
+def parts(study: Study) -> list[str | Grid]:
+    """Return the parts of a study in a terminal: a table of rows, the measured orders, the advice."""
+    lines = []
+    for rows in grouped(study.rows).values():
+        for place, row in enumerate(rows):
+            name = (row.quantity, row.method) if place == 0 else ("", "")
+            error, seconds = ("" if value is None else f"{value:.1e}" for value in (row.error, row.seconds))
+            lines.append((*name, told(row.setting), error, seconds, str(row.evaluations), _words(row)))
+    head = ("quantity", "method", "setting", "error", "time [s]", "positions", "status")
+    named = dict.fromkeys([*study.orders, *study.knees])
+    found = tuple((joined(name), _order(study, name), _knee(study, name)) for name in named)
+    return [
+        f"{study.problem}: relative errors against references at least 100 times tighter, and what they cost",
+        Grid("", head, tuple(lines), right=(2, 3, 4, 5)),
+        Grid(
+            "Measured orders, and the settings from which on errors stop falling", ("", "order", "knee"), found, (1, 2)
+        ),
+        *(text for text in (study.advice, in_time(study.rows)) if text),
+    ]
+
+
+def _words(row: Row) -> str:
+    """Return a row's status; what everything is, is not said."""
+    return "" if row.status in ("done", "optimal") else row.status.removeprefix("Solve_Succeeded, ")
+
+
+def _order(study: Study, name: str) -> str:
+    return f"{study.orders[name]:.2f}" if name in study.orders else ""
+
+
+def _knee(study: Study, name: str) -> str:
+    return told(study.knees[name]) if name in study.knees else ""
+
+
+def check(path: Path) -> None:
+    """Raise BadInput, before anything is computed, where a study cannot be written as this file."""
+    suffix(path, FORMATS)
+
+
+def write(study: Study, path: Path) -> None:
+    """Write a study's table as CSV, or its figure, by the file's ending."""
+    if suffix(path, FORMATS) == ".csv":
+        outputs.text(path, tables.csv(study.table()))
+    else:
+        atomically(path, functools.partial(draw, study))
+
+
+def draw(study: Study, path: Path) -> None:
+    """Write the figure as PNG, PDF or SVG: a panel per quantity, error over time, or over the method's own setting."""
+    panels = _panels(study)
+    with _own_style():
+        high = math.ceil(len(panels) / COLUMNS)
+        page = _figure(9.0, 2.5 * high + 0.5)
+        page.set_layout_engine("constrained")
+        page.suptitle(f"{study.problem}: what accuracy costs", fontsize=11, parse_math=False)
+        for place, (quantity, ladders) in enumerate(panels.items()):
+            _panel(page.add_subplot(high, COLUMNS, place + 1), study, quantity, ladders)
+        _save(page, path)
+
+
+def _panels(study: Study) -> dict[str, list[list[Row]]]:
+    """Return quantity → its ladders' rows that have an error; only quantities that some method tells at sizes."""
+    found: dict[str, list[list[Row]]] = {}
+    for rows in grouped(study.rows).values():
+        known = [row for row in rows if row.error is not None and row.seconds]
+        if known:
+            found.setdefault(known[0].quantity, []).append(known)
+    return {name: ladders for name, ladders in found.items() if any(_sized(rows) for rows in ladders)}
+
+
+def _sized(rows: Sequence[Row]) -> bool:
+    return len(rows) > 1 and not isinstance(rows[0].setting, str)
+
+
+def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Row]]) -> None:
+    """Draw one quantity's methods; where all settings of one cost alike, over the setting."""
+    from matplotlib.ticker import NullFormatter
+
+    alike = any(_sized(rows) and len({row.evaluations for row in rows}) == 1 for rows in ladders)
+    ladders = [rows for rows in ladders if rows[0].method != NUMBERS]
+    for place, rows in enumerate(ladders):
+        method, colour, mark = rows[0].method, _COLOURS[place % len(_COLOURS)], MARKS[place % len(MARKS)]
+        errors = [max(row.error or 0.0, LEAST) for row in rows]
+        name = f"{quantity}, {method}"
+        label = f"{method}, order {study.orders[name]:.2f}" if name in study.orders else method
+        if alike and not _sized(rows):
+            axes.axhline(errors[0], color=colour, linewidth=1.2, linestyle=(0, (4, 2)), label=label)
+            continue
+        x = [row.setting if alike else row.seconds for row in rows]
+        line = "-" if _sized(rows) else ""
+        axes.plot(x, errors, color=colour, marker=mark, markersize=4, linewidth=1.2, linestyle=line, label=label)
+    axes.set(xscale="log", yscale="log", title=quantity)
+    axes.set_xlim(_decades(axes.get_xlim()))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("step [rad]" if alike else "time of one run [s]")
+    axes.set_ylabel("relative error")
+    axes.grid(color="#e5e7eb", linewidth=0.5)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize=7, edgecolor="none", framealpha=0.8)
+
+
+def _decades(ends: tuple[float, float]) -> tuple[float, float]:
+    """Return the whole decades around the positive ends of an axis, so that at least two powers of ten are named."""
+    low, high = ends
+    return 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
