@@ -9,7 +9,7 @@ from loomopt import designs
 from loomopt.jobs import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY
+from loomopt.solving.asked import ACCURACY, check_numbers
 from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
@@ -94,11 +94,13 @@ def prove(
     return proof.prove(scene, designs.checked(design, scene) if design else {}, target, slack)
 
 
-def simulate(scene: Scene, design: Mapping[str, float] | None = None) -> "pd.DataFrame":
+def simulate(scene: Scene, design: Mapping[str, Any] | None = None, *, accuracy: float | None = None) -> "pd.DataFrame":
     """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
 
-    Raises BadInput for a design that does not assemble.
+    accuracy: as few rows as show each column's largest magnitude to it; every half degree without. Raises BadInput.
     """
     from loomopt import tables
 
-    return tables.curves(scene, designs.checked(design, scene) if design else {})
+    if accuracy is not None:
+        check_numbers(accuracy, 1)
+    return tables.curves(scene, designs.checked(design, scene) if design else {}, accuracy)

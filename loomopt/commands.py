@@ -11,6 +11,7 @@ from loomopt.jobs import JOBS, load
 from loomopt.packaged import problem_names
 from loomopt.scene_errors import refusal, unknown
 from loomopt.shell import DIFFERS, read_design, read_number, read_scene, remark
+from loomopt.solving.asked import check_numbers
 from loomopt.solving.solution import Evaluation
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
@@ -136,6 +137,9 @@ def simulate(
         list[Path] | None,
         typer.Option(metavar="F", help="Write curves (.csv, .parquet) or a figure (.png, .svg, .pdf)."),
     ] = None,
+    accuracy: Annotated[
+        str | None, typer.Option(metavar="R", help="As few rows as show each peak to R; with --out.")
+    ] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -145,8 +149,11 @@ def simulate(
 
     scene = read_scene(problem, sets, on, off)
     given = read_design(design, scene)
+    asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
+    if asked is not None:
+        check_numbers(asked, 1)
     for path in out or ():
-        outputs.curves(path, scene, given)
+        outputs.curves(path, scene, given, asked)
         remark(f"Wrote {path}")
     if not out:
         layout.show(*scene_view.curves(scene, given, layout.width()))

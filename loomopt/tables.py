@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
+from loomopt.jobs import sparse_curves
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -57,14 +58,23 @@ def rows(solution: Evaluation, scene: Any, before: Evaluation | None = None) -> 
     return found
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> "pd.DataFrame":
-    """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI."""
+def curves(scene: Any, design: Mapping[str, float], accuracy: float | None = None) -> "pd.DataFrame":
+    """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
+
+    Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
+    """
     import pandas as pd
 
     task = TASKS[scene.job.name]
     full = {**task.today(scene), **designs.flat(design)}
-    frame = pd.DataFrame(task.curves(scene, full))
-    frame.attrs.update(provenance(scene))
+    more: dict[str, object] = {}
+    if accuracy is None:
+        columns = task.curves(scene, full)
+    else:
+        columns, error = sparse_curves.curves(task, scene, full, accuracy)
+        more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
+    frame = pd.DataFrame(columns)
+    frame.attrs.update(provenance(scene, **more))
     return frame
 
 

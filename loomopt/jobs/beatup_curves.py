@@ -1,6 +1,6 @@
 """Beat-up curves over the cycle: columns of SI numbers with their units in the names."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,16 @@ from loomopt.jobs.sampling import Sampler
 STEPS = 720
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
+def curves(
+    scene: Any, design: Mapping[str, float], steps: int = STEPS, also: Sequence[float] = ()
+) -> dict[str, Floats]:
     """Return ψ, ψ', ψ'', each effect's term, M3 and Md over one turn for a design, SI.
 
-    Rows are every half degree, both dead centres, and both sides of every corner (the same angle twice). Columns of
-    what the scene does not call for are absent: no effect, no column.
+    Rows are `steps` equal ones, the angles `also`, rad, both dead centres, and both sides of every corner (the same
+    angle twice). Columns of what the scene does not call for are absent: no effect, no column.
     """
     sampled = sampler(scene, design)
-    pieces, u, phi = _rows(sampled)
+    pieces, u, phi = _rows(sampled, steps, also)
     model: Any = sampled.model
     pose = model.pose(maths.numpy(), sampled.given, sampled.cycle.angles(pieces, u))
     switches = list(sampled.cycle.switches[pieces].T)
@@ -50,11 +52,11 @@ def marks(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
-def _rows(sampled: Sampler) -> tuple[np.ndarray, Floats, Floats]:
+def _rows(sampled: Sampler, steps: int, also: Sequence[float]) -> tuple[np.ndarray, Floats, Floats]:
     """Return nodes (pieces, u) and their angles from 0 to 2π, corners from both sides."""
     values, starts = sampled.given.values, sampled.cycle.starts
     centres = [values["beta"], np.pi + values["beta_r"]]
-    phi = np.unique(np.concatenate([np.linspace(0.0, TURN, STEPS + 1), np.mod(centres, TURN)]))
+    phi = np.unique(np.concatenate([np.linspace(0.0, TURN, steps + 1), np.mod([*centres, *also], TURN)]))
     if not sampled.cycle.order:
         return np.zeros(len(phi), dtype=np.intp), phi / TURN, phi
     corners = np.mod(starts[:-1], TURN)

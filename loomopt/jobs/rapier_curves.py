@@ -1,7 +1,7 @@
 """Rapier curves over the cycle: columns of SI numbers with their units in the names."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,16 @@ from loomopt.jobs.sampling import Sampler
 STEPS = 720
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
+def curves(
+    scene: Any, design: Mapping[str, float], steps: int = STEPS, also: Sequence[float] = ()
+) -> dict[str, Floats]:
     """Return S with three derivatives, φ3, φ6, φ63, each load's term, tape force and crank torque over one turn, SI.
 
-    Rows are every half degree, the hand-over, and both sides of every corner (the same angle twice).
+    Rows are `steps` equal ones, the angles `also`, rad, the hand-over, and both sides of every corner (the same
+    angle twice).
     """
     sampled = sampler(scene, design)
-    pieces, u = _rows(sampled)
+    pieces, u = _rows(sampled, steps, also)
     phi = sampled.cycle.angles(pieces, u)
     order = np.lexsort((1 - u, np.round(np.mod(phi, TURN), 12)))
     pieces, u = pieces[order], u[order]
@@ -66,12 +69,12 @@ def marks(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
-def _rows(sampled: Sampler) -> tuple[np.ndarray, Floats]:
+def _rows(sampled: Sampler, steps: int, also: Sequence[float]) -> tuple[np.ndarray, Floats]:
     """Return nodes (pieces, u) at every half degree and the hand-over; corners of loads from both sides."""
     starts = sampled.cycle.starts
     centres = sampled.given.values["centres"]
     marked = [read(sampled).phi_stroke, (math.pi + centres.beta_r - centres.beta) % TURN]
-    phi = np.unique(np.append(np.linspace(0.0, TURN, STEPS, endpoint=False), marked))
+    phi = np.unique(np.append(np.linspace(0.0, TURN, steps, endpoint=False), [*marked, *np.mod(also, TURN)]))
     turned = starts[0] + np.mod(phi - starts[0], TURN)
     piece = np.clip(np.searchsorted(starts, turned, side="right") - 1, 0, sampled.cycle.pieces - 1)
     inside = (turned - starts[piece]) / np.diff(starts)[piece]

@@ -1,7 +1,7 @@
 """Shedding curves over the cycle: columns of SI numbers with their units in the names."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,16 +15,18 @@ from loomopt.jobs.shedding_pose import DWELLS
 STEPS = 720
 
 
-def curves(scene: Any, design: Mapping[str, float]) -> dict[str, Floats]:
+def curves(
+    scene: Any, design: Mapping[str, float], steps: int = STEPS, also: Sequence[float] = ()
+) -> dict[str, Floats]:
     """Return X with three derivatives, each load's term, cam force and torque, pressure angle and curvature, SI.
 
-    Rows are every half degree, both ends of every segment and corner (the same angle twice), and where the cam force
-    is least. What friction is in a dwell is not determined: the value by which contact is judged is shown. Where the
-    warp's pull is not known, neither is the cam force: NaN.
+    Rows are `steps` equal ones, the angles `also`, rad, both ends of every segment and corner (the same angle
+    twice), and where the cam force is least. What friction is in a dwell is not determined: the value by which
+    contact is judged is shown. Where the warp's pull is not known, neither is the cam force: NaN.
     """
     sampled = sampler(scene, design)
     physics: Any = sampled.model
-    pieces, u, theta = _rows(sampled)
+    pieces, u, theta = _rows(sampled, steps, also)
     switches = list(sampled.cycle.switches[pieces].T)
     pose = physics.pose(maths.numpy(), sampled.given, theta, switches)
     shape = theta.shape
@@ -64,11 +66,11 @@ def marks(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     return found | {"least cam force": angle if angle is not None else math.nan}
 
 
-def _rows(sampled: Sampler) -> tuple[np.ndarray, Floats, Floats]:
+def _rows(sampled: Sampler, steps: int, also: Sequence[float]) -> tuple[np.ndarray, Floats, Floats]:
     """Return nodes (pieces, u) and their cam angles: every half degree, all extremes of N, both sides of corners."""
     starts = sampled.cycle.starts
     lowest = [sampled.angle(extreme) for extreme in sampled.extremes("lift")]
-    theta = np.unique(np.append(np.linspace(0.0, TURN, STEPS, endpoint=False), np.mod(lowest, TURN)))
+    theta = np.unique(np.append(np.linspace(0.0, TURN, steps, endpoint=False), np.mod([*lowest, *also], TURN)))
     piece = np.clip(np.searchsorted(starts, theta, side="right") - 1, 0, sampled.cycle.pieces - 1)
     inside = (theta - starts[piece]) / np.diff(starts)[piece]
     corner = np.min(np.abs(theta[:, None] - starts[None, :]), axis=1) < 1e-12

@@ -48,7 +48,8 @@ class Task:
     design(program, x), values(program, design): NLP variables to design and back.
     tidy(program, x): x without what is only rounding. moves(program), wish(scene, move, x): the silent levels.
     figures(scene, design): every figure. sampler(scene, design): the design's cycle.
-    curves(scene, design): its curves by column. marks(scene, design): crank angles a reader looks for, rad.
+    curves(scene, design, steps, also): its curves by column, at equal steps and other angles, rad.
+    marks(scene, design): crank angles a reader looks for, rad.
     peaks(model): figures that are extremes over the cycle → their quantities.
     adopted(scene, design): the scene whose own are the lists of a design.
     sizes(scene): the freed variables that come in sizes only → those sold, ascending.
@@ -65,7 +66,7 @@ class Task:
     wish: Callable[[Any, Move, Numbers], Wish | None]
     figures: Callable[[Any, Numbers], dict[str, float | None]]
     sampler: Callable[[Any, Numbers], Sampler]
-    curves: Callable[[Any, Numbers], dict[str, Floats]]
+    curves: Callable[..., dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
     peaks: Callable[[Any], Mapping[str, str]] = _quantities
     adopted: Callable[[Any, Mapping[str, Any]], Any] = _same

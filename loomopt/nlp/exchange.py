@@ -22,6 +22,8 @@ from loomopt.nlp.transcribe import Family, Transcription
 ROUNDS, ELASTIC_ROUNDS, LEADING = 16, 32, 4
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at."""
+NEEDED = 1e-9
+"""Excess of an elastic solve, in natural sizes, that is more than rounding."""
 
 
 def solve(
@@ -176,7 +178,7 @@ class _Run:
         """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
         limits = self.program.limits
         needs = {k: extra[2 * g] - extra[2 * g + 1] * (limits[k].sign == 0) for k, g in self.program.soft.items()}
-        return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > 1e-7}
+        return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
 
 
 def _uniform(sampler: Sampler, family: Family, count: int) -> list[Extreme]:

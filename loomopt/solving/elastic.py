@@ -17,7 +17,7 @@ PRICED = 1e-6
 """Multipliers above this belong to the clash."""
 ENOUGH = 3
 """Starts that must agree on the least sum of relaxations before the rest need not be tried."""
-NEEDED = 1e-7
+NEEDED = 1e-9
 """Excess, in natural sizes, below which a set of limits is admissible after all."""
 
 

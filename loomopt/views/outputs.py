@@ -83,10 +83,10 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
 
 
-def curves(path: Path, scene: Any, design: Mapping[str, float]) -> None:
-    """Write a design's curves as CSV, Parquet or a figure, by the file's ending."""
+def curves(path: Path, scene: Any, design: Mapping[str, float], accuracy: float | None = None) -> None:
+    """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows."""
     ending = suffix(path, CURVES)
-    frame = tables.curves(scene, design)
+    frame = tables.curves(scene, design, accuracy)
     if ending == ".csv":
         text(path, tables.csv(frame))
     elif ending == ".parquet":
