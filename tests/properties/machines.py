@@ -1,6 +1,7 @@
-"""Random mechanisms that assemble: crank-rockers, rapier drives, roller followers, splines, tables."""
+"""Random mechanisms that assemble: crank-rockers, rapier drives, roller followers, cam laws; and whole machines."""
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -9,8 +10,10 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import maths
+from loomopt.jobs.tasks import TASKS
 from loomopt.mechanisms import cam_follower, crank_rocker, rapier_faults
 from loomopt.mechanisms.cam_follower import Follower
+from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.crank_rocker import Lengths
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -106,3 +109,49 @@ def tables(draw):
 def growing(steps):
     """Return 0, …, 1 that grows in proportion to the steps."""
     return tuple(math.fsum(steps[:k]) / math.fsum(steps) for k in range(len(steps) + 1))
+
+
+factors = st.floats(0.2, 3)
+
+
+@functools.cache
+def machine(job, *effects, law=""):
+    """Return today's machine with those effects on: its model and its numbers, SI; law: of the cam, or of the rod."""
+    scene = lo.load(job)
+    for name in effects:
+        scene = scene.with_effect(name)
+    if law in ("lumped", "exact"):
+        scene = scene.set("effects.rod_inertia.model", law)
+    elif law:
+        scene = scene.set("mechanism.law", law)
+    task = TASKS[job]
+    sampler = task.sampler(scene, task.today(scene))
+    return sampler.model, sampler.values
+
+
+def varied(draw, values, kept=()):
+    """Return numbers times random factors, 0.2 to 3; 0 stays."""
+    return {name: value if name in kept else value * draw(factors) for name, value in values.items()}
+
+
+REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction")
+
+
+@st.composite
+def reeds(draw, without=()):
+    """Draw a beat-up mechanism with everything on that can be, but for some effects."""
+    model, values = machine("beatup", *REED, law=draw(st.sampled_from(["lumped", "exact"])))
+    model = dataclasses.replace(model, loads=tuple(load for load in model.loads if load.name not in without))
+    values = varied(draw, values | {"m4e": 5.0, "r4e": 0.05, "gravity.offset": 0.1})
+    values |= dict(zip(("l1", "l2", "l3", "l4"), sides_of(draw(crank_rockers(nearest=1e-3))), strict=True))
+    return model, values | {"resistance.pulse": draw(st.floats(0.05, 1.5))}
+
+
+@st.composite
+def frames(draw, effects=("damping", "dry_friction")):
+    """Draw a heald frame on a named law: any angles of rise, dwells and return, any masses and forces."""
+    model, values = machine("shedding", *effects, law=draw(st.sampled_from(tuple(LAWS))))
+    arcs = [draw(st.floats(0.2, 1)) for _ in range(4)]
+    turn = dict(zip(("rise", "far_dwell", "return", "near_dwell"), arcs, strict=True))
+    found = varied(draw, values, kept=("arm", "centre_distance", "base_radius", "roller_radius"))
+    return model, found | {name: TURN * arc / math.fsum(arcs) for name, arc in turn.items()}

@@ -4,41 +4,16 @@ M3, Md, N, tape force and all else a target bounds over the cycle, to C times co
 with every dimension, mass and angle of the machine drawn anew.
 """
 
-import math
-
 from conditions import assert_right
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import NAMES, TURN, crank_rockers, drives, shares, sides_of
+from machines import NAMES, drives, frames, machine, reeds, shares, varied
 
-import loomopt as lo
 from loomopt import balance
 from loomopt.jobs.sampling import Sampler
-from loomopt.jobs.tasks import TASKS
-from loomopt.mechanisms.cam_laws import LAWS
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|); worst of 1000 random machines each: 4.1 reed, 2 heald frame, 5.3 head."""
-factors = st.floats(0.2, 3)
-
-
-def machine(scene):
-    """Return today's machine of a scene: its model and its numbers, SI."""
-    task = TASKS[scene.job.name]
-    sampler = task.sampler(scene, task.today(scene))
-    return sampler.model, sampler.values
-
-
-def everything(job, *names):
-    scene = lo.load(job)
-    for name in names:
-        scene = scene.with_effect(name)
-    return scene
-
-
-def varied(draw, values, kept=()):
-    """Return numbers times random factors; 0 stays."""
-    return {name: value if name in kept else value * draw(factors) for name, value in values.items()}
 
 
 def quantity(system, model, given_, name, angle, switches):
@@ -70,39 +45,12 @@ def assert_cycle_right(model, values, quantities, place, inside, static=()):
     assert_right(formulas, values.values(), MOST, float(begin + (end - begin) * inside), terms)
 
 
-REED = ("inertia", "counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction")
-
-
-@st.composite
-def reeds(draw):
-    """Draw a beat-up mechanism with everything on that can be."""
-    scene = everything("beatup", *REED).set("effects.rod_inertia.model", draw(st.sampled_from(["lumped", "exact"])))
-    model, values = machine(scene)
-    sides = sides_of(draw(crank_rockers(nearest=1e-3)))
-    values = varied(draw, values | {"m4e": 5.0, "r4e": 0.05, "gravity.offset": 0.1})
-    values |= dict(zip(("l1", "l2", "l3", "l4"), sides, strict=True))
-    return model, values | {"resistance.pulse": draw(st.floats(0.05, 1.5))}
-
-
 @settings(max_examples=30)
 @given(reeds(), shares, shares)
 def test_reed_torque_and_crank_torque(reed, place, inside):
     model, values = reed
     static = ("M3_fdc", "alpha_fdc", "J4", "r4", "swing", "theta", "mu_near", "mu_far")
     assert_cycle_right(model, values, ("M3", "peak_torque", "obliquity"), place, inside, static)
-
-
-SHEDS = {law: machine(everything("shedding", "damping", "dry_friction").set("mechanism.law", law)) for law in LAWS}
-
-
-@st.composite
-def frames(draw):
-    """Draw a heald frame on a named law: any angles of rise, dwells and return, any masses and forces."""
-    model, values = SHEDS[draw(st.sampled_from(tuple(LAWS)))]
-    arcs = [draw(st.floats(0.2, 1)) for _ in range(4)]
-    turn = dict(zip(("rise", "far_dwell", "return", "near_dwell"), arcs, strict=True))
-    found = varied(draw, values, kept=("arm", "centre_distance", "base_radius", "roller_radius"))
-    return model, found | {name: TURN * arc / math.fsum(arcs) for name, arc in turn.items()}
 
 
 @settings(max_examples=80)
@@ -113,13 +61,10 @@ def test_cam_force_and_what_the_cam_is_judged_by(frame, place, inside):
     assert_cycle_right(model, values, names, place, inside, ("spring_force_max", "spring_stretch", "near_dwell"))
 
 
-RAPIER = machine(everything("rapier", "head_inertia", "tape_friction"))
-
-
 @settings(max_examples=20)
 @given(drives(), st.data(), shares, shares)
 def test_travel_of_the_head_and_what_it_takes(d, data, place, inside):
-    model, values = RAPIER
+    model, values = machine("rapier", "head_inertia", "tape_friction")
     values = varied(data.draw, values, kept=("dwell_after", "dwell_before"))
     values |= {name: getattr(d, name) for name in NAMES}
     names = ("S", "S_1", "peak_acceleration", "peak_jerk", "obliquity", "tape_force", "peak_torque")

@@ -1,0 +1,75 @@
+"""Work over a whole cycle at constant speed: none by masses, weight, springs; by friction and damping what they take.
+
+For random machines; by the trapezoid rule where the cycle is smooth, by Gauss's piece by piece where it is not.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
+
+from loomopt import maths
+from loomopt.jobs.sampling import Sampler
+
+POINTS = 4096
+"""So many that the rule is right to rounding also for a crank-rocker a twentieth of its room from a change point."""
+NOTHING = 1e-11
+ROUGH = ("resistance", "bearing_friction")
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+def torque_all_round(model, values):
+    """Return the crank torque at evenly spread crank angles."""
+    phi = np.arange(POINTS) * TURN / POINTS
+    off = [np.zeros(POINTS)] * len(model.switched)
+    return model.quantity(maths.numpy(), model.given(maths.FLOAT, values), "peak_torque", phi, off)
+
+
+@settings(max_examples=60)
+@given(reeds(ROUGH), crank_rockers(nearest=0.05))
+def test_masses_and_weight_of_a_beat_up_take_no_work(reed, lengths):
+    model, values = reed
+    found = torque_all_round(model, values | dict(zip(("l1", "l2", "l3", "l4"), sides_of(lengths), strict=True)))
+    assert abs(found.mean()) <= NOTHING * np.sqrt(np.mean(found**2))
+
+
+@settings(max_examples=30)
+@given(drives())
+def test_the_head_and_its_tape_take_no_work(d):
+    model, values = machine("rapier", "head_inertia")
+    found = torque_all_round(model, values | {name: getattr(d, name) for name in NAMES})
+    assert abs(found.mean()) <= NOTHING * np.sqrt(np.mean(found**2))
+
+
+def work(model, values, of):
+    """Return the integral of a function of (pose, cam force) over the turn of the cam."""
+    sampler, system = Sampler(model, values), maths.numpy()
+    total = 0.0
+    for piece, switches in enumerate(sampler.cycle.switches):
+        begin, end = sampler.cycle.starts[piece : piece + 2]
+        theta = begin + (end - begin) * (1 + NODES) / 2
+        rows = [np.full(theta.shape, switch) for switch in switches]
+        force = -model.quantity(system, sampler.given, "lift", theta, rows)
+        total += (end - begin) / 2 * np.sum(WEIGHTS * of(model.pose(system, sampler.given, theta, rows), force))
+    return total
+
+
+def power(pose, force):
+    """Return the power of the cam over its speed, N·m."""
+    return force * pose.q1
+
+
+@settings(max_examples=40)
+@given(frames(("damping", "dry_friction")), st.sampled_from([(), ("dry_friction",), ("damping",)]))
+def test_a_heald_frame_takes_what_friction_and_damping_take(frame, losses):
+    """F twice the travel, C ω ∮X'² dθ; nothing for mass, weight, spring and warp."""
+    model, values = frame
+    off = {"dry_friction": "dry_friction.F", "damping": "damping.C"}
+    values = values | {number: 0.0 for name, number in off.items() if name not in losses}
+    expected = 2 * values["travel"] * values["dry_friction.F"]
+    expected += values["damping.C"] * values["speed"] * work(model, values, lambda pose, force: pose.q1**2)
+    size = math.fsum([work(model, values, lambda pose, force: abs(power(pose, force))), expected])
+    assert work(model, values, power) == pytest.approx(expected, rel=0, abs=NOTHING * size)
