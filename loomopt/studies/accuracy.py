@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt import tables
 from loomopt.studies import optima, readings
-from loomopt.studies.ladders import Ladder, Row, Setting, climbed, grouped, knee, order, told
+from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.subject import Subject
 
 if TYPE_CHECKING:
@@ -148,5 +148,5 @@ def floor(rows: Sequence[Row]) -> float:
     """Return the power of ten that errors stay below from the knee on."""
     at = knee(rows)
     begun = [row.setting for row in rows].index(at) if at is not None else 0
-    worst = max(row.error or 0.0 for row in rows[begun:])
-    return 10.0 ** math.ceil(math.log10(worst)) if worst > 0.0 else 1e-16
+    worst = max(EPSILON, *(row.error or 0.0 for row in rows[begun:]))
+    return 10.0 ** math.ceil(math.log10(worst))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.cycle import TURN, Floats
+from loomopt.cycle import SAME_ANGLE, TURN, Floats
 from loomopt.jobs.sampling import Sampler, Tally
 from loomopt.maths import Maths, Number
 from loomopt.nlp import slopes
@@ -19,6 +19,8 @@ SAMPLED, REFINED, DWELL = "sampled points", "refined points", "dwell_after"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"
 SAMPLES = (36, 72, 144, 360, 720, 3600, 36000, 100000)
 REFINED_FROM = (90, 180, 360, 720, 1440)
+ALIKE = 1e-2
+"""Peaks within this share of the highest are as high."""
 STEPS = tuple(10.0**-k for k in range(1, 10))
 SYSTEMS = ("float64", "NumPy", "mpmath 40")
 
@@ -35,24 +37,33 @@ def ladders(subject: Subject) -> Iterator[Ladder]:
 
 
 def _sampled(subject: Subject) -> Ladder:
-    """Return largest values on equal points that miss the peak by as much as such points can: half a step."""
+    """Return largest values on equal points that miss the peak by as much as such points can: half a step.
+
+    Of equal peaks, as a symmetric motion has, only one is looked at: the points would meet the others by chance.
+    """
     sampler = subject.sampler
-
-    def middle(name: str, signed: bool) -> float:
-        found = sampler.extremes(name)
-        return sampler.angle(max(found, key=lambda e: e.value if signed else e.height))
-
-    centres = {figure: middle(*read) for figure, read in subject.peaks.items()}
+    windows = {figure: _window(sampler, *read) for figure, read in subject.peaks.items()}
 
     def run(count: int) -> dict[str, float]:
         found = {}
+        away = np.mod(TURN * (np.arange(count, dtype=np.float64) + 0.5) / count + np.pi, TURN) - np.pi
         for figure, (name, signed) in subject.peaks.items():
-            angles = centres[figure] + TURN * (np.arange(count) + 0.5) / count
-            values = sampler.at(name, *_located(sampler, angles))
-            found[figure] = float(np.max(values if signed else sampler.heights(name, values)))
+            centre, half = windows[figure]
+            values = sampler.at(name, *_located(sampler, centre + away))
+            heights = values if signed else sampler.heights(name, values)
+            found[figure] = float(np.max(heights[np.abs(away) <= half], initial=-np.inf))
         return found
 
     return _today(subject, SAMPLED, tuple(subject.peaks), SAMPLES, run, lambda count: 1 / count)
+
+
+def _window(sampler: Sampler, name: str, signed: bool) -> tuple[float, float]:
+    """Return a peak's crank angle, rad, and half the way to the nearest one that is as high."""
+    heights = {sampler.angle(e): e.value if signed else e.height for e in sampler.extremes(name)}
+    centre = max(heights, key=lambda angle: heights[angle])
+    alike = [angle for angle, height in heights.items() if height >= (1 - ALIKE) * heights[centre]]
+    ways = [abs((angle - centre + np.pi) % TURN - np.pi) for angle in alike if angle != centre]
+    return centre, min((way / 2 for way in ways if way > SAME_ANGLE), default=np.pi)
 
 
 def _located(sampler: Sampler, angles: Floats) -> tuple[Any, Floats]:
