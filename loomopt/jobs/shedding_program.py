@@ -129,7 +129,8 @@ class _Task:
             self.known |= {f"{PREFIX}{k}": value for k, value in enumerate(started)}
         self.physics = model(scene, self.law)
         self.sampler = Sampler(self.physics, self.known)
-        self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"])
+        most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
+        self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
         self.kept = ["travel", *(["speed"] if set(DYNAMIC) & set(scene.effects) else [])]
         self.limits = Limits(scene, target, self.physics, self.known, self.limited, self.sizes, self.kept, self.law)
         self.coiled = "coil" in scene.effects

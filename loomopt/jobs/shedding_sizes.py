@@ -15,10 +15,10 @@ MEGA = 1e6
 class Sizes:
     """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
 
-    sampler: the frame today; stretch: the largest elongation its spring may have, m.
+    sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
     """
 
-    def __init__(self, sampler: Sampler, stretch: float) -> None:
+    def __init__(self, sampler: Sampler, stretch: float, most: float) -> None:
         self.sampler = sampler
         model, given = sampler.model, sampler.given
         pieces, u = sampler.grid()
@@ -33,7 +33,7 @@ class Sizes:
         self.stretch = stretch
         preload = stretch - float(given.values["travel"])
         self.needed = self.stiffness_for(least, preload) or (self.force / stretch if stretch > 0.0 else 1.0)
-        self.stiffness = self.needed
+        self.stiffness = min(self.needed, most) or self.needed
 
     def stiffness_for(self, least: float, preload: float) -> float:
         """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""

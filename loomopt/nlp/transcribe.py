@@ -17,33 +17,10 @@ from loomopt.cycle import Floats, node_angle
 from loomopt.jobs.program import Integral, Program
 from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.layout import Layout
+from loomopt.nlp.options import ipopt_options
 from loomopt.nlp.point import Settings
 
 CACHE_SIZE = 32
-IPOPT = {
-    "tol": 1e-11,
-    "dual_inf_tol": 1e-9,
-    "constr_viol_tol": 1e-11,
-    "compl_inf_tol": 1e-11,
-    "bound_relax_factor": 0.0,
-    "acceptable_iter": 0,
-    "max_iter": 300,
-    "mu_strategy": "adaptive",
-    "nlp_scaling_method": "none",
-    "mumps_permuting_scaling": 0,
-    "mumps_pivot_order": 2,
-    "print_level": 0,
-    "sb": "yes",
-}
-WARM = {
-    "warm_start_init_point": "yes",
-    "mu_init": 1e-8,
-    "warm_start_bound_push": 1e-10,
-    "warm_start_bound_frac": 1e-10,
-    "warm_start_slack_bound_push": 1e-10,
-    "warm_start_slack_bound_frac": 1e-10,
-    "warm_start_mult_bound_push": 1e-10,
-}
 
 
 @dataclass(frozen=True)
@@ -100,7 +77,7 @@ class Transcription:
         name = (warm, callback, settings.tolerance, settings.hessian)
         if name not in self._solvers:
             options: dict[str, Any] = {
-                "ipopt": IPOPT | (WARM if warm else {}) | _asked(settings),
+                "ipopt": ipopt_options(settings, warm),
                 "print_time": False,
                 "show_eval_warnings": False,
                 "calc_lam_p": False,
@@ -275,16 +252,6 @@ class Transcription:
             idle = [[0.0, 1.0, *self.node(sampler, 0, 0.5)]] * (self.slots - len(used))
             write(p, f"family {k}", used + idle)
         return p
-
-
-def _asked(settings: Settings) -> dict[str, Any]:
-    """Return IPOPT's options that a study of methods changes."""
-    found: dict[str, Any] = {}
-    if settings.tolerance:
-        found |= dict.fromkeys(("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol"), settings.tolerance)
-    if settings.hessian != "exact":
-        found["hessian_approximation"] = settings.hessian
-    return found
 
 
 def families(program: Program, elastic: bool = False) -> list[Family]:

@@ -16,6 +16,7 @@ from loomopt.jobs.sampling import Sampler
 from loomopt.nlp.point import Settings
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact, Row
+from loomopt.solving.excess import excesses
 from loomopt.solving.nnls import nnls
 from loomopt.solving.prices import priced
 from loomopt.solving.second_order import Lagrangian, least_on_cone
@@ -33,20 +34,6 @@ MEASURE, FARTHEST = 1e6, 1e8
 """Largest multiplier that is a price, and largest variable that is a design, in natural sizes."""
 CURVED, CORRECTED = 1e-5, 1e-10
 """Curvature that Newton's step may follow, and the slope it need not mind."""
-
-
-def excesses(program: Program, sampler: Sampler) -> dict[int, float]:
-    """Return how far each limit is exceeded, in its natural size (an equality: how far it is missed)."""
-    static = {**sampler.given.values, **sampler.figures}
-    found = {}
-    for k, limit in enumerate(program.limits):
-        if limit.family == "cycle":
-            found[k] = (sampler.peak(limit.row, limit.where) - limit.bound) / limit.scale
-        else:
-            values = sampler.given.values if limit.family == "variable" else static
-            residual = limit.residual(values, limit.value) / limit.scale
-            found[k] = abs(residual) if limit.sign == 0 else residual
-    return found
 
 
 def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:

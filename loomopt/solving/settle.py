@@ -10,7 +10,7 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.jobs.program import Move, Program, Wish
 from loomopt.jobs.sampling import Sampler
-from loomopt.solving.certificate import excesses
+from loomopt.solving.excess import excesses
 
 UNCHANGED = 1e-10
 SLACK, NOTICED = 1e-12, 1e-9

@@ -104,7 +104,6 @@ def test_too_little_preload_is_refused_by_name_with_the_least_that_helps(X0):
     assert needed == pytest.approx(STATIC / 1e6, rel=1e-6)
 
 
-@pytest.mark.xfail(reason="sizes are taken from today's X0 of 80 mm: found to 2e-16, but not certified", strict=True)
 def test_a_small_preload_is_certified_whatever_todays_is():
     answer = lo.solve(scene_of(replace(PAPER, X0=1e-6), **{"mechanism.X0": "80 mm"}))
     assert answer.figures["K1"] == pytest.approx(STATIC / 1e-6, rel=1e-12)

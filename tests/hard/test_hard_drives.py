@@ -115,7 +115,6 @@ def test_a_five_bar_that_locks_by_a_hair_is_refused_with_the_angle(side, gap):
         lo.load("rapier").set("mechanism.l5", f"{d.l5!r} m")
 
 
-@pytest.mark.xfail(reason="a spike narrower than the samples is missed: 292 m/rad^2 at a gap of 1e-8", strict=True)
 @pytest.mark.parametrize("gap", [1e-8])
 def test_peaks_of_a_drive_next_to_its_singular_position_grow_as_the_root_of_the_gap(gap):
     wide, narrow = (

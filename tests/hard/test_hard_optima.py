@@ -164,7 +164,7 @@ def test_a_clash_above_it_is_never_called_optimal(share):
 @pytest.mark.parametrize(
     "share",
     [
-        pytest.param(1e-8, marks=pytest.mark.xfail(reason='"failed", no limit named, below 1e-7', strict=True)),
+        1e-8,
         1e-6,
         1e-3,
     ],

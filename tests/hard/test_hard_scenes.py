@@ -145,7 +145,7 @@ def test_a_rapier_drive_of_any_size_has_the_same_angles(unit, factor):
     [
         "beatup",
         "shedding",
-        pytest.param("rapier", marks=pytest.mark.xfail(reason="unique is a NumPy bool: no JSON", strict=True)),
+        "rapier",
     ],
 )
 def test_an_answer_of_any_size_prints_as_json_without_nan(problem):
