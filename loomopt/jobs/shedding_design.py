@@ -79,13 +79,19 @@ def values_of(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
     return known | {(name if name.startswith(PREFIX) else full_name(known, name)): v for name, v in design.items()}
 
 
-def adopted(scene: Any, design: Mapping[str, Any]) -> Any:
-    """Return the scene with a design's own cam law."""
-    intervals = named(design)
-    if not intervals:
-        return scene
-    law = [float(design[f"{PREFIX}{k}"]) for k in range(intervals + 1)]
-    return scene.update({"mechanism.law": "spline", "mechanism.law_coefficients": law})
+def adopted(scene: Any, design: Mapping[str, Any], target: str) -> tuple[Any, str]:
+    """Return the scene with a design's own cam law, and the target whose limits it keeps.
+
+    Of target law the law is then given: what remains is contact, and the bound on its acceleration.
+    """
+    intervals, changes = named(design), {}
+    if intervals:
+        law = [float(design[f"{PREFIX}{k}"]) for k in range(intervals + 1)]
+        changes = {"mechanism.law": "spline", "mechanism.law_coefficients": law}
+    if target == "law" and "law_acceleration" not in scene.limits:
+        changes["limits.law_acceleration.max"] = scene.targets["law"].acceleration
+    changed = scene.update(changes) if changes else scene
+    return changed, "stiffness" if target == "law" else target
 
 
 def peaks(model: Any) -> dict[str, str]:

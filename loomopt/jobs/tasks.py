@@ -35,8 +35,8 @@ def _quantities(model: Any) -> dict[str, str]:
     return {name: name for name in model.quantities} | {"mu_min": "obliquity"}
 
 
-def _same(scene: Any, design: Mapping[str, Any]) -> Any:
-    return scene
+def _same(scene: Any, design: Mapping[str, Any], target: str) -> tuple[Any, str]:
+    return scene, target
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Task:
     curves(scene, design, steps, also): its curves by column, at equal steps and other angles, rad.
     marks(scene, design): crank angles a reader looks for, rad.
     peaks(model): figures that are extremes over the cycle → their quantities.
-    adopted(scene, design): the scene whose own are the lists of a design.
+    adopted(scene, design, target): the scene whose own are a design's lists, and the target whose limits it keeps.
     sizes(scene): the freed variables that come in sizes only → those sold, ascending.
     explain(scene, clash): what physics says of why the limits `clash` (phrases) do; "" where it says nothing.
     """
@@ -69,7 +69,7 @@ class Task:
     curves: Callable[..., dict[str, Floats]]
     marks: Callable[[Any, Numbers], dict[str, float]]
     peaks: Callable[[Any], Mapping[str, str]] = _quantities
-    adopted: Callable[[Any, Mapping[str, Any]], Any] = _same
+    adopted: Callable[[Any, Mapping[str, Any], str], tuple[Any, str]] = _same
     explain: Callable[[Any, Sequence[str]], str] = _nothing
     sizes: Callable[[Any], Mapping[str, Sequence[float]]] = _any
 

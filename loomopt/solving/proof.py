@@ -13,9 +13,11 @@ import numpy as np
 
 from loomopt import designs
 from loomopt.errors import BadInput
+from loomopt.jobs.numbers import numbers
 from loomopt.jobs.program import Limit, Program
 from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS, Task
+from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
@@ -70,10 +72,11 @@ def prove(scene: Any, design: Mapping[str, float], target: str | None = None, sl
         allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
         remedy = "Write --slack 1e-8, or leave it out."
         raise BadInput("the slack is out of range", key="--slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
-    task, name = TASKS[scene.job.name], target or scene.job.default_target
+    task, name = TASKS[scene.job.name], target_name(scene, target)
+    task.demand(scene, name)
     full = {**task.today(scene), **design}
-    own = task.adopted(scene, full)
-    program = task.program(own, name)
+    own, asked = task.adopted(scene, full, name)
+    program = task.program(own, asked)
     court = _Court(own, task, program, full, slack)
     return Proofs(scene.name, name, tuple(_merged(list(court.proofs()))))
 
@@ -94,9 +97,12 @@ class _Court:
     def __init__(self, scene: Any, task: Task, program: Program, design: Mapping[str, float], slack: float) -> None:
         self.scene, self.task, self.program, self.slack = scene, task, program, slack
         self.words = Words(scene)
-        full = {v.name.rpartition(".")[2]: v.name for v in program.variables}
+        known = numbers(scene)
+        full = {name.rpartition(".")[2]: name for name in (*known, *(v.name for v in program.variables))}
         chosen = {full.get(name, name): value for name, value in design.items()}
-        values = {**program.parameters, **task.values(program, chosen)}
+        # What the target's program does not choose is the design's own too, and today's where it names nothing.
+        values = {**program.parameters, **{n: v for n, v in chosen.items() if n in program.parameters}}
+        values |= task.values(program, {**known, **chosen})
         self.sampler = Sampler(program.model, values)
         self.boxes = Boxes(self.sampler)
         self.whole = task.sampler(scene, design)
@@ -104,11 +110,7 @@ class _Court:
 
     def proofs(self) -> Iterator[Proof]:
         """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
-        kept: dict[tuple[str, int, Any], Limit] = {}
-        for limit in self.program.limits:
-            if limit.family != "variable" and not (limit.hidden and limit.family == "static"):
-                kept.setdefault((limit.name, limit.sign, (limit.row, limit.where)), limit)
-        for limit in kept.values():
+        for limit in (limit for limit in self.program.limits if limit.family != "variable"):
             yield self._cycle(limit) if limit.family == "cycle" else self._static(limit)
         for name, (quantity, most) in self.whole.model.assembly.items():
             peak = self.whole.peak(quantity)
@@ -157,7 +159,8 @@ class _Court:
         excess = abs(residual) if limit.sign == 0 else residual
         slack = self.slack * size
         status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
-        return Proof(limit.name, self.words.limit(limit), status, -float(excess.mid()), slack, 1)
+        text = limit.name if limit.hidden else self.words.limit(limit)
+        return Proof(limit.name, text, status, -float(excess.mid()), slack, 1)
 
 
 def _largest(sampler: Sampler, quantity: str) -> float:
