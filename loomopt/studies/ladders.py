@@ -170,11 +170,12 @@ def order(rows: Sequence[Row], step: Callable[[Any], float]) -> float | None:
     """Return the measured order of a ladder's rows: the middle one of all slopes, log error over log step.
 
     Read from the longest run of at least three rows where errors fall alike from row to row and are no rounding, of
-    equally long ones the one where they fall most alike; None where that is less than half of the rows that fall.
+    equally long ones the one where they fall most alike; None where that is less than half of the rows to the knee.
     """
-    best, found = (0, 0.0), None
+    best, found, last = (0, 0.0), None, knee(rows)
+    before = [row.setting for row in rows].index(last) + 1 if last is not None else 0
+    least = max(3, math.ceil(before / 2))
     for falling in _falling(rows, step):
-        least = max(3, math.ceil(len(falling) / 2))
         for begin, end in itertools.combinations(range(len(falling) + 1), 2):
             if end - begin < least:
                 continue
