@@ -99,7 +99,6 @@ def test_the_optimum_of_a_tighter_task_is_no_optimum_of_this_one(name):
         limits = {key: (TIGHTER[name][key], percent / 100) for key, percent in drawn.items()}
         tight = {key: f"{a + share * (b - a)!r} {unit}" for key, ((a, b, unit), share) in limits.items()}
         _, other = solved(job, target, changes | tight)
-        # What binds only in the tighter task's own numbers (N_min, dwell) is a parameter: x is read by this program.
         certificate, found = certify(program, {v: other[v] for v in x}, ACCURACY), objectives(program, other)
         assert certificate.feasibility <= 1e-9
         if found[0] > best[0] + 1e-6:
