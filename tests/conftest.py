@@ -1,6 +1,6 @@
 """One Hypothesis profile for every run: the same examples each time, no clock; "thorough" looks farther by hand.
 
-    pytest tests/properties --hypothesis-profile=thorough
+pytest tests/properties --hypothesis-profile=thorough
 """
 
 from hypothesis import settings
