@@ -99,6 +99,8 @@ def balls() -> Maths:
             return arb.atan2(arb(y), arb(x))
         whole = series([0, 0], ORDER)
         y, x = whole + y, whole + x
+        if y[0].contains(0) and not x[0] > 0:
+            raise ValueError("a ball of angles lies across the branch cut")
         slope = (x * y.derivative() - y * x.derivative()) / (x * x + y * y)
         return arb.atan2(y[0], x[0]) + slope.integral()
 

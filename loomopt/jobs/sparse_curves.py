@@ -6,60 +6,72 @@ from typing import Any
 import numpy as np
 
 from loomopt.cycle import TURN, Floats
+from loomopt.jobs import spikes
 
 STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
-"""Equal steps of one turn that are begun with, by accuracy."""
-ROUNDS, ROUNDING = 12, 1e-15
+"""Equal steps of one turn that are begun with, by accuracy; no stretch between corners gets fewer than an eighth."""
+ROUNDS, ROUNDING = 40, 1e-15
 NEARLY = 0.8
 """Share of a column's largest magnitude above which another top may turn out higher."""
+ANGLE = "phi [rad]"
 
 
 def curves(task: Any, scene: Any, design: Mapping[str, float], accuracy: float) -> tuple[dict[str, Floats], float]:
     """Return the curves (SI), and an estimate of the relative error of each column's largest magnitude.
 
-    task: the job's functions. Rows are added at the vertex of the parabola through the highest row and its neighbours,
-    until no column's largest magnitude moves by more than a hundredth of the accuracy.
+    task: the job's functions. Around every top rows are added between it and its neighbours, in thirds and at the
+    vertex of their parabola, until what the top may still rise (no more than it stands above them) is small enough.
     """
     steps = next(count for least, count in STEPS if accuracy >= least)
-    also: list[float] = []
-    columns = task.curves(scene, design, steps, also)
-    highest, change = _highest(columns), np.inf
+    sampler = task.sampler(scene, design)
+    also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
+    also += [spikes.graded(centre) for centre in sampler.singular]
     for _ in range(ROUNDS):
-        also += _vertices(columns)
-        columns = task.curves(scene, design, steps, also)
-        now = _highest(columns)
-        change = max((abs(now[name] - highest[name]) / now[name] for name in now if now[name] > 0.0), default=0.0)
-        highest = now
-        if change <= max(accuracy / 100, ROUNDING):
+        columns = task.curves(scene, design, steps, np.concatenate(also))
+        added, left = _around_tops(columns, accuracy / 10)
+        if not added:
             break
-    return columns, max(change, ROUNDING)
+        also.append(np.array(added))
+    return columns, max(left, ROUNDING)
 
 
-def _highest(columns: Mapping[str, Floats]) -> dict[str, float]:
-    return {name: float(np.nanmax(np.abs(values))) for name, values in columns.items() if name != "phi [rad]"}
-
-
-def _vertices(columns: Mapping[str, Floats]) -> list[float]:
-    """Return the angles, rad, where parabolas through each column's highest rows, and those not far below, end."""
-    angles, found = columns["phi [rad]"], set()
+def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:
+    """Return the angles, rad, where rows are missing, and the largest share by which a column's top may still rise."""
+    angles, found, worst = columns[ANGLE], set(), 0.0
     # The turn closes: a top may stand between the last row and the first.
     phi = np.concatenate([angles[-1:] - TURN, angles, angles[:1] + TURN])
     for name, values in columns.items():
         sizes = np.abs(np.concatenate([values[-1:], values, values[:1]]))
-        if name == "phi [rad]" or not np.isfinite(sizes).any():
+        if name == ANGLE or not np.isfinite(sizes).any():
             continue
-        middle, left, right = sizes[1:-1], sizes[:-2], sizes[2:]
+        top = float(np.nanmax(sizes))
         with np.errstate(invalid="ignore"):
-            tops = np.flatnonzero((middle >= left) & (middle >= right) & (middle >= NEARLY * np.nanmax(sizes))) + 1
-        found |= {angle for k in tops if (angle := _vertex(phi, sizes, int(k))) is not None}
-    return sorted(found)
+            inner = (sizes[1:-1] >= sizes[:-2]) | (phi[1:-1] == phi[:-2])
+            inner &= (sizes[1:-1] >= sizes[2:]) | (phi[1:-1] == phi[2:])
+            tops = np.flatnonzero(inner & (sizes[1:-1] >= NEARLY * top)) + 1
+        for k in tops:
+            rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
+            worst = max(worst, rise)
+            if rise > max(least, ROUNDING):
+                found |= set(_between(phi, sizes, int(k)))
+    return sorted(found), worst
 
 
-def _vertex(phi: Floats, sizes: Floats, k: int) -> float | None:
-    """Return where the parabola through row k and its neighbours is highest; None at a corner or on a level."""
+def _rise(phi: Floats, sizes: Floats, k: int) -> float:
+    """Return by how much row k stands above its neighbours on its own side of any corner."""
+    sides = [sizes[j] for j in (k - 1, k + 1) if phi[j] != phi[k] and np.isfinite(sizes[j])]
+    return float(sizes[k] - min(sides)) if sides else 0.0
+
+
+def _between(phi: Floats, sizes: Floats, k: int) -> list[float]:
+    """Return angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
     before, after = phi[k] - phi[k - 1], phi[k + 1] - phi[k]
+    found = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []
+    found += [phi[k] + share * after for share in (1 / 3, 2 / 3)] if after > 0.0 else []
     rise, fall = sizes[k] - sizes[k - 1], sizes[k] - sizes[k + 1]
     bend = rise * after + fall * before
-    if not (before > 0.0 and after > 0.0 and bend > 0.0):
-        return None
-    return float(phi[k] + (rise * after**2 - fall * before**2) / (2 * bend))
+    if before > 0.0 and after > 0.0 and bend > 0.0:
+        vertex = phi[k] + (rise * after**2 - fall * before**2) / (2 * bend)
+        width = min(before, after) / 64
+        found += [vertex - width, vertex, vertex + width]
+    return [float(angle % TURN) for angle in found]

@@ -11,10 +11,15 @@ WIDEST, HALVINGS = 0.02, 44
 GOLDEN, SECTIONS = (5**0.5 - 1) / 2, 90
 
 
+def graded(centre: float) -> Floats:
+    """Return angles, rad, in order, graded toward a centre from both sides."""
+    offsets = WIDEST * 0.5 ** np.arange(HALVINGS)
+    return np.concatenate([centre - offsets, [centre], centre + offsets[::-1]])
+
+
 def peaks(heights: Callable[[Floats], Floats], centre: float) -> list[float]:
     """Return the angles, rad, of the local maxima of heights(angles) near `centre` that graded nodes show, refined."""
-    offsets = WIDEST * 0.5 ** np.arange(HALVINGS)
-    angles = np.concatenate([centre - offsets, [centre], centre + offsets[::-1]])
+    angles = graded(centre)
     values = heights(angles)
     if not np.all(np.isfinite(values)):
         return []

@@ -66,7 +66,7 @@ class Boxes:
                     if used >= MOST_BOXES:
                         return Bound("undecided", used)
                     boxes += [((low + high) / 2, high), (low, (low + high) / 2)]
-        return Bound("proven", used)
+        return Bound("proven" if used else "undecided", used)
 
     def mean(self, integral: Integral) -> Any:
         """Return a ball around an integral's mean over the pieces where its load's switch is 1.

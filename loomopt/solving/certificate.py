@@ -32,7 +32,7 @@ FAINT = 1e-4
 """Curvature up to which a direction is looked along, for what higher orders do there."""
 MEASURE, FARTHEST = 1e6, 1e8
 """Largest multiplier that is a price, and largest variable that is a design, in natural sizes."""
-CURVED, CORRECTED = 1e-5, 1e-10
+CURVED, CORRECTED = 1e-5, 1e-13
 """Curvature that Newton's step may follow, and the slope it need not mind."""
 
 
@@ -64,6 +64,7 @@ class _Trial:
         self.falling = ""
         """The objective that falls where second order does not decide."""
         self.correction: dict[str, float] = {}
+        self.step = 0.0
         self.settled_alone = False
         """Whether the levels so far leave a single design: then later ones have nothing to choose, and no KKT point."""
 
@@ -142,6 +143,7 @@ class _Trial:
             self._binding(),
             by="bounded" if bound == "proven" else "refined",
             correction=self.correction,
+            step=self.step,
         )
 
     def _columns(self, place: int) -> tuple[list[int], list[int], list[int]]:
@@ -296,6 +298,7 @@ class _Trial:
             return
         step = back - directions @ (pull / bends)
         sizes = {v.name: v.scale for v in self.program.variables}
+        self.step = float(np.abs(step).max(initial=0.0))
         self.correction = {name: float(part * sizes[name]) for name, part in zip(self.exact.names, step, strict=True)}
 
     def _binding(self) -> tuple[Binding, ...]:

@@ -101,8 +101,9 @@ class _Court:
         full = {name.rpartition(".")[2]: name for name in (*known, *(v.name for v in program.variables))}
         chosen = {full.get(name, name): value for name, value in design.items()}
         # What the target's program does not choose is the design's own too, and today's where it names nothing.
-        values = {**program.parameters, **{n: v for n, v in chosen.items() if n in program.parameters}}
-        values |= task.values(program, {**known, **chosen})
+        parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
+        program = replace(program, parameters=parameters)
+        values = {**parameters, **task.values(program, {**known, **chosen})}
         self.sampler = Sampler(program.model, values)
         self.boxes = Boxes(self.sampler)
         self.whole = task.sampler(scene, design)

@@ -50,11 +50,18 @@ class Certificate:
     settled: tuple[str, ...] = field(default=())
     correction: Mapping[str, float] = field(default_factory=dict)
     """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
+    step: float = 0.0
+    """The length of that step, in natural sizes."""
 
     @property
     def error(self) -> float:
-        """Estimate of the relative error of what the answer says: the largest of all that was found amiss."""
-        return max(self.feasibility, self.violation, self.residual, ROUNDING)
+        """Estimate of the relative error of what the answer says, in natural sizes.
+
+        What limits are exceeded by, what lies between points, prices where nothing touches, and how far Newton's
+        method would still move the design.
+        """
+        amiss = max((level.complementarity for level in self.levels), default=0.0)
+        return max(self.feasibility, self.violation, amiss, self.step, ROUNDING)
 
     @property
     def residual(self) -> float:
