@@ -184,7 +184,8 @@ class _Search:
         self.x, self.certificate = self._judged(point.x)
         for _ in range(CORRECTIONS):
             precise = max(min(PRECISE, self.settings.accuracy), ROUNDING)
-            if not self.certificate.correction or self.certificate.residual <= precise:
+            close = self.certificate.residual <= precise and self.certificate.error <= self.settings.accuracy
+            if not self.certificate.correction or close:
                 break
             x, better = self._judged(self._corrected(self.x, self.certificate.correction))
             if better.residual >= self.certificate.residual or better.feasibility > FEASIBILITY:
