@@ -186,13 +186,23 @@ def test_a_ball_contains_the_number_of_many_digits_and_is_no_wider_than_rounding
         assert float(ball.rad()) <= 1e-14 * max(1.0, abs(float(value)))
 
 
-def test_balls_have_the_angle_of_a_point_in_every_quadrant_and_no_series_of_it():
+def test_balls_have_the_angle_of_a_point_in_every_quadrant():
     system = maths.balls()
     for y, x in ((1.0, 2.0), (1.0, -2.0), (-1.0, -2.0), (-1.0, 2.0), (0.0, 1.0), (1.0, 0.0)):
         ball = system.atan2(system.number(y), system.number(x))
         assert holds(ball, DIGITS.atan2(DIGITS.number(y), DIGITS.number(x)))
-    with pytest.raises(TypeError):
-        system.atan2(maths.ball_series(0.5, 0.0), maths.ball_series(0.3, 0.0))
+
+
+def test_a_series_of_an_angle_holds_its_derivatives_and_refuses_the_branch_cut():
+    """The angle of (cos t, sin t) is t; half a turn on, a ball of t lies across the cut."""
+    system = maths.balls()
+    series = system.atan2(maths.ball_series(0.4, 0.0).sin(), maths.ball_series(0.4, 0.0).cos())
+    assert abs(float(series[0]) - 0.4) < 1e-15
+    assert abs(float(series[1]) - 1.0) < 1e-15
+    assert abs(float(series[2])) < 1e-15
+    across = maths.ball_series(3.14, 0.1)
+    with pytest.raises(ValueError, match="branch cut"):
+        system.atan2(across.sin(), across.cos())
 
 
 @pytest.mark.parametrize("name", WHOLE)

@@ -65,8 +65,9 @@ class Beatup:
         """Return the crank angles, rad, 0 and π, where the dyad comes within a hair of folding or stretching."""
         lengths = given.values["lengths"]
         near = [
-            crank_rocker.span(FLOAT, lengths, angle, far) > (1 - HAIR) ** 2
-            for angle, far in ((0.0, False), (0.0, True), (math.pi, False), (math.pi, True))
+            span(FLOAT, lengths, angle) > (1 - HAIR) ** 2
+            for angle in (0.0, math.pi)
+            for span in (crank_rocker.span_far, crank_rocker.span_near)
         ]
         return (*((0.0,) if any(near[:2]) else ()), *((math.pi,) if any(near[2:]) else ()))
 
@@ -127,7 +128,8 @@ class Beatup:
     def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
         """Return a whole-cycle quantity, SI, at crank angle φ, rad."""
         if name in ("span_far", "span_near"):
-            return crank_rocker.span(maths, given.values["lengths"], phi, name == "span_far")
+            span = crank_rocker.span_far if name == "span_far" else crank_rocker.span_near
+            return span(maths, given.values["lengths"], phi)
         pose = self.pose(maths, given, phi)
         if name == "obliquity":
             return pose.joints.obliquity

@@ -225,7 +225,8 @@ class Rapier:
         if name in ("span_far", "span_near"):
             return self._span(values, pose.joints, name)
         if name in ("sley_span_far", "sley_span_near"):
-            return crank_rocker.span(maths, _sley(values), phi + values["beta"], name == "sley_span_far")
+            span = crank_rocker.span_far if name == "sley_span_far" else crank_rocker.span_near
+            return span(maths, _sley(values), phi + values["beta"])
         force = balance.output_force(maths, self.loads, pose, given, switches[: len(self.loads)])
         return force if name == "tape_force" else force * pose.q1
 

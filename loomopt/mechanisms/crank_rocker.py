@@ -104,13 +104,19 @@ class Pose:
         return (rod.x * crank.y - rod.y * crank.x) / (self.lengths.l1 * self.lengths.l2)
 
 
-def span(maths: Maths, lengths: Lengths, phi: Number, far: bool) -> Number:
-    """Return the square of B to D over that of l2 + l3 (far), or of |l2 − l3| over it: 1 where the dyad just closes.
+def _base_square(maths: Maths, lengths: Lengths, phi: Number) -> Number:
+    """Return the square of B to D, m², written so that nothing cancels near change points."""
+    return (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * maths.sin(phi / 2) ** 2
 
-    phi: crank angle, rad, any shape. The base is written so that nothing cancels near change points.
-    """
-    base = (lengths.l4 - lengths.l1) ** 2 + 4 * lengths.l1 * lengths.l4 * maths.sin(phi / 2) ** 2
-    return base / (lengths.l2 + lengths.l3) ** 2 if far else (lengths.l2 - lengths.l3) ** 2 / base
+
+def span_far(maths: Maths, lengths: Lengths, phi: Number) -> Number:
+    """Return the square of B to D over that of l2 + l3: 1 where rod and rocker are stretched; phi: crank angle, rad."""
+    return _base_square(maths, lengths, phi) / (lengths.l2 + lengths.l3) ** 2
+
+
+def span_near(maths: Maths, lengths: Lengths, phi: Number) -> Number:
+    """Return the square of l2 − l3 over that of B to D: 1 where rod and rocker are folded; phi: crank angle, rad."""
+    return (lengths.l2 - lengths.l3) ** 2 / _base_square(maths, lengths, phi)
 
 
 def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats", "Floats", "Floats"]:
