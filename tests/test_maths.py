@@ -252,7 +252,7 @@ FORBIDDEN_NAMES = {
     *("fabs", "copysign", "fmod", "floor", "ceil", "clip", "maximum", "minimum", "fmax", "fmin", "hypot", "norm_2"),
     *("acos", "asin", "arccos", "arcsin", "math", "np", "numpy", "ca", "casadi", "sp", "sympy", "mp", "mpmath"),
 }
-NOT_FORMULAS = {"fault", "_where_it_stops", "_angle_at", "synthesise", "curves"}
+NOT_FORMULAS = {"synthesise", "curves"}
 """Parts of crank_rocker.py that talk to people or fill arrays: they run on plain floats only."""
 EFFECT_FILES = sorted(p.name for p in (PACKAGE / "effects").glob("*.py") if p.name != "__init__.py")
 

@@ -7,7 +7,7 @@ from loomopt.effects import BEATUP
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup import ASSEMBLY
 from loomopt.jobs.template import BEATUP_TEMPLATE
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker_faults
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.schema import Figure, Job, Table, Target
 
@@ -88,13 +88,13 @@ TARGETS = {
 def fault(design: Mapping[str, float]) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
-    return crank_rocker.fault(*(design[name] for name in named)) if len(named) == 4 else ""
+    return crank_rocker_faults.fault(*(design[name] for name in named)) if len(named) == 4 else ""
 
 
 def check(scene: Any) -> None:
     """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
     lengths = [scene.mechanism[name] for name in ("l1", "l2", "l3", "l4")]
-    fault = crank_rocker.fault(*lengths)
+    fault = crank_rocker_faults.fault(*lengths)
     if fault:
         raise BadInput(
             f"today's machine is not a crank-rocker: {fault}",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt import maths
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker_faults
 from loomopt.mechanisms.dyad import dot
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -21,7 +21,7 @@ def fault(dimensions: Dimensions) -> str:
     d = dimensions
     if min(d.l1, d.l2, d.l3, d.l71, d.l3p, d.l4, d.l5, d.l6, d.i1, d.i2, d.wheel) <= 0:
         return "every length and ratio must be greater than 0"
-    four_bar = crank_rocker.fault(d.l1, d.l2, d.l3, d.l71)
+    four_bar = crank_rocker_faults.fault(d.l1, d.l2, d.l3, d.l71)
     if four_bar:
         return f"the sley four-bar is no crank-rocker: {four_bar.replace('l4', 'l71')}"
     phi1 = _angles(d)

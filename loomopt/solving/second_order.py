@@ -1,5 +1,6 @@
 """Second order: the least curvature over the directions that are open, and what happens along flat ones."""
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -65,14 +66,15 @@ class Lagrangian:
 
     def falls(self, direction: Mapping[str, float], slope: float) -> bool:
         """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
-        base = self._value(0.0, direction)
+        base = self._base
         if base is None:
             return False
-        found = [self._value(step, direction) for step in PROBES]
-        return all(
-            value is not None and value - base < -(10 * slope * step + NOTICED)
-            for value, step in zip(found, PROBES, strict=True)
-        )
+        found = ((step, self._value(step, direction)) for step in PROBES)
+        return all(value is not None and value - base < -(10 * slope * step + NOTICED) for step, value in found)
+
+    @functools.cached_property
+    def _base(self) -> float | None:
+        return self._value(0.0, {})
 
     def _value(self, step: float, direction: Mapping[str, float]) -> float | None:
         sampler = sampler_at(self.program, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()})

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from loomopt.errors import BadInput
 from loomopt.maths import FLOAT
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker, crank_rocker_faults
 from loomopt.views.drawing import Label, arrow, captioned, fixed_pivot, place
 from loomopt.views.shapes import Arc, Circle, Drawing, Line, Point, Primitive
 
@@ -39,7 +39,7 @@ def joints_csv(design: Mapping[str, float]) -> str:
 def _lengths(design: Mapping[str, float]) -> crank_rocker.Lengths:
     """Return a design's lengths in mm. Raises BadInput when they are no crank-rocker."""
     metres = [design[name] for name in ("l1", "l2", "l3", "l4")]
-    fault = crank_rocker.fault(*metres)
+    fault = crank_rocker_faults.fault(*metres)
     if fault:
         raise BadInput(f"the linkage cannot be drawn: {fault}", key="l1, l2, l3, l4", remedy="Correct them")
     return crank_rocker.Lengths(*(1000 * length for length in metres))

@@ -106,7 +106,7 @@ def test_too_little_preload_is_refused_by_name_with_the_least_that_helps(X0):
 
 def test_a_small_preload_is_certified_whatever_todays_is():
     answer = lo.solve(scene_of(replace(PAPER, X0=1e-6), **{"mechanism.X0": "80 mm"}))
-    assert answer.figures["K1"] == pytest.approx(STATIC / 1e-6, rel=1e-12)
+    assert answer.figures["K1"] == pytest.approx(STATIC / 1e-6, rel=1e-10)
     assert answer.status == "optimal", answer.message
 
 

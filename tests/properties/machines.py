@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt import maths
 from loomopt.jobs.tasks import TASKS
-from loomopt.mechanisms import cam_follower, crank_rocker, rapier_faults
+from loomopt.mechanisms import cam_follower, crank_rocker_faults, rapier_faults
 from loomopt.mechanisms.cam_follower import Follower
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.crank_rocker import Lengths
@@ -54,7 +54,7 @@ def crank_rockers(draw, nearest=NEAREST):
     l4 = least + share * (most - least) if draw(st.booleans()) else most - share * (most - least)
     size = draw(powers(-2, 1))
     lengths = Lengths(l1 * size, l2 * size, l3 * size, l4 * size, draw(sides))
-    assume(l4 - l1 >= CLOSEST * max(l2, l3) and crank_rocker.fault(*sides_of(lengths)) == "")
+    assume(l4 - l1 >= CLOSEST * max(l2, l3) and crank_rocker_faults.fault(*sides_of(lengths)) == "")
     return lengths
 
 

@@ -60,7 +60,7 @@ def test_crank_rocker_angles_and_their_derivatives(lengths, phi):
     def formulas(system, *numbers):
         *links, angle = numbers
         sized = Lengths(*links, lengths.side)
-        spans = {f"span {far}": crank_rocker.span(system, sized, angle, far) for far in (True, False)}
+        spans = {of.__name__: of(system, sized, angle) for of in (crank_rocker.span_far, crank_rocker.span_near)}
         return named(Pose(system, sized, angle), OF_POSE) | spans
 
     assert_right(formulas, sides_of(lengths), MOST, phi)
