@@ -13,7 +13,7 @@ from loomopt import balance
 from loomopt.balance import Given
 from loomopt.jobs.beatup_poses import FrontPose, ReedPose
 from loomopt.jobs.program import Integral
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.schema import Check, Load, Values
 
@@ -63,13 +63,11 @@ class Beatup:
 
     def singular(self, given: Given) -> tuple[float, ...]:
         """Return the crank angles, rad, 0 and π, where the dyad comes within a hair of folding or stretching."""
-        lengths = given.values["lengths"]
-        near = [
-            span(FLOAT, lengths, angle) > (1 - HAIR) ** 2
-            for angle in (0.0, math.pi)
-            for span in (crank_rocker.span_far, crank_rocker.span_near)
-        ]
-        return (*((0.0,) if any(near[:2]) else ()), *((math.pi,) if any(near[2:]) else ()))
+        sides = given.values["lengths"]
+        far, fold = (sides.l2 + sides.l3) ** 2, (sides.l2 - sides.l3) ** 2
+        least = (1 - HAIR) ** 2
+        bases = {0.0: (sides.l4 - sides.l1) ** 2, math.pi: (sides.l4 + sides.l1) ** 2}
+        return tuple(angle for angle, base in bases.items() if base > least * far or fold > least * base)
 
     def implied(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return nothing: no variable follows from the others."""

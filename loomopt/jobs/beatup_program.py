@@ -21,6 +21,8 @@ ROWS = {"mu_min": ("mu_near", "mu_far")}
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
 MUCH = {"m4e": 0.98, "r4e": 0.9}
 """Shares of the counterweight's room that a solve starts from."""
+SAMPLES = 180
+"""Samples of one turn that are enough for a size."""
 MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
@@ -83,7 +85,7 @@ class _Sizes:
     """Natural sizes of this machine, SI, from today's design: what the NLP is scaled by."""
 
     def __init__(self, physics: Beatup, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> None:
-        sampler = Sampler(physics, known)
+        sampler = Sampler(physics, known, SAMPLES)
         resistance = known.get("M0", 0.0) if "resistance.pulse" in known else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
         self.known, self.limited, self.sampler = known, limited, sampler

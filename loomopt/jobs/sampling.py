@@ -134,10 +134,12 @@ class Sampler:
 
     def grid(self, samples: int = 0) -> tuple[NDArray[np.intp], Floats]:
         """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
-        samples = samples or self.samples
-        widths = np.diff(self.cycle.starts)
-        counts = [max(samples // 8, int(np.ceil(samples * width / TURN))) + 1 for width in widths]
-        return _grid(tuple(counts))
+        return _grid(self._counts(samples or self.samples))
+
+    def _counts(self, samples: int) -> tuple[int, ...]:
+        """Return how many nodes each piece has."""
+        widths = np.diff(self.cycle.starts).tolist()
+        return tuple(max(samples // 8, math.ceil(samples * width / TURN)) + 1 for width in widths)
 
     def extremes(self, name: str, where: tuple[int, float] | None = None) -> list[Extreme]:
         """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
@@ -155,12 +157,14 @@ class Sampler:
         size = self.heights(name, values)
         if not np.all(np.isfinite(size)):
             return [Extreme(0, 0.0, float("inf"))]
-        first, last = u == 0.0, u == 1.0
-        left, right = np.full_like(size, -np.inf), np.full_like(size, -np.inf)
+        left, right = np.empty_like(size), np.empty_like(size)
         left[1:], right[:-1] = size[:-1], size[1:]
+        first, last = self._ends
         left[first] = right[last] = -np.inf
         peaks = np.flatnonzero((size > left) & (size >= right))
-        found = self._refine(name, pieces, u, values, peaks) + self._spikes(name)
+        found = self._refine(name, pieces, u, values, peaks)
+        if self.singular:
+            found += self._spikes(name)
         return sorted(found, key=lambda extreme: -extreme.height)
 
     @functools.cached_property
@@ -189,6 +193,13 @@ class Sampler:
             values = self.model.quantity(maths.numpy(), self.given, name, angles, switches)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
+    @functools.cached_property
+    def _ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Where pieces begin and end in the sampler's own grid."""
+        counts = np.array(self._counts(self.samples))
+        last = np.cumsum(counts) - 1
+        return last - counts + 1, last
+
     def heights(self, name: str, values: Floats) -> Floats:
         """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
         return values if name in self.model.signed else np.abs(values)
@@ -209,8 +220,9 @@ class Sampler:
         around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
         vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
         refined = sign * self.at(name, piece, vertex)
-        level = np.ptp(around, axis=0) == 0.0
-        better = (refined >= sampled) & ~level
+        # A level stretch's extreme is its beginning.
+        bent = (around[0] != around[2]) | (around[4] != around[2])
+        better = (refined >= sampled) & bent
         best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme, signed=signed) for extreme in found]

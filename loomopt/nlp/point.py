@@ -1,5 +1,6 @@
 """Where a solve starts, stands and ends: plain records."""
 
+import functools
 import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from loomopt.jobs.sampling import SAMPLES, Extreme, Sampler
 
 PENALTY = 1000.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
-SAMPLED = ((1e-3, 180), (1e-6, 360))
+SAMPLED = ((1e-3, 180), (1e-9, 360))
 """Samples of one turn that are enough for an accuracy."""
 CHECKED, MOST_CHECKED = 1.6384, 65536
 """16384 points for the usual 1e-8."""
@@ -40,7 +41,7 @@ class Settings:
     polished: bool = True
     uniform: int = 0
 
-    @property
+    @functools.cached_property
     def sampled(self) -> int:
         """Samples of one turn: from 180 where a percent is asked to 720."""
         return self.samples or next((count for least, count in SAMPLED if self.accuracy >= least), SAMPLES)
