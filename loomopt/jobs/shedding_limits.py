@@ -70,7 +70,7 @@ class Limits:
         found = [Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0, where=w) for w in arcs]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            found += [replace(each, value=0.0, relaxable=False, hidden=True) for each in found]
+            found += [replace(each, name="contact", value=0.0, relaxable=False, hidden=True) for each in found]
         return found
 
     def _angles(self) -> list[Limit]:

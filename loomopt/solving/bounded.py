@@ -16,7 +16,7 @@ from loomopt.jobs.program import Integral, Program
 from loomopt.jobs.sampling import Sampler, Tally
 
 MOST_BOXES = 20_000
-STRIPS = 512
+STRIPS = 2048
 """Boxes of one piece over which a mean is enclosed."""
 
 

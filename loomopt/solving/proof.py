@@ -156,7 +156,9 @@ class _Court:
                 known[integral.name] = self.boxes.mean(integral)
                 known[integral.root] = known[integral.name].sqrt()
         residual = limit.residual(known, maths.number(limit.value)) + maths.number(0.0)
-        size = max(abs(float(known[limit.row])), abs(limit.value), limit.scale)
+        weight = float(known[limit.weight]) if limit.weight else 1.0
+        residual = residual / weight if weight else residual
+        size = max(abs(float(known[limit.row])) / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
         excess = abs(residual) if limit.sign == 0 else residual
         slack = self.slack * size
         status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"

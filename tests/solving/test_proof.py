@@ -129,7 +129,6 @@ def test_margins_are_those_of_the_refined_figures(name, target):
     assert compared >= 1
 
 
-@pytest.mark.xfail(strict=True, reason="P12: it is one of m4e r4e², kg·m²")
 def test_the_margin_of_the_counterweights_mass_is_a_mass():
     answer = solved("beatup")
     proof = next(each for each in proofs_of("beatup").proofs if each.text == "m4e <= 12.4 kg")
@@ -287,7 +286,7 @@ ONE_SIDED = {"mu_min": "min", "sley_mu_min": "min", "pulse_rms": "max", "J4": "m
 
 @pytest.mark.parametrize(
     "case",
-    ["beatup", "rapier", pytest.param("pulse", marks=pytest.mark.xfail(strict=True, reason="P13: 512 strips"))],
+    ["beatup", "rapier", "pulse"],
 )
 def test_limits_of_one_position_are_judged_at_their_edge(case):
     """The values are those of the plain machines."""
