@@ -113,13 +113,13 @@ FLAT = {("smooth", 1e-10), ("match", 1e-10)}
 
 @pytest.mark.parametrize(
     ("name", "accuracy"),
-    known([(name, accuracy) for name in OTHERS for accuracy in ASKED], FLAT, "P15: a flat optimum's figures"),
+    known([(name, accuracy) for name in OTHERS for accuracy in ASKED], FLAT, "a flat optimum's figures"),
 )
 def test_the_promise_holds_for_other_machines_and_targets(name, accuracy):
     kept(solved(name, accuracy), accuracy, solved(name, BEST).figures)
 
 
-@pytest.mark.parametrize("name", known([(n,) for n in OTHERS], {("smooth",)}, "P15: no correction helps"))
+@pytest.mark.parametrize("name", known([(n,) for n in OTHERS], {("smooth",)}, "no correction helps"))
 def test_the_best_answer_estimates_no_more_than_it_promises(name):
     answer = solved(name, BEST)
     assert answer.status == "optimal"
