@@ -28,14 +28,14 @@ MASKED = 1e-3
 CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
 
 
-def model(scene: Any) -> Beatup:
-    """Return the mechanism with the effects the scene calls for."""
+def model(scene: Any, known: Mapping[str, float] | None = None) -> Beatup:
+    """Return the mechanism with the effects the scene calls for; known: its numbers, where they are at hand."""
     effects = [scene.job.effects[name] for name in scene.effects]
     return Beatup(
         tuple(effect for effect in effects if isinstance(effect, Load)),
         tuple(effect for effect in effects if isinstance(effect, Check)),
         words(scene),
-        frozenset(numbers(scene)),
+        frozenset(known or numbers(scene)),
     )
 
 
@@ -58,8 +58,9 @@ def bounds(scene: Any) -> dict[str, tuple[float, float]]:
 
 def program(scene: Any, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
-    known, limited = numbers(scene), bounds(scene)
-    physics = model(scene)
+    known = numbers(scene)
+    limited = bounds_of(scene, known, VARIABLES)
+    physics = model(scene, known)
     sizes = _Sizes(physics, known, limited)
     direct = _reads_counterweight(scene, target, limited)
     names = [name for name in limited if direct or name != "m4e"]

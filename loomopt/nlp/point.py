@@ -12,7 +12,7 @@ from loomopt.jobs.sampling import SAMPLES, Extreme, Sampler
 
 PENALTY = 1000.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
-SAMPLED = ((1e-3, 180), (1e-9, 360))
+SAMPLED = ((1e-3, 180), (1e-6, 360))
 """Samples of one turn that are enough for an accuracy."""
 CHECKED, MOST_CHECKED = 1.6384, 65536
 """16384 points for the usual 1e-8."""

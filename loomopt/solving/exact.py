@@ -161,18 +161,22 @@ class Exact:
         """Return u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
         assert row.node is not None
         u, step, given = self.number(row.node.u), self.number(SECOND_STEP), self._given(self.base)
-        if row.node.u in (0.0, 1.0):
+        if self._at_corner(row.node):
             return u
         low, mid, high = (self._at(given, row.quantity, row.node.piece, u + k * step) for k in (-1, 0, 1))
         bend = (high - 2 * mid + low) / step**2
         shift = -(high - low) / (2 * step * bend) if bend else self.number(0)
         return u + shift if abs(shift) < self.number("1e-3") else u
 
+    def _at_corner(self, node: Extreme) -> bool:
+        """Say whether a node is the end of a piece; a cycle without corners has none."""
+        return node.u in (0.0, 1.0) and bool(self.sampler.cycle.order)
+
     def _mixed(self, k: int, directions: Sequence[Sequence[Any]], step: Any) -> tuple[Floats, float]:
         """Return g_xu along each direction and g_uu of a row at an interior extreme; (…, 0) at a piece's end."""
         row, u = self.rows[k], self.u[k]
         assert row.node is not None
-        if row.node.u in (0.0, 1.0):
+        if self._at_corner(row.node):
             return np.zeros(len(directions)), 0.0
         factor = self.number(row.sign) / self.number(row.scale)
 
