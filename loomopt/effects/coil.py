@@ -14,7 +14,6 @@ from loomopt.schema import Check, Demand, Table, Values
 
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""
-MEGA = 1e6
 RATE = "coils give K1"
 LEAST_INITIAL, MOST_INITIAL = (
     "initial tension: no less than winding gives",

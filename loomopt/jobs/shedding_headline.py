@@ -17,7 +17,7 @@ CLOSE = 1e-9
 def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
     """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
     size = {name: value or 0.0 for name, value in figures.items()}
-    stiffness = show(size["spring_force_max"] / (size["spring_stretch"] or math.inf), scene.unit("K1", "stiffness"), 9)
+    stiffness = show(size["K1"], scene.unit("K1", "stiffness"), 9)
     speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
     kept = "keeps the roller on the cam all round"
     if "levels" in [getattr(own, "shape", "") for own in scene.effects.values()]:

@@ -142,9 +142,12 @@ def _curves(axes: Any, frame: "pd.DataFrame", panel: Panel, place: int) -> None:
         axes.plot(angle, values, color=colour, linewidth=1.4, label=plain(split(column)[0]))
     axes.set_ylabel(panel.label if unit == "1" else f"{panel.label} [{unit}]", parse_math=False)
     axes.set_xlim(angle.min(), angle.max())
+    # A level's name keeps out of the way of a point's, which is as a rule on the level.
+    crowded = any(math.degrees(point.phi) < (angle.min() + angle.max()) / 2 for point in panel.points)
+    side = "right" if crowded else "left"
     for text, value in panel.levels.items():
         axes.axhline(size * value, color="#374151", linewidth=0.8)
-        _write(axes, text, (angle.min(), size * value), (3, 3), "left")
+        _write(axes, text, (angle.max() if crowded else angle.min(), size * value), (-3 if crowded else 3, 3), side)
     _points(axes, panel, size, colours[0])
     axes.xaxis.set_major_locator(MultipleLocator(45))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
