@@ -52,7 +52,7 @@ def new(
     file: Annotated[Path, typer.Argument(help="The scene to write; it must not exist yet.")],
 ) -> None:
     """Write a commented scene to start from."""
-    from loomopt.store import atomically
+    from loomopt.files import atomically
 
     if job not in JOBS:
         raise unknown("job", job, JOBS, "", "")

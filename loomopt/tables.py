@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
-from loomopt.jobs import sparse_curves
 from loomopt.jobs.tasks import TASKS
+from loomopt.program import sparse_curves
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.units import factor

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import cycle
-from loomopt.jobs.beatup_design import sampler
+from loomopt.jobs.beatup.design import sampler
 from loomopt.schema import Load, Table
 
 TURN = 2 * math.pi

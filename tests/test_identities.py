@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from loomopt import balance, maths
 from loomopt.effects import BEATUP
-from loomopt.jobs.beatup import Beatup
-from loomopt.jobs.beatup_poses import ReedPose
+from loomopt.jobs.beatup.model import Beatup
+from loomopt.jobs.beatup.poses import ReedPose
 from loomopt.mechanisms import crank_rocker
 from loomopt.schema import Load
 

@@ -14,8 +14,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs import rapier_curves
-from loomopt.jobs.rapier_design import figures, sampler
+from loomopt.jobs.rapier import curves as rapier_curves
+from loomopt.jobs.rapier.design import figures, sampler
 from loomopt.mechanisms import crank_rocker, rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 

@@ -15,7 +15,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.beatup_design import sampler
+from loomopt.jobs.beatup.design import sampler
 from loomopt.mechanisms import crank_rocker
 
 ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "yuan24.csv").open())}

@@ -10,9 +10,9 @@ from loomopt import balance, maths
 from loomopt.cycle import TURN
 from loomopt.effects import BEATUP
 from loomopt.jobs import load
-from loomopt.jobs.beatup_curves import curves
-from loomopt.jobs.beatup_design import figures, sampler
-from loomopt.jobs.beatup_program import model, numbers
+from loomopt.jobs.beatup.curves import curves
+from loomopt.jobs.beatup.design import figures, sampler
+from loomopt.jobs.beatup.program import model, numbers
 from loomopt.schema import Check
 
 COMBINATIONS = [names for n in range(len(BEATUP) + 1) for names in itertools.combinations(BEATUP, n)]

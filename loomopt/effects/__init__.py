@@ -1,23 +1,19 @@
 """The effects a scene may call for, one file each; an effect absent from a scene is absent from its equations."""
 
-from loomopt.effects import (
+from loomopt.effects.beatup import (
     bearing_friction,
     centrifugal,
-    coil,
     counterweight_inertia,
-    dry_friction,
-    frame_damping,
-    frame_inertia,
     gravity,
-    head_inertia,
-    reed_inertia,
     resistance,
     rocker_inertia,
     rod_inertia,
-    tape_friction,
-    warp_tension,
-    weight,
 )
+from loomopt.effects.beatup import inertia as reed_inertia
+from loomopt.effects.rapier import head_inertia, tape_friction
+from loomopt.effects.shedding import coil, dry_friction, warp_tension, weight
+from loomopt.effects.shedding import damping as frame_damping
+from loomopt.effects.shedding import inertia as frame_inertia
 from loomopt.schema import Effect
 
 BEATUP: dict[str, Effect] = {

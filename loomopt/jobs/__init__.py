@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt import packaged
-from loomopt.jobs import beatup_tables, rapier_tables, shedding_tables
+from loomopt.jobs.beatup import scene as beatup_tables
+from loomopt.jobs.rapier import scene as rapier_tables
+from loomopt.jobs.shedding import scene as shedding_tables
 from loomopt.scene_document import read_document
 from loomopt.scenes import Scene, build
 from loomopt.schema import Job

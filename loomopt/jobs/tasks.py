@@ -5,20 +5,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from loomopt.cycle import Floats
-from loomopt.jobs import (
-    beatup_curves,
-    beatup_design,
-    beatup_program,
-    rapier_curves,
-    rapier_design,
-    rapier_program,
-    shedding_curves,
-    shedding_design,
-    shedding_headline,
-    shedding_program,
-)
-from loomopt.jobs.program import Move, Program, Wish
-from loomopt.jobs.sampling import Sampler
+from loomopt.jobs.beatup import curves as beatup_curves
+from loomopt.jobs.beatup import design as beatup_design
+from loomopt.jobs.beatup import program as beatup_program
+from loomopt.jobs.rapier import curves as rapier_curves
+from loomopt.jobs.rapier import design as rapier_design
+from loomopt.jobs.rapier import program as rapier_program
+from loomopt.jobs.shedding import curves as shedding_curves
+from loomopt.jobs.shedding import design as shedding_design
+from loomopt.jobs.shedding import headline as shedding_headline
+from loomopt.jobs.shedding import program as shedding_program
+from loomopt.program.program import Move, Program, Wish
+from loomopt.program.sampling import Sampler
 
 Numbers = Mapping[str, float]
 

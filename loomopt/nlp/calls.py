@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
+from loomopt.program.program import Program
+from loomopt.program.sampling import Extreme, Sampler
 
 FIRST_SLOTS = 6
 

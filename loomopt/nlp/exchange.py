@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.cycle import Cycle, Floats
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Extreme, Sampler, Tally
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.follow import follow, polish
 from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
 from loomopt.nlp.polish import BINDING
 from loomopt.nlp.transcribe import Family, Transcription
+from loomopt.program.program import Program
+from loomopt.program.sampling import Extreme, Sampler, Tally
 
 ROUNDS, ELASTIC_ROUNDS, LEADING = 16, 32, 4
 STANDS = 1e-7

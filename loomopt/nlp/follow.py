@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.calls import FIRST_SLOTS, Calls
 from loomopt.nlp.pivot import bound_by, reach
 from loomopt.nlp.point import Point
 from loomopt.nlp.polish import BINDING, binding, met
+from loomopt.program.sampling import Extreme, Sampler
 
 TOUCHING, SETTLED, POLISHES, POLISH = 1e-8, 1e-8, 3, 1e-6
 """Rows this close to their bound are polished onto it, in steps up to POLISH; below SETTLED no extreme moves."""

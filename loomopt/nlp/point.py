@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import SAMPLES, Extreme, Sampler
+from loomopt.program.program import Program
+from loomopt.program.sampling import SAMPLES, Extreme, Sampler
 
 PENALTY = 1000.0
 """Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""

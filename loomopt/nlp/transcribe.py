@@ -14,11 +14,11 @@ import numpy as np
 from loomopt import maths
 from loomopt.balance import Given, total
 from loomopt.cycle import Floats, node_angle
-from loomopt.jobs.program import Integral, Program
-from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.layout import Layout
 from loomopt.nlp.options import ipopt_options
 from loomopt.nlp.point import Settings
+from loomopt.program.program import Integral, Program
+from loomopt.program.sampling import Extreme, Sampler
 
 CACHE_SIZE = 32
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.jobs.program import Integral, Program
-from loomopt.jobs.sampling import Sampler, Tally
+from loomopt.program.program import Integral, Program
+from loomopt.program.sampling import Sampler, Tally
 
 MOST_BOXES = 20_000
 STRIPS = 2048

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Limit, Objective, Program
-from loomopt.jobs.sampling import Sampler
 from loomopt.nlp.point import Settings
+from loomopt.program.program import Limit, Objective, Program
+from loomopt.program.sampling import Sampler
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact, Row
 from loomopt.solving.excess import excesses

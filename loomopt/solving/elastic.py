@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from loomopt.jobs.program import Limit, Program
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
 from loomopt.nlp.transcribe import families
+from loomopt.program.program import Limit, Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
 

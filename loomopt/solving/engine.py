@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from loomopt.jobs.program import Objective, Program
-from loomopt.jobs.sampling import Sampler, Tally
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.nlp import exchange
 from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
+from loomopt.program.program import Objective, Program
+from loomopt.program.sampling import Sampler, Tally
 from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted

@@ -12,8 +12,8 @@ import numpy as np
 from loomopt import maths
 from loomopt.balance import Given, total
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Limit, Objective, Program
-from loomopt.jobs.sampling import Extreme, Sampler
+from loomopt.program.program import Limit, Objective, Program
+from loomopt.program.sampling import Extreme, Sampler
 
 DIGITS = 40
 STEP = "1e-20"

@@ -1,7 +1,7 @@
 """By how much a design exceeds its limits."""
 
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Sampler
+from loomopt.program.program import Program
+from loomopt.program.sampling import Sampler
 
 
 def excesses(program: Program, sampler: Sampler) -> dict[int, float]:

@@ -1,7 +1,7 @@
 """What a limit costs: its multiplier in the units a designer reads."""
 
-from loomopt.jobs.program import Limit, Objective
-from loomopt.jobs.sampling import Sampler
+from loomopt.program.program import Limit, Objective
+from loomopt.program.sampling import Sampler
 from loomopt.solving.verdict import Binding
 
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from loomopt import designs
 from loomopt.errors import BadInput
-from loomopt.jobs.numbers import numbers
-from loomopt.jobs.program import Limit, Program
-from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS, Task
+from loomopt.program.numbers import numbers
+from loomopt.program.program import Limit, Program
+from loomopt.program.sampling import Sampler
 from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution

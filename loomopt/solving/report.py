@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt import designs
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import Task
+from loomopt.program.program import Program
+from loomopt.program.sampling import Sampler
 from loomopt.solving.certificate import FEASIBILITY
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
 from loomopt.solving.verdict import Certificate

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Sampler
 from loomopt.nlp.point import sampler_at
+from loomopt.program.program import Program
+from loomopt.program.sampling import Sampler
 from loomopt.solving.nnls import nnls
 
 SEEDS, STEPS = 12, 30

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jobs.program import Move, Program, Wish
-from loomopt.jobs.sampling import Sampler
+from loomopt.program.program import Move, Program, Wish
+from loomopt.program.sampling import Sampler
 from loomopt.solving.excess import excesses
 
 UNCHANGED = 1e-10

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from loomopt.jobs.program import Limit, Objective
+from loomopt.program.program import Limit, Objective
 
 ROUNDING = 1e-15
 """Nothing is known better, relative to its natural size."""

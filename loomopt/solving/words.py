@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from loomopt.jobs.program import Limit
+from loomopt.program.program import Limit
 from loomopt.quantities import SI_UNIT, factor, kind_of, show
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding

@@ -95,7 +95,7 @@ def reference(found: Solution, scene: Any) -> "pd.DataFrame":
 
 def write(folder: Path) -> list[Path]:
     """Write the reference table of every packaged scene and target; returns the files."""
-    from loomopt.store import atomically
+    from loomopt.files import atomically
 
     written = []
     for name in problem_names():

@@ -11,10 +11,10 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import Cycle, Floats
-from loomopt.jobs.program import Model, Program
-from loomopt.jobs.sampling import Extreme, Sampler
 from loomopt.nlp.point import Point
 from loomopt.nlp.polish import BINDING
+from loomopt.program.program import Model, Program
+from loomopt.program.sampling import Extreme, Sampler
 
 DIGITS = 40
 STEP, SLOPE_STEP = "1e-12", "1e-20"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from loomopt.errors import BadInput
-from loomopt.jobs.sampling import Tally
+from loomopt.program.sampling import Tally
 
 Setting = float | int | str
 TIGHTER = 100.0

@@ -8,9 +8,9 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import SAME_ANGLE, TURN, Floats
-from loomopt.jobs.sampling import Sampler, Tally
 from loomopt.maths import Maths, Number
 from loomopt.nlp import slopes
+from loomopt.program.sampling import Sampler, Tally
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject

@@ -11,10 +11,10 @@ import numpy as np
 from loomopt import designs, maths
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Floats
-from loomopt.jobs.program import Program
-from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS, Task
 from loomopt.maths import Maths, Number
+from loomopt.program.program import Program
+from loomopt.program.sampling import Sampler
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import check, digits

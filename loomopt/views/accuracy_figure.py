@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from loomopt import tables
-from loomopt.store import atomically, suffix
+from loomopt.files import atomically, suffix
 from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from loomopt.views.shapes import (
+from loomopt.picture.shapes import (
     DASH,
     GAP,
     LAYERS,

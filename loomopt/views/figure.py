@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from loomopt import store
-from loomopt.views import svg
-from loomopt.views.panels import ANGLE, Panel, each, split
-from loomopt.views.shapes import (
+from loomopt import files as store
+from loomopt.picture.panels import ANGLE, Panel, each, split
+from loomopt.picture.shapes import (
     CAPITAL,
     DASH,
     GAP,
@@ -26,6 +25,7 @@ from loomopt.views.shapes import (
     extent,
     plain,
 )
+from loomopt.views import svg
 
 if TYPE_CHECKING:
     import pandas as pd

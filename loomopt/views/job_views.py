@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from loomopt.views import panels as panels_of
+from loomopt.picture import panels as panels_of
 
 if TYPE_CHECKING:
-    from loomopt.views.equations import Equation
-    from loomopt.views.panels import Panel
-    from loomopt.views.shapes import Drawing
+    from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Panel
+    from loomopt.picture.shapes import Drawing
 
 Numbers = Mapping[str, float]
 
@@ -58,74 +58,74 @@ def full(scene: Any, design: Numbers) -> dict[str, float]:
 
 
 def _beatup_linkage(scene: Any, design: Numbers) -> "Drawing":
-    from loomopt.views import crank_rocker_drawing
+    from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 
     return crank_rocker_drawing.linkage(full(scene, design), scene.name)
 
 
 def _beatup_joints(scene: Any, design: Numbers) -> str:
-    from loomopt.views import crank_rocker_drawing
+    from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 
     return crank_rocker_drawing.joints_csv(full(scene, design))
 
 
 def _beatup_equations(scene: Any) -> tuple["Equation", ...]:
-    from loomopt.jobs import beatup_program
-    from loomopt.views import beatup_equations
+    from loomopt.jobs.beatup import equations as beatup_equations
+    from loomopt.jobs.beatup import program as beatup_program
 
     return beatup_equations.equations(beatup_program.model(scene))
 
 
 def _rapier_linkage(scene: Any, design: Numbers) -> "Drawing":
-    from loomopt.views import rapier_drawing
+    from loomopt.jobs.rapier import drawing as rapier_drawing
 
     return rapier_drawing.linkage(full(scene, design), scene.name)
 
 
 def _rapier_joints(scene: Any, design: Numbers) -> str:
-    from loomopt.views import rapier_drawing
+    from loomopt.jobs.rapier import drawing as rapier_drawing
 
     return rapier_drawing.joints_csv(full(scene, design))
 
 
 def _rapier_equations(scene: Any) -> tuple["Equation", ...]:
-    from loomopt.views import rapier_equations
+    from loomopt.jobs.rapier import equations as rapier_equations
 
     return rapier_equations.equations(scene)
 
 
 def _shedding_linkage(scene: Any, design: Numbers) -> "Drawing":
-    from loomopt.views import shedding_drawing
+    from loomopt.jobs.shedding import drawing as shedding_drawing
 
     return shedding_drawing.linkage(scene, design)
 
 
 def _shedding_profile(scene: Any, design: Numbers) -> str:
-    from loomopt.views import shedding_drawing
+    from loomopt.jobs.shedding import drawing as shedding_drawing
 
     return shedding_drawing.joints_csv(scene, design)
 
 
 def _shedding_equations(scene: Any) -> tuple["Equation", ...]:
-    from loomopt.views import shedding_equations
+    from loomopt.jobs.shedding import equations as shedding_equations
 
     return shedding_equations.equations(scene)
 
 
 def _shedding_panels(scene: Any, design: Numbers, columns: Sequence[str]) -> tuple["Panel", ...]:
-    from loomopt.views import shedding_panels
+    from loomopt.jobs.shedding import panels as shedding_panels
 
     return shedding_panels.panels(scene, design, columns)
 
 
 def _shedding_remarks(scene: Any, design: Numbers) -> tuple[str, ...]:
-    from loomopt.views import shedding_remarks
+    from loomopt.jobs.shedding import remarks as shedding_remarks
 
     return shedding_remarks.remarks(scene, design)
 
 
 def _shedding_missing(scene: Any) -> tuple[str, ...]:
-    from loomopt.views import cam_curves
+    from loomopt.jobs.shedding import cam_curves
 
     return cam_curves.missing(scene)
 

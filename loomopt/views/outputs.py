@@ -10,9 +10,9 @@ from typing import Any
 from loomopt import __version__, tables
 from loomopt.designs import flat
 from loomopt.errors import BadInput
+from loomopt.files import atomically, suffix
 from loomopt.jobs.tasks import TASKS
 from loomopt.solving.solution import Evaluation, Solution
-from loomopt.store import atomically, suffix
 from loomopt.views import job_views
 
 PICTURES = (".png", ".svg", ".pdf")

@@ -3,7 +3,7 @@
 import math
 from xml.etree import ElementTree
 
-from loomopt.views.shapes import (
+from loomopt.picture.shapes import (
     CAPITAL,
     DASH,
     GAP,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from loomopt import maths
 from loomopt.balance import Pose
-from loomopt.effects import bearing_friction, centrifugal, gravity, resistance, rod_inertia
+from loomopt.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
 from loomopt.mechanisms import crank_rocker
 
 MP = mpmath.MPContext()

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt import maths
 from loomopt.balance import Pose
-from loomopt.effects import head_inertia, tape_friction
-from loomopt.jobs.rapier_design import figures, sampler
+from loomopt.effects.rapier import head_inertia, tape_friction
+from loomopt.jobs.rapier.design import figures, sampler
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 RAPIER = lo.load("rapier")

@@ -13,11 +13,14 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import balance, maths
-from loomopt.effects import SHEDDING, dry_friction, frame_damping, frame_inertia, warp_tension, weight
-from loomopt.jobs import shedding_pose
-from loomopt.jobs.shedding_curves import curves
-from loomopt.jobs.shedding_design import figures, sampler
-from loomopt.jobs.shedding_program import model, numbers
+from loomopt.effects import SHEDDING
+from loomopt.effects.shedding import damping as frame_damping
+from loomopt.effects.shedding import dry_friction, warp_tension, weight
+from loomopt.effects.shedding import inertia as frame_inertia
+from loomopt.jobs.shedding import pose as shedding_pose
+from loomopt.jobs.shedding.curves import curves
+from loomopt.jobs.shedding.design import figures, sampler
+from loomopt.jobs.shedding.program import model, numbers
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 MOVING = lo.load("shedding")

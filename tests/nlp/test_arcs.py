@@ -8,9 +8,9 @@ import pytest
 import loomopt as lo
 from loomopt import maths
 from loomopt.cycle import TURN, split
-from loomopt.jobs.rapier_design import sampler
-from loomopt.jobs.rapier_program import program
-from loomopt.jobs.sampling import Sampler
+from loomopt.jobs.rapier.design import sampler
+from loomopt.jobs.rapier.program import program
+from loomopt.program.sampling import Sampler
 from loomopt.schema import Arcs
 
 

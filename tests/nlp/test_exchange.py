@@ -8,11 +8,11 @@ import pytest
 
 import loomopt as lo
 from loomopt.balance import Given
-from loomopt.jobs.program import Limit, Objective, Program, Variable
-from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
+from loomopt.program.program import Limit, Objective, Program, Variable
+from loomopt.program.sampling import Sampler
 from loomopt.solving.certificate import certify
 
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.jobs.sampling import Extreme
 from loomopt.jobs.tasks import TASKS
 from loomopt.nlp import transcribe as module
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import Layout, families, transcribe
+from loomopt.program.sampling import Extreme
 from loomopt.solving.exact import Exact, Row
 
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")

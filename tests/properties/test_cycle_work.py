@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
 
 from loomopt import maths
-from loomopt.jobs.sampling import Sampler
+from loomopt.program.sampling import Sampler
 
 POINTS = 4096
 """So many that the rule is right to rounding also for a crank-rocker a twentieth of its room from a change point."""

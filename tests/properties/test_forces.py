@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from machines import NAMES, drives, frames, machine, reeds, shares, varied
 
 from loomopt import balance
-from loomopt.jobs.sampling import Sampler
+from loomopt.program.sampling import Sampler
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|); worst of 1000 random machines each: 4.1 reed, 2 heald frame, 5.3 head."""

@@ -13,11 +13,11 @@ from shedding_cases import flat, freed, plain
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.sampling import Sampler
-from loomopt.jobs.shedding_design import sampler
-from loomopt.jobs.shedding_program import model, numbers
+from loomopt.jobs.shedding.design import sampler
+from loomopt.jobs.shedding.program import model, numbers
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.program.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes, judged
 from loomopt.solving.certificate import certify

@@ -18,8 +18,8 @@ from shedding_cases import flat, freed, product
 
 import loomopt as lo
 from loomopt.errors import BadInput
-from loomopt.jobs.sampling import Sampler
 from loomopt.packaged import problem_names
+from loomopt.program.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes
 from loomopt.studies.check import served

@@ -6,7 +6,7 @@ import toy
 from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
-from loomopt.jobs.program import Move, Wish
+from loomopt.program.program import Move, Wish
 from loomopt.solving.settle import settle
 
 SLIDE = Move("slide", ("y",), "axis")

@@ -15,7 +15,7 @@ from shedding_cases import CYCLOID, TRAVELS, flat, freed, lowest, plain, product
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.shedding_design import sampler
+from loomopt.jobs.shedding.design import sampler
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import spline
 

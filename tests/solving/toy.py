@@ -8,9 +8,9 @@ from types import SimpleNamespace
 from unittest import mock
 
 from loomopt.balance import Given
-from loomopt.jobs.program import Limit, Objective, Program, Variable
-from loomopt.jobs.sampling import Sampler
 from loomopt.jobs.tasks import TASKS, Task
+from loomopt.program.program import Limit, Objective, Program, Variable
+from loomopt.program.sampling import Sampler
 from loomopt.solving import engine
 
 WIDE = 10.0

@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from loomopt.errors import BadInput
-from loomopt.views import crank_rocker_drawing, figure, svg
+from loomopt.jobs.beatup import drawing as crank_rocker_drawing
+from loomopt.views import figure, svg
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 MARKS = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse begins": 0.89, "pulse ends": 1.41}

@@ -11,10 +11,11 @@ import pytest
 import loomopt as lo
 from loomopt import packaged
 from loomopt.jobs import JOBS
+from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.jobs.tasks import TASKS
-from loomopt.views import crank_rocker_drawing, job_views, scene_view
+from loomopt.picture.shapes import LAYERS
+from loomopt.views import job_views, scene_view
 from loomopt.views.layout import Grid
-from loomopt.views.shapes import LAYERS
 
 
 def test_every_job_has_its_views():

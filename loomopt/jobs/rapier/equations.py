@@ -1,0 +1,120 @@
+"""The equations a rapier scene really uses: both loops, the rapier's travel, each effect's own formula on symbols."""
+
+from typing import Any
+
+from loomopt import balance, maths
+from loomopt.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.picture.equations import (
+    Angle,
+    Equation,
+    Symbols,
+    equation,
+    latex,
+    loop,
+    moving,
+    own_values,
+    sums,
+    symbol,
+    sympy,
+    text,
+)
+from loomopt.schema import Check, Load
+
+
+def equations(scene: Any) -> tuple[Equation, ...]:
+    """Return the equations of a rapier scene: dead centres, both loops, travel, each term, balance, crank torque.
+
+    scene: its job's `effects` by name, and its own `effects`, the tables of those that are on. An effect that is not
+    in the scene leaves no symbol and no term.
+    """
+    d = Dimensions(*(symbol(name) for name in Dimensions.__dataclass_fields__))
+    return (*_sley(d), *_five_bar(d), *_travel(d), *_forces(scene))
+
+
+def _sley(d: Dimensions) -> list[Equation]:
+    """Run the sley's own closed forms on symbols, and close the loop A0 A B1 B0; phi7: direction of A0→B0 from x."""
+    sp, sley = sympy(), Sley(maths.sympy(), d)
+    phi1, beta, beta_r, phi7, phi2, phi3 = (symbol(name) for name in ("phi1", "beta", "beta_r", "phi7", "phi2", "phi3"))
+    crank = phi1 + beta + phi7
+    sides = (
+        (d.l1 * sp.cos(crank) + d.l2 * sp.cos(phi2), d.l71 * sp.cos(phi7) + d.l3 * sp.cos(phi3)),
+        (d.l1 * sp.sin(crank) + d.l2 * sp.sin(phi2), d.l71 * sp.sin(phi7) + d.l3 * sp.sin(phi3)),
+    )
+    return [
+        equation("front dead centre", beta, sley.stand.beta),
+        equation("rear dead centre", beta_r, sley.centres.beta_r),
+        equation("rear dead centre", symbol("phi1_rear"), sp.pi + beta_r - beta),
+        equation("direction of A0 B0", phi7, sley.stand.frame_angle),
+        *loop(sides, phi1, (moving("phi2"), moving("phi3")), kind="sley: "),
+    ]
+
+
+def _five_bar(d: Dimensions) -> list[Equation]:
+    """Close the loop C0 C D B2 B0; the second crank turns twice as fast, against the first."""
+    sp, phi1 = sympy(), symbol("phi1")
+    phi4, sley = Angle("phi4", sp.Integer(-2), sp.Integer(0)), moving("phi3")
+    phi5, phi6 = moving("phi5"), moving("phi6")
+    carrier = sley.symbol + d.alpha
+    sides = tuple(
+        (
+            pivot + d.l4 * part(phi4.symbol) + d.l5 * part(phi5.symbol),
+            d.l3p * part(carrier) + d.l6 * part(phi6.symbol),
+        )
+        for pivot, part in ((d.C0x, sp.cos), (d.C0y, sp.sin))
+    )
+    return [
+        equation("second crank", phi4.symbol, d.phi40 - 2 * phi1),
+        *loop(sides, phi1, (phi5, phi6), (sley, phi4), kind="five-bar: "),
+    ]
+
+
+def _travel(d: Dimensions) -> list[Equation]:
+    """Write the rapier's travel S and its derivatives [Hong17, eq 1]."""
+    phi60, angle = symbol("phi60"), moving("phi63")
+    phi3, phi6 = moving("phi3"), moving("phi6")
+    return [
+        equation("at front dead centre", phi60, sympy().Function("phi6")(0)),
+        equation("driving link on the sley", angle.symbol, phi6.symbol - phi3.symbol - phi60 + d.phi30),
+        equation("travel", symbol("S"), d.travel * angle.symbol),
+        equation("travel", symbol("S'"), d.travel * (phi6.rate - phi3.rate)),
+        equation("travel", symbol("S''"), d.travel * (phi6.second - phi3.second)),
+    ]
+
+
+def _pose() -> balance.Pose:
+    """Return a pose of symbols: the output is the rapier's travel."""
+    return balance.Pose(symbol("phi1"), symbol("omega"), symbol("S"), symbol("S'"), symbol("S''"))
+
+
+def _forces(scene: Any) -> list[Equation]:
+    """Write each term that is on, their balance and the crank torque, and the checks."""
+    pose, given = _pose(), Symbols()
+    effects = [scene.job.effects[name] for name in scene.effects]
+    loads = [effect for effect in effects if isinstance(effect, Load)]
+    found = [_term(load, pose, given, _words(scene, load.name)) for load in loads]
+    found += sums(loads, pose, symbol("Q"), "Q")
+    for check in (effect for effect in effects if isinstance(effect, Check)):
+        own = own_values(check, _words(scene, check.name))
+        for name, quantity in check.quantities.items():
+            found.append(equation(check.name, symbol(name), quantity(maths.sympy(), pose, given, own)))
+    return found
+
+
+def _words(scene: Any, effect: str) -> dict[str, str]:
+    """Return the values of an effect's table that choose a formula."""
+    return {key: value for key, value in scene.effects[effect].model_dump().items() if isinstance(value, str)}
+
+
+def _term(load: Load, pose: balance.Pose, given: Symbols, words: dict[str, str]) -> Equation:
+    """Write a load's term; one with corners jumps where the rapier turns back: its switch is the sign of S'."""
+    name, own, rate = symbol(f"Q_{load.name}"), own_values(load, words), symbol("S'")
+
+    def force(switch: int) -> Any:
+        return load.force(maths.sympy(), pose, given, own, sympy().Integer(switch))
+
+    if load.corners is None:
+        return equation(load.name, name, force(0))
+    cases = [(force(1), rate > 0), (force(-1), rate < 0)]
+    written = ", ".join(f"{text(term)} for {text(when)}" for term, when in cases)
+    rows = r" \\ ".join(rf"{latex(term)} & {latex(when)}" for term, when in cases)
+    return Equation(load.name, f"{text(name)} = {written}", rf"{latex(name)} = \begin{{cases}} {rows} \end{{cases}}")

@@ -1,0 +1,148 @@
+"""Drawings as plain data: lines, circles, arcs and texts on named layers, in mm; renderers write them."""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from loomopt.picture.placing import Box, Floats
+
+
+class Point(NamedTuple):
+    """x and y, mm, y up."""
+
+    x: float
+    y: float
+
+    def towards(self, angle: float, distance: float) -> "Point":
+        """Return the point at a distance, mm, in the direction of an angle, rad."""
+        return Point(self.x + distance * math.cos(angle), self.y + distance * math.sin(angle))
+
+
+@dataclass(frozen=True)
+class Layer:
+    """How a layer looks: colour on white; aci: AutoCAD colour; width: of lines, mm at 3.5 mm text."""
+
+    colour: str
+    aci: int
+    width: float
+    dashed: bool = False
+
+
+LAYERS: Mapping[str, Layer] = {
+    "paths": Layer("#6b7280", 8, 0.18, dashed=True),
+    "frame": Layer("#1f2937", 7, 0.35),
+    "front dead centre": Layer("#c2410c", 30, 0.5),
+    "hand-over": Layer("#7c3aed", 200, 0.35),
+    "rear dead centre": Layer("#1d4ed8", 150, 0.35, dashed=True),
+    "pitch curve": Layer("#0e7490", 132, 0.25),
+    "profile": Layer("#1f2937", 7, 0.7),
+    "far dwell": Layer("#7c3aed", 200, 0.35),
+    "near dwell": Layer("#1d4ed8", 150, 0.35),
+    "least cam force": Layer("#c2410c", 30, 0.35),
+    "joints": Layer("#1f2937", 7, 0.35),
+    "dimensions": Layer("#047857", 92, 0.18),
+    "notes": Layer("#111827", 7, 0.25),
+}
+"""Layers from back to front."""
+
+NOMINAL_HEIGHT = 3.5
+"""Text height, mm, that the layers' widths and the dashes are meant for."""
+DASH, GAP = 3.0, 2.0
+"""Lengths in a dashed line, mm."""
+CAPITAL = 0.72
+"""Height of capitals, which CAD calls text height, in font sizes."""
+CHARACTER = 0.88
+"""Width to reserve for one character, in text heights."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight strokes through points, mm."""
+
+    layer: str
+    points: tuple[Point, ...]
+    closed: bool = False
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A full circle; radius in mm."""
+
+    layer: str
+    centre: Point
+    radius: float
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A circular arc, counter-clockwise from begin to end, rad; radius in mm."""
+
+    layer: str
+    centre: Point
+    radius: float
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Text:
+    """One level line of text; at: its centre or the middle of its left edge; size: in text heights."""
+
+    layer: str
+    at: Point
+    text: str
+    size: float = 1.0
+    anchor: Literal["centre", "left"] = "centre"
+
+
+Primitive = Line | Circle | Arc | Text
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing at full scale; height: of its capitals, mm, which line widths and dashes follow."""
+
+    title: str
+    height: float
+    primitives: tuple[Primitive, ...]
+    unit: Literal["mm"] = "mm"
+
+
+def plain(text: str) -> str:
+    """Return text without control characters, which neither XML nor DXF can hold."""
+    return "".join(character if character.isprintable() else " " for character in text)
+
+
+def text_box(text: Text, height: float) -> Box:
+    """Return the room a text takes, mm, by a generous estimate of its width."""
+    tall = height * text.size
+    wide = CHARACTER * tall * len(text.text)
+    left = text.at.x - (wide / 2 if text.anchor == "centre" else 0.0)
+    return Box(left, text.at.y - 0.75 * tall, left + wide, text.at.y + 0.75 * tall)
+
+
+def extent(drawing: Drawing, margin: float = 2.0) -> Box:
+    """Return what the drawing covers, mm, with a margin in text heights."""
+    points = np.concatenate([marks(primitive, drawing.height) for primitive in drawing.primitives])
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    room = margin * drawing.height
+    return Box(float(left) - room, float(bottom) - room, float(right) + room, float(top) + room)
+
+
+def marks(primitive: Primitive, height: float) -> Floats:
+    """Return points close together along a primitive, or the corners of a text, (n, 2) mm."""
+    if isinstance(primitive, Text):
+        box = text_box(primitive, height)
+        return np.array([[box.left, box.bottom], [box.right, box.top]])
+    if isinstance(primitive, Line):
+        ends = (*primitive.points, primitive.points[0]) if primitive.closed else primitive.points
+        steps = [(a, b, 2 + int(math.dist(a, b) / (0.2 * height))) for a, b in itertools.pairwise(ends)]
+        return np.concatenate([np.linspace(*step) for step in steps])
+    begin, end = (primitive.begin, primitive.end) if isinstance(primitive, Arc) else (0.0, 2 * math.pi)
+    angles = np.linspace(begin, end, 33 + int((end - begin) * primitive.radius / (0.2 * height)))
+    around = np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(primitive.centre) + primitive.radius * around

@@ -1,0 +1,253 @@
+"""Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loomopt import cycle, maths
+from loomopt.balance import Given
+from loomopt.cycle import TURN, Cycle, Floats
+from loomopt.program import spikes
+from loomopt.program.program import Integral, Model
+
+CHUNK = 8192
+"""Positions evaluated at once: small enough to stay in cache."""
+SAMPLES = 720
+"""Samples of one turn from which extremes are refined; no piece gets fewer than an eighth of them."""
+CLOSER = 1 / 8
+"""Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
+GAUSS_NODES = 32
+
+
+@functools.cache
+def gauss() -> tuple[Floats, Floats]:
+    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    return (nodes + 1) / 2, weights / 2
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """A local extreme of |quantity|: where, and the value with its sign, SI; signed: of the quantity as it is."""
+
+    piece: int
+    u: float
+    value: float
+    signed: bool = False
+
+    @property
+    def height(self) -> float:
+        """What is compared with a bound, SI."""
+        return self.value if self.signed else abs(self.value)
+
+    @property
+    def sign(self) -> float:
+        """What the value is multiplied by to give the height."""
+        return -1.0 if self.value < 0 and not self.signed else 1.0
+
+
+@functools.cache
+def _grid(counts: tuple[int, ...]) -> tuple[NDArray[np.intp], Floats]:
+    """Return nodes with so many evenly spread over each piece."""
+    pieces = np.repeat(np.arange(len(counts)), counts)
+    return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
+
+
+def _inside(values: Floats, margin: Floats) -> Floats:
+    """Return values moved into [margin, 1 − margin]."""
+    return np.minimum(np.maximum(values, margin), 1 - margin)
+
+
+def _vertex(values: Floats) -> Floats:
+    """Return where a polynomial through three or five equidistant values is highest, in steps from the middle one."""
+    middle = len(values) // 2
+    low, mid, high = values[middle - 1 : middle + 2]
+    slope, bend, third = (high - low) / 2, low - 2 * mid + high, np.zeros_like(mid)
+    if middle == 2:
+        outer = values[4] - values[0]
+        third = outer / 2 - 2 * slope
+        slope, bend = (16 * slope - outer) / 12, bend - (values[4] - 4 * high + 6 * mid - 4 * low + values[0]) / 12
+    first = slope / np.where(bend < 0, -bend, np.inf)
+    shift = first + third * first**2 / np.where(bend < 0, -2 * bend, np.inf)
+    return np.asarray(np.minimum(np.maximum(shift, -middle), middle), dtype=np.float64)
+
+
+class Tally:
+    """How many positions of mechanisms were evaluated so far, by samples, nodes and boxes."""
+
+    positions = 0
+
+
+class Sampler:
+    """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined."""
+
+    def __init__(self, model: Model, values: Mapping[str, float], samples: int = SAMPLES) -> None:
+        self.model, self.values, self.samples = model, dict(values), samples
+        self.given: Given = model.given(maths.FLOAT, values)
+        self.hints = dict(model.hints(self.given))
+        if self.hints:
+            self.given = model.given(maths.FLOAT, {**values, **self.hints})
+        self.corners = model.corners(maths.FLOAT, self.given)
+        self._extremes: dict[str, list[Extreme]] = {}
+        self.cycle: Cycle = cycle.split(model.switched, self.corners)
+
+    @property
+    def corner_count(self) -> int:
+        """Number of declared corners."""
+        return sum(len(of_load) for of_load in self.corners)
+
+    @functools.cached_property
+    def front(self) -> list[float]:
+        """Each load's switch just before the position `static` speaks of."""
+        piece = self.cycle.piece_before(float(self.model.front_angle(self.given)))
+        return [float(switch) for switch in self.cycle.switches[piece]]
+
+    @functools.cached_property
+    def static(self) -> dict[str, float]:
+        """Figures that need one position only."""
+        return self.model.static(maths.FLOAT, self.given, self.front)
+
+    @functools.cached_property
+    def figures(self) -> dict[str, float]:
+        """Static figures, the model's means over parts of the cycle, and their roots."""
+        found = dict(self.static)
+        for integral in self.model.integrals:
+            found[integral.name] = self.mean(integral)
+            found[integral.root] = math.sqrt(found[integral.name])
+        return found
+
+    def at(self, name: str, pieces: NDArray[np.intp], u: Floats) -> Floats:
+        """Return a quantity at nodes (pieces, u), SI."""
+        result = np.empty(u.shape)
+        Tally.positions += len(u)
+        for begin in range(0, len(u), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            angles = self.cycle.angles(pieces[part], u[part])
+            switches = self.cycle.switches[pieces[part]].T
+            with np.errstate(invalid="ignore", divide="ignore"):
+                result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
+        return result
+
+    def grid(self, samples: int = 0) -> tuple[NDArray[np.intp], Floats]:
+        """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
+        return _grid(self._counts(samples or self.samples))
+
+    def _counts(self, samples: int) -> tuple[int, ...]:
+        """Return how many nodes each piece has."""
+        widths = np.diff(self.cycle.starts).tolist()
+        return tuple(max(samples // 8, math.ceil(samples * width / TURN)) + 1 for width in widths)
+
+    def extremes(self, name: str, where: tuple[int, float] | None = None) -> list[Extreme]:
+        """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
+
+        where: (switch, its value) on the pieces they are asked for; every piece without it.
+        """
+        if name not in self._extremes:
+            self._extremes[name] = self._find_extremes(name)
+        found = self._extremes[name]
+        return found if where is None else [e for e in found if self.cycle.switches[e.piece, where[0]] == where[1]]
+
+    def _find_extremes(self, name: str) -> list[Extreme]:
+        pieces, u = self.grid()
+        values = self.at(name, pieces, u)
+        size = self.heights(name, values)
+        if not np.all(np.isfinite(size)):
+            return [Extreme(0, 0.0, float("inf"))]
+        left, right = np.empty_like(size), np.empty_like(size)
+        left[1:], right[:-1] = size[:-1], size[1:]
+        first, last = self._ends
+        left[first] = right[last] = -np.inf
+        peaks = np.flatnonzero((size > left) & (size >= right))
+        found = self._refine(name, pieces, u, values, peaks)
+        if self.singular:
+            found += self._spikes(name)
+        return sorted(found, key=lambda extreme: -extreme.height)
+
+    @functools.cached_property
+    def singular(self) -> tuple[float, ...]:
+        """Crank angles, rad, where the mechanism comes very near to a singular position."""
+        return self.model.singular(self.given)
+
+    def _spikes(self, name: str) -> list[Extreme]:
+        """Return the extremes beside singular positions that even samples may miss."""
+
+        def heights(angles: Floats) -> Floats:
+            return self.heights(name, self._at_angles(name, angles))
+
+        found = []
+        for angle in (peak for centre in self.singular for peak in spikes.peaks(heights, centre)):
+            value = float(self._at_angles(name, np.array([angle]))[0])
+            found.append(Extreme(*self.cycle.located(angle), value, signed=name in self.model.signed))
+        return found
+
+    def _at_angles(self, name: str, angles: Floats) -> Floats:
+        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
+        Tally.positions += len(angles)
+        pieces = [self.cycle.located(float(angle))[0] for angle in angles]
+        switches = list(self.cycle.switches[pieces].T)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values = self.model.quantity(maths.numpy(), self.given, name, angles, switches)
+        return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
+
+    @functools.cached_property
+    def _ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Where pieces begin and end in the sampler's own grid."""
+        counts = np.array(self._counts(self.samples))
+        last = np.cumsum(counts) - 1
+        return last - counts + 1, last
+
+    def heights(self, name: str, values: Floats) -> Floats:
+        """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
+        return values if name in self.model.signed else np.abs(values)
+
+    def _refine(
+        self, name: str, pieces: NDArray[np.intp], u: Floats, values: Floats, peaks: NDArray[np.intp]
+    ) -> list[Extreme]:
+        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak."""
+        signed = name in self.model.signed
+        piece, sign = pieces[peaks], np.ones(len(peaks)) if signed else np.sign(values[peaks])
+        sampled = sign * values[peaks]
+        inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
+        step = u[inner + 1] - u[inner]
+        centre = u[inner] + step * _vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
+        step = CLOSER * step
+        centre = _inside(centre, 2 * step)
+        nodes = centre + step * np.arange(-2, 3)[:, None]
+        around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
+        vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
+        refined = sign * self.at(name, piece, vertex)
+        # A level stretch's extreme is its beginning.
+        bent = (around[0] != around[2]) | (around[4] != around[2])
+        better = (refined >= sampled) & bent
+        best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
+        found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
+        return [Extreme(*extreme, signed=signed) for extreme in found]
+
+    def angle(self, extreme: Extreme) -> float:
+        """Return the crank angle of an extreme, rad."""
+        return float(self.cycle.angles(np.array([extreme.piece]), np.array([extreme.u]))[0])
+
+    def peak(self, name: str, where: tuple[int, float] | None = None) -> float:
+        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
+        return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
+
+    def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
+        """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""
+        active = np.flatnonzero(self.cycle.switches[:, integral.load] == 1.0)
+        nodes, weights = gauss()
+        return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
+
+    def mean(self, integral: Integral) -> float:
+        """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
+        if integral.angles:
+            data = [np.asarray(integral.data)]
+            angles = np.asarray(integral.angles)
+            values = self.model.quantity(maths.numpy(), self.given, integral.quantity, angles, data)
+            return float(np.mean(values))
+        pieces, u, weights = self.quadrature(integral)
+        widths = np.diff(self.cycle.starts)[pieces] * weights
+        return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))

@@ -1,0 +1,108 @@
+"""Curves in as few rows as an accuracy asks for: coarse equal steps, and rows added where a column is largest."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from loomopt.cycle import SAME_ANGLE, TURN, Floats
+from loomopt.program import spikes
+
+STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
+"""Equal steps of one turn that are begun with, by accuracy; no stretch between corners gets fewer than an eighth."""
+ROUNDS, ROUNDING = 40, 1e-15
+NEARLY = 0.8
+"""Share of a column's largest magnitude above which another top may turn out higher."""
+LEVEL = 2e-13
+"""Share of a top by which rows beside it may differ on a level."""
+MOST_ROWS = 20_000
+ANGLE = "phi [rad]"
+
+
+def curves(task: Any, scene: Any, design: Mapping[str, float], accuracy: float) -> tuple[dict[str, Floats], float]:
+    """Return the curves (SI), and an estimate of the relative error of each column's largest magnitude.
+
+    task: the job's functions. Around every top rows are added between it and its neighbours, in thirds and at the
+    vertex of their parabola, until what the top may still rise (no more than it stands above them) is small enough.
+    """
+    steps = next(count for least, count in STEPS if accuracy >= least)
+    sampler = task.sampler(scene, design)
+    also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
+    also += [spikes.graded(centre) for centre in sampler.singular]
+    for _ in range(ROUNDS):
+        columns = task.curves(scene, design, steps, np.concatenate(also))
+        added, left = _around_tops(columns, accuracy / 10)
+        if not added or len(columns[ANGLE]) > MOST_ROWS:
+            break
+        also.append(np.array(added))
+    return columns, max(left, ROUNDING)
+
+
+def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:
+    """Return the angles, rad, where rows are missing, and the largest share by which a column's top may still rise."""
+    angles, found, worst = columns[ANGLE], set(), 0.0
+    # The turn closes: a top may stand between the last row and the first.
+    phi = np.concatenate([angles[-1:] - TURN, angles, angles[:1] + TURN])
+    # Neighbours at another angle: both rows of a corner look past each other.
+    order = np.maximum.accumulate(phi)
+    left = np.maximum(np.searchsorted(order, order - SAME_ANGLE, side="left") - 1, 0)
+    right = np.minimum(np.searchsorted(order, order + SAME_ANGLE, side="right"), len(phi) - 1)
+    for name, values in columns.items():
+        sizes = np.abs(np.concatenate([values[-1:], values, values[:1]]))
+        if name == ANGLE or not np.isfinite(sizes).any():
+            continue
+        top = float(np.nanmax(sizes))
+        with np.errstate(invalid="ignore"):
+            inner = (sizes >= sizes[left]) & (sizes >= sizes[right]) & (sizes >= NEARLY * top)
+        tops = [k for k in np.flatnonzero(inner) if 0 < k < len(phi) - 1]
+        for k in tops:
+            rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
+            worst = max(worst, rise)
+            if rise > max(least, ROUNDING):
+                found |= set(_between(phi, sizes, int(k)))
+    return sorted(found), worst
+
+
+def _rise(phi: Floats, sizes: Floats, k: int) -> float:
+    """Return by how much a top at row k may still rise between it and its neighbours on its own side of any corner.
+
+    On a level it cannot. At a corner that the curve rises to, only what its bend leaves; else no more than the top
+    stands above its neighbours.
+    """
+    sides = [side for side in (-1, 1) if phi[k + side] != phi[k] and np.isfinite(sizes[k + side])]
+    same = LEVEL * sizes[k]
+    for side in sides:
+        beyond = k + 2 * side
+        if 0 <= beyond < len(sizes) and max(abs(sizes[k] - sizes[k + side]), abs(sizes[k] - sizes[beyond])) <= same:
+            return 0.0
+    if len(sides) == 1:
+        bent = _bent(phi, sizes, k, sides[0])
+        if bent is not None:
+            return bent
+    return float(sizes[k] - min((sizes[k + side] for side in sides), default=sizes[k]))
+
+
+def _bent(phi: Floats, sizes: Floats, k: int, side: int) -> float | None:
+    """Return what the bend leaves open beside a corner that the curve rises to; None where it does not rise."""
+    near, far = k + side, k + 2 * side
+    if not 0 <= far < len(sizes) or phi[far] == phi[near] or not np.isfinite(sizes[far]):
+        return None
+    width, next_width = abs(phi[near] - phi[k]), abs(phi[far] - phi[near])
+    slope, next_slope = (sizes[k] - sizes[near]) / width, (sizes[near] - sizes[far]) / next_width
+    bend = 2 * (slope - next_slope) / (width + next_width)
+    rises = slope + bend * width / 2 > 0.0 and slope > 0.0
+    return float(abs(bend) * width**2 / 8) if rises else None
+
+
+def _between(phi: Floats, sizes: Floats, k: int) -> list[float]:
+    """Return angles, rad, between row k and its neighbours: thirds, and the vertex of their parabola."""
+    before, after = phi[k] - phi[k - 1], phi[k + 1] - phi[k]
+    found = [phi[k] - share * before for share in (1 / 3, 2 / 3)] if before > 0.0 else []
+    found += [phi[k] + share * after for share in (1 / 3, 2 / 3)] if after > 0.0 else []
+    rise, fall = sizes[k] - sizes[k - 1], sizes[k] - sizes[k + 1]
+    bend = rise * after + fall * before
+    if before > 0.0 and after > 0.0 and bend > 0.0:
+        vertex = phi[k] + (rise * after**2 - fall * before**2) / (2 * bend)
+        width = min(before, after) / 64
+        found += [vertex - width, vertex, vertex + width]
+    return [float(angle % TURN) for angle in found]

@@ -1,0 +1,164 @@
+"""The beat-up model: its figures, its poses, and what it leaves out when numbers or effects are missing."""
+
+import dataclasses
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import loomopt as lo
+from loomopt import maths
+from loomopt.jobs.beatup.design import sampler
+from loomopt.jobs.beatup.model import ASSEMBLY, ASSEMBLY_MARGIN, Beatup
+from loomopt.jobs.beatup.poses import FrontPose
+from loomopt.jobs.beatup.program import model, numbers
+
+BEATUP = lo.load("beatup")
+EVERY = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
+FULL = BEATUP
+for effect in EVERY:
+    FULL = FULL.with_effect(effect)
+DESIGN = {"l1": 0.0305, "l2": 0.083, "l3": 0.15, "l4": 0.166, "m4e": 3.0, "r4e": 0.07}
+PSI_2 = 0.300280
+
+
+def figures(scene, design=None):
+    return lo.evaluate(scene, design).figures
+
+
+def test_q_is_minus_psi_so_that_the_reed_torque_pushes_toward_the_fell():
+    found = model(BEATUP)
+    given = found.given(maths.FLOAT, numbers(BEATUP))
+    pose = found.pose(maths.FLOAT, given, 2.0)
+    assert (pose.q, pose.q1, pose.q2) == (-pose.joints.psi, -pose.joints.psi_1, -pose.joints.psi_2)
+    assert pose.omega == BEATUP.operation["speed"]
+    assert given.values["centres"].psi_front < given.values["centres"].psi_rear
+
+
+def test_without_cloth_inertia_alone_beats_up():
+    """M3 < 0 at front dead centre: the reed has to be held back, it would strike harder than the cloth resists."""
+    assert figures(BEATUP.without_effect("resistance"))["M3_fdc"] == pytest.approx(
+        -0.62 * PSI_2 * (20 * math.pi) ** 2, 1e-5
+    )
+
+
+@pytest.mark.parametrize("scene", [BEATUP, FULL], ids=["the paper's", "every effect"])
+@pytest.mark.parametrize("design", [None, DESIGN], ids=["today", "another"])
+def test_the_figure_at_front_dead_centre_is_the_limit_of_the_curve_from_before(scene, design):
+    sampled = sampler(scene, design or {})
+    piece = sampled.cycle.piece_before(sampled.given.values["beta"])
+    square = sampled.at("M3_square", np.full(1, piece), np.ones(1))[0]
+    if "bearing_friction" not in scene.effects:  # then front dead centre is inside a piece
+        share = (sampled.given.values["beta"] - sampled.cycle.starts[piece]) / np.diff(sampled.cycle.starts)[piece]
+        square = sampled.at("M3_square", np.full(1, piece), np.array([share]))[0]
+    assert sampled.static["M3_fdc"] == pytest.approx(
+        math.copysign(math.sqrt(square), sampled.static["M3_fdc"]), rel=1e-11
+    )
+
+
+def test_the_front_pose_is_the_general_pose_at_front_dead_centre():
+    given = model(FULL).given(maths.FLOAT, numbers(FULL))
+    front, general = FrontPose(given.values), model(FULL).pose(maths.FLOAT, given, given.values["beta"])
+    for name in ("phi", "omega", "q", "q2", "acceleration"):
+        assert getattr(front, name) == pytest.approx(getattr(general, name), rel=1e-13)
+    assert (front.q1, front.velocity, front.omega_dot) == (0, 0, None)
+    assert general.q1 == pytest.approx(0, abs=1e-15)
+
+
+def test_static_figures_are_their_formulas():
+    found = figures(FULL, DESIGN)
+    s = 3.0 * 0.07**2
+    JS = FULL.effects["counterweight_inertia"].JS
+    assert found["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
+    assert found["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
+    centres = sampler(FULL, DESIGN).given.values["centres"]
+    assert found["alpha_fdc"] == pytest.approx(centres.psi_2_front * (20 * math.pi) ** 2, rel=1e-14)
+    assert [found[name] for name in ("swing", "theta", "beta")] == [centres.swing, centres.theta, centres.beta]
+    widths = {"l1": 5, "l2": 25, "l3": 30, "l4": 17, "m4e": 12.4, "r4e": 80}
+    moved = {"l1": -0.5, "l2": 18, "l3": -5, "l4": -1, "m4e": 3.0, "r4e": 70}
+    assert found["change"] == pytest.approx(sum((moved[x] / widths[x]) ** 2 for x in widths), rel=1e-12)
+
+
+def test_the_counterweights_own_inertia_counts_only_with_its_effect():
+    without = figures(FULL.without_effect("counterweight_inertia"), DESIGN)
+    assert figures(FULL, DESIGN)["J4"] - without["J4"] == pytest.approx(0.0106, rel=1e-12)
+    assert figures(FULL, DESIGN)["M3_fdc"] != pytest.approx(without["M3_fdc"], rel=1e-6)
+
+
+def test_the_transmission_angle_is_the_lesser_of_both_ends():
+    values = sampler(BEATUP, DESIGN).static
+    assert figures(BEATUP, DESIGN)["mu_min"] == min(values["mu_near"], values["mu_far"])
+    phi = np.linspace(0, 2 * math.pi, 100_001)
+    l1, l2, l3, l4 = (DESIGN[f"l{k}"] for k in (1, 2, 3, 4))
+    mu = np.arccos((l2**2 + l3**2 - l1**2 - l4**2 + 2 * l1 * l4 * np.cos(phi)) / (2 * l2 * l3))
+    assert figures(BEATUP, DESIGN)["mu_min"] == pytest.approx(np.min(np.minimum(mu, math.pi - mu)), rel=1e-12)
+
+
+@pytest.mark.parametrize("row", ASSEMBLY)
+def test_an_assembly_row_is_zero_where_the_triangle_closes_with_the_margin_only(row):
+    """|r1 − r2|·1.001 ≤ L ≤ (r1 + r2)/1.001 for the distance L of the dyad's ends."""
+    assert ASSEMBLY_MARGIN == 1.001
+    base = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
+    ends = {
+        "assembly: l1 + l4 < l2 + l3": ("l2", 1.001 * (0.031 + 0.167) - 0.155),
+        "assembly: l1 + l2 < l3 + l4": ("l2", (0.167 - 0.031) / 1.001 + 0.155),
+        "assembly: l1 + l3 < l2 + l4": ("l3", (0.167 - 0.031) / 1.001 + 0.065),
+    }
+    name, edge = ends[row]
+    assert ASSEMBLY[row](base) > 0
+    assert ASSEMBLY[row](base | {name: edge}) == pytest.approx(0, abs=1e-15)
+    worse = -1e-3 if row.startswith("assembly: l1 + l4") else 1e-3
+    assert ASSEMBLY[row](base | {name: edge + worse}) < 0
+
+
+def test_s_may_stand_for_the_counterweight():
+    """Solved in s = m4e r4e², the model gives the same torque as from m4e and r4e."""
+    values = numbers(BEATUP) | DESIGN
+    found = model(BEATUP)
+    by_mass = found.given(maths.FLOAT, values)
+    by_s = found.given(maths.FLOAT, {k: v for k, v in values.items() if k != "m4e"} | {"s": 3.0 * 0.07**2})
+    for name in ("peak_torque", "M3_square"):
+        assert found.quantity(maths.FLOAT, by_s, name, 2.0, [0, 0]) == pytest.approx(
+            found.quantity(maths.FLOAT, by_mass, name, 2.0, [0, 0]), rel=1e-15
+        )
+    symbols = {name: ca.SX.sym(name) for name in values if name != "m4e"} | {"s": ca.SX.sym("s")}
+    given = found.given(maths.casadi(), symbols)
+    read = {x.name() for x in ca.symvar(found.quantity(maths.casadi(), given, "peak_torque", ca.SX.sym("phi"), [0, 1]))}
+    assert "s" in read
+    assert not read & {"m4e", "r4e", "m4", "r4"}
+
+
+def test_figures_without_their_numbers_are_undefined_not_invented():
+    bare = BEATUP.without_effect("inertia").set("mechanism", {f"l{k}": f"{x} mm" for k, x in DIMENSIONS.items()})
+    found = figures(bare.set("operation", {"M0": "745 N*m"}))
+    assert {name for name, value in found.items() if value is None} == {
+        *("alpha_fdc", "J4", "r4", "bearing_force", "shaking_force")
+    }
+    assert found["M3_fdc"] == 745.0
+    assert all(math.isfinite(value) for value in found.values() if value is not None)
+
+
+DIMENSIONS = {1: 31, 2: 65, 3: 155, 4: 167}
+
+
+def test_the_mean_over_the_pulse_exists_with_the_pulse_only():
+    assert [each.name for each in model(BEATUP).integrals] == ["pulse_mean_square"]
+    assert model(BEATUP.without_effect("resistance")).integrals == ()
+    assert figures(BEATUP.without_effect("resistance"))["pulse_rms"] is None
+
+
+def test_the_key_tells_structures_apart_and_numbers_not():
+    keys = [model(FULL.without_effect(name)).key for name in FULL.effects]
+    exact = FULL.set("effects.rod_inertia.model", "exact")
+    assert len({model(FULL).key, model(exact).key, *keys}) == len(keys) + 2
+    assert model(FULL.set("operation.M0", "800 N*m").set("effects.inertia.J4", "0.5 kg*m^2")).key == model(FULL).key
+
+
+def test_a_model_is_plain_unchangeable_data():
+    found = model(FULL)
+    assert isinstance(found, Beatup)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.loads = ()
+    assert [load.name for load in found.loads] == [name for name in FULL.effects if name != "centrifugal"]
+    assert found.quantities == ("peak_torque", "bearing_force", "shaking_force")

@@ -1,0 +1,151 @@
+import csv
+import io
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from loomopt.errors import BadInput
+from loomopt.jobs.beatup import drawing as crank_rocker_drawing
+from loomopt.mechanisms import crank_rocker
+from loomopt.picture import shapes
+from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Text
+
+few = settings(max_examples=30, deadline=None, database=None)
+PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167, "m4e": 3.0, "r4e": 0.05}
+
+
+def texts(drawn):
+    return [primitive for primitive in drawn.primitives if isinstance(primitive, Text)]
+
+
+def links(drawn, layer):
+    """Return crank, rod and rocker of a layer as pairs of points."""
+    return [shape.points for shape in drawn.primitives if isinstance(shape, Line) and shape.layer == layer]
+
+
+@st.composite
+def designs(draw):
+    """Crank-rockers from their angles, of any size."""
+    swing = draw(st.floats(math.radians(1), math.radians(80)))
+    theta = draw(st.floats(-0.3, 0.3)) * swing
+    beta = draw(st.floats(math.radians(10), math.radians(85)))
+    size = draw(st.sampled_from([1e-3, 0.167, 1.0, 1e3]))
+    try:
+        found = crank_rocker.synthesise(theta, beta, swing, size)
+    except ValueError:
+        return PAPER
+    return {"l1": found.l1, "l2": found.l2, "l3": found.l3, "l4": found.l4}
+
+
+@pytest.mark.parametrize("layer", ["front dead centre", "rear dead centre"])
+@few
+@given(design=designs())
+def test_links_are_drawn_at_full_scale_and_meet(layer, design):
+    crank, rod, rocker = links(crank_rocker_drawing.linkage(design, ""), layer)
+    scale = 1e3 * design["l4"]
+    lengths = [math.dist(*link) for link in (crank, rod, rocker)]
+    assert lengths == pytest.approx([1e3 * design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * scale)
+    assert crank[0] == rod[0]
+    assert rod[1] == rocker[1]
+    assert crank[1] == (0, 0)
+    assert rocker[0] == (1e3 * design["l4"], 0)
+
+
+def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
+    drawn = crank_rocker_drawing.linkage(PAPER, "")
+    for layer, length in (("front dead centre", 96.0), ("rear dead centre", 34.0)):
+        (b, a), (_, c), _ = links(drawn, layer)
+        assert math.dist(a, c) == pytest.approx(length, rel=1e-12)
+        assert a.x * (c.y - b.y) - a.y * (c.x - b.x) + b.x * c.y - b.y * c.x == pytest.approx(0, abs=1e-10)
+
+
+def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle():
+    drawn = crank_rocker_drawing.linkage(PAPER, "")
+    path = next(p for p in drawn.primitives if isinstance(p, Arc) and p.layer == "paths")
+    assert path.radius == pytest.approx(155.0, rel=1e-14)
+    assert math.degrees(path.end - path.begin) == pytest.approx(23.0875, abs=1e-3)
+    _, (_, c), _ = links(drawn, "front dead centre")
+    assert math.dist(path.centre.towards(path.begin, path.radius), c) < 1e-10
+    circle = next(p for p in drawn.primitives if isinstance(p, Circle) and p.layer == "paths")
+    assert (circle.centre, circle.radius) == ((0, 0), pytest.approx(31.0, rel=1e-14))
+
+
+def test_the_arrow_to_the_fell_points_toward_decreasing_psi():
+    (start, tip), _ = links(crank_rocker_drawing.linkage(PAPER, ""), "notes")
+    angles = [math.atan2(point.y, point.x - 167.0) for point in (start, tip)]
+    assert angles[1] < angles[0]
+
+
+def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
+    shown = " | ".join(text.text for text in texts(crank_rocker_drawing.linkage(PAPER, "Reed")))
+    for part in (
+        "Reed",
+        "l1 = 31",
+        "l2 = 65",
+        "l3 = 155",
+        "l4 = 167",
+        "β = 65.9",
+        "swing = 23.09°",
+        "fell",
+        "θ",
+    ):
+        assert part in shown
+    assert {"A", "B", "C", "D", "B'", "C'"} <= {text.text for text in texts(crank_rocker_drawing.linkage(PAPER, ""))}
+
+
+@few
+@given(design=designs())
+def test_no_two_texts_overlap(design):
+    drawn = crank_rocker_drawing.linkage(
+        design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
+    )
+    boxes = [shapes.text_box(text, drawn.height) for text in texts(drawn)]
+    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
+
+
+@few
+@given(design=designs())
+def test_the_extent_holds_every_joint_and_every_text(design):
+    drawn = crank_rocker_drawing.linkage(design, "title")
+    box = shapes.extent(drawn)
+    points = [point for p in drawn.primitives if isinstance(p, Line) for point in p.points]
+    for text in texts(drawn):
+        room = shapes.text_box(text, drawn.height)
+        points += [(room.left, room.bottom), (room.right, room.top)]
+    assert all(box.left < x < box.right and box.bottom < y < box.top for x, y in points)
+
+
+def test_a_drawing_scales_with_its_machine():
+    large = {name: 1000 * value for name, value in PAPER.items()}
+    small, big = (crank_rocker_drawing.linkage(design, "t") for design in (PAPER, large))
+    assert big.height == pytest.approx(1000 * small.height)
+    for layer in ("frame", "front dead centre", "rear dead centre", "dimensions", "notes"):
+        for one, other in zip(links(small, layer), links(big, layer), strict=True):
+            assert np.array(other) == pytest.approx(1000 * np.array(one), rel=1e-12, abs=1e-9)
+
+
+def test_every_layer_drawn_on_has_a_style():
+    assert {primitive.layer for primitive in crank_rocker_drawing.linkage(PAPER, "t").primitives} <= LAYERS.keys()
+
+
+def test_lengths_that_are_no_crank_rocker_are_refused():
+    for draw in (crank_rocker_drawing.joints_csv, lambda design: crank_rocker_drawing.linkage(design, "t")):
+        with pytest.raises(BadInput, match=r"l1 \+ l4 < l2 \+ l3 fails"):
+            draw({"l1": 0.1, "l2": 0.02, "l3": 0.02, "l4": 0.1})
+
+
+def test_joints_are_written_in_mm_with_every_digit():
+    rows = list(csv.DictReader(io.StringIO(crank_rocker_drawing.joints_csv(PAPER))))
+    at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
+    assert list(at) == ["A", "D", "B", "C", "B'", "C'"]
+    for b, c in (("B", "C"), ("B'", "C'")):
+        found = [math.dist(at["A"], at[b]), math.dist(at[b], at[c]), math.dist(at["D"], at[c])]
+        assert found == pytest.approx([31, 65, 155], rel=1e-13)
+
+
+def test_control_characters_are_taken_out_of_text():
+    assert shapes.plain("a\n\x1b[31mβ\x00") == "a  [31mβ "

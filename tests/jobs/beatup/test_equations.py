@@ -1,0 +1,212 @@
+import itertools
+import math
+import re
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from loomopt import balance, cycle
+from loomopt.effects import BEATUP
+from loomopt.jobs.beatup import equations as beatup_equations
+from loomopt.jobs.beatup.model import Beatup
+from loomopt.maths import FLOAT
+from loomopt.schema import Load
+
+SPEED = 62.83185307179586
+NUMBERS = {"l1": 0.031, "l2": 0.066, "l3": 0.155, "l4": 0.167, "today.l2": 0.065, "speed": SPEED, "M0": 745.0}
+NUMBERS |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}
+OWN = {
+    "inertia": {"J4": 0.62},
+    "resistance": {"pulse": 0.52},
+    "rocker_inertia": {"J3": 0.05},
+    "counterweight_inertia": {"JS": 0.01},
+    "rod_inertia": {"m2": 4.0, "s2": 0.03, "JS2": 0.004},
+    "gravity": {"tilt": 0.3, "offset": 0.1},
+    "bearing_friction": {"coulomb": 5.0, "viscous": 0.7},
+    "centrifugal": {},
+}
+SYMBOLS = {
+    "inertia": {"J4", "m4e", "r4e"},
+    "resistance": {"M0", "delta", "beta"},
+    "rocker_inertia": {"J3"},
+    "counterweight_inertia": {"JS"},
+    "rod_inertia": {"m2", "s2", "JS2"},
+    "gravity": {"m4", "r4", "tilt", "chi"},
+    "bearing_friction": {"T_c", "c"},
+}
+
+
+def model(*names, rod="exact"):
+    effects = [BEATUP[name] for name in names]
+    loads = tuple(effect for effect in effects if isinstance(effect, Load))
+    options = (("rod_inertia", "model", rod),) if "rod_inertia" in names else ()
+    return Beatup(loads, tuple(e for e in effects if not isinstance(e, Load)), options, frozenset(NUMBERS))
+
+
+def words(found):
+    """Return every name that stands in the texts."""
+    return set(re.findall(r"[A-Za-z]\w*", " ".join(equation.text for equation in found)))
+
+
+def numbers(given, pose, phi):
+    """Return the value of each symbol of a printed equation."""
+    rod = pose.joints.dyad.link1
+    named = {"phi": phi, "omega": SPEED, "q": pose.q, "q'": pose.q1, "q''": pose.q2, "psi": pose.joints.psi}
+    named |= {"psi'": pose.joints.psi_1, "psi''": pose.joints.psi_2, "gamma": math.atan2(rod.y, rod.x)}
+    named |= {"gamma'": pose.joints.rod_1, "gamma''": pose.joints.rod_2, "beta": given.values["beta"]}
+    named |= {"beta_r": given.values["beta_r"], "l2_today": NUMBERS["today.l2"]} | NUMBERS
+    for own in OWN.values():
+        named |= {
+            {"pulse": "delta", "offset": "chi", "coulomb": "T_c", "viscous": "c"}.get(k, k): v for k, v in own.items()
+        }
+    return named
+
+
+def value(expression, named):
+    exact = {symbol: sp.Rational(float(named[symbol.name])) for symbol in expression.free_symbols}
+    return float(expression.subs(exact).evalf(30))
+
+
+def setting(found, phi):
+    """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
+    values = NUMBERS | {f"{name}.{key}": number for name, own in OWN.items() for key, number in own.items()}
+    given = found.given(FLOAT, {k: v for k, v in values.items() if "." not in k or k.split(".")[0] in (*OWN, "today")})
+    split = cycle.split(found.loads, found.corners(FLOAT, given))
+    turned = split.starts[0] + (phi - split.starts[0]) % cycle.TURN
+    switches = split.switches[np.searchsorted(split.starts, turned, side="right") - 1]
+    return given, found.pose(FLOAT, given, phi), switches
+
+
+@pytest.mark.parametrize("rod", ["lumped", "exact"])
+@pytest.mark.parametrize("phi", [0.3, 1.0, 1.15, 1.3, 2.0, 4.0, 4.5, 6.0])
+def test_printed_terms_are_the_balance(rod, phi):
+    found = model(*OWN, rod=rod)
+    given, pose, switches = setting(found, phi)
+    named, symbolic = numbers(given, pose, phi), beatup_equations.terms(found)
+    for load, term in balance.terms(FLOAT, found.loads, pose, given, switches):
+        assert value(symbolic[load.name], named) == pytest.approx(term, rel=1e-12, abs=1e-12)
+    output = sum(symbolic[load.name] for load in found.loads if load.acts == "output")
+    drive = sum(symbolic[load.name] for load in found.loads if load.acts == "drive")
+    arguments = (FLOAT, found.loads, pose, given, switches)
+    assert value(output, named) == pytest.approx(balance.output_force(*arguments), rel=1e-12)
+    torque = output * sp.Symbol("q'", real=True) + drive
+    assert value(torque, named) == pytest.approx(balance.crank_torque(*arguments), rel=1e-12)
+
+
+def plain(name):
+    """Return a name without primes, as Python can read it."""
+    return name.replace("''", "_2").replace("'", "_1")
+
+
+def read(text):
+    """Read a printed expression back."""
+    names = {name: sp.Symbol(name) for name in ("beta", "gamma")}
+    return sp.parse_expr(plain(text).replace("^", "**"), local_dict=names)
+
+
+@pytest.mark.parametrize("name", ["loop closure", "rates", "second rates"])
+@pytest.mark.parametrize("phi", [0.3, 2.0, 5.0])
+def test_printed_geometry_holds_for_the_mechanism(name, phi):
+    found = model("inertia")
+    given, pose, _ = setting(found, phi)
+    named = {plain(k): v for k, v in numbers(given, pose, phi).items()}
+    chosen = [equation.text for equation in beatup_equations.equations(found) if equation.name == name]
+    assert len(chosen) == 2
+    for text in chosen:
+        left, right = (read(side) for side in text.split(" = "))
+        size = named["l4"] * max(1, abs(named["gamma_2"]), abs(named["psi_2"]))
+        assert value(left - right, named) == pytest.approx(0, abs=1e-13 * size)
+
+
+def test_printed_dead_centres_are_the_mechanisms():
+    found = model("inertia")
+    given, pose, _ = setting(found, 1.0)
+    named = numbers(given, pose, 1.0)
+    expected = {"beta": given.values["beta"], "beta_r": given.values["beta_r"]}
+    expected["psi''_FDC"] = given.values["centres"].psi_2_front
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
+    for name, number in expected.items():
+        assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-13)
+
+
+def test_the_output_is_minus_psi():
+    found = model("inertia")
+    _, pose, _ = setting(found, 1.0)
+    assert "q = -psi" in [equation.text for equation in beatup_equations.equations(found)]
+    assert pose.q == -pose.joints.psi
+
+
+def test_printed_checks_are_the_effects():
+    found = model("inertia", "centrifugal")
+    given, pose, _ = setting(found, 2.0)
+    named = {plain(k): v for k, v in numbers(given, pose, 2.0).items()}
+    shown = dict(equation.text.split(" = ") for equation in beatup_equations.equations(found))
+    for check in found.checks:
+        for name, quantity in check.quantities.items():
+            number = quantity(FLOAT, pose, given.values, given.own[check.name])
+            assert value(read(shown[name]), named) == pytest.approx(number, rel=1e-12)
+
+
+@pytest.mark.parametrize("absent", [set(pair) for n in (1, 2) for pair in itertools.combinations(SYMBOLS, n)])
+def test_an_absent_effect_leaves_no_symbol_and_a_present_one_its_term(absent):
+    present = [name for name in SYMBOLS if name not in absent]
+    found = beatup_equations.equations(model(*present))
+    kept = {"beta", "r4e", "m4e"}.union(*(SYMBOLS[name] for name in present))
+    forbidden = set().union(*(SYMBOLS[name] | {f"M_{name}"} for name in absent)) - kept
+    assert not words(found) & forbidden
+    assert {equation.name for equation in found} & SYMBOLS.keys() == set(present)
+    for name in present:
+        assert SYMBOLS[name] | {f"M_{name}"} <= words(found)
+
+
+def test_a_scene_without_counterweight_terms_does_not_print_them():
+    assert not words(beatup_equations.equations(model("resistance"))) & {"m4e", "r4e", "omega", "J4"}
+
+
+@pytest.mark.parametrize(
+    ("names", "lines"),
+    [
+        (("inertia", "resistance"), {"M3 = M_inertia + M_resistance", "Md = M3*q'"}),
+        (("inertia", "rod_inertia"), {"M3 = M_inertia", "Md = M3*q' + M_rod_inertia"}),
+        (("rod_inertia",), {"Md = M_rod_inertia"}),
+        ((), set()),
+    ],
+)
+def test_balance_and_crank_torque_list_what_is_on(names, lines):
+    found = beatup_equations.equations(model(*names))
+    shown = {equation.text for equation in found if equation.name in ("balance", "crank torque")}
+    assert shown == lines
+
+
+def test_a_term_with_corners_says_where_each_formula_holds():
+    shown = {
+        equation.name: equation for equation in beatup_equations.equations(model("resistance", "bearing_friction"))
+    }
+    pulse = "M_resistance = M0*cos(pi*(-beta + phi)/delta) for beta - delta/2 <= phi <= beta + delta/2, else 0"
+    assert shown["resistance"].text == pulse
+    assert r"\begin{cases}" in shown["resistance"].latex
+    assert "for beta <= phi <= beta_r + pi, else T_c" in shown["bearing_friction"].text
+
+
+def test_all_effects_together_stay_short_and_their_symbols_apart():
+    found = beatup_equations.equations(model(*BEATUP))
+    assert sum(len(equation.name) + len(equation.text) + 2 for equation in found) < 4000
+    keys = [key for effect in BEATUP.values() for key in effect.own.model_fields]
+    assert len(keys) == len(set(keys))
+
+
+def test_latex_names_symbols_the_way_papers_do():
+    latex = " ".join(equation.latex for equation in beatup_equations.equations(model(*BEATUP)))
+    for name in (
+        r"M_{3} ",
+        r"J_{4} ",
+        r"m_{4e} ",
+        r"T_{c}",
+        r"\beta_{r}",
+        r"q''",
+        r"l_{2, \mathrm{today}}",
+        r"\gamma'",
+    ):
+        assert name in latex
+    assert latex.count("{") == latex.count("}")

@@ -1,0 +1,164 @@
+import csv
+import dataclasses
+import io
+import itertools
+import math
+
+import ezdxf
+import numpy as np
+import pytest
+
+from loomopt import maths
+from loomopt.errors import BadInput
+from loomopt.jobs.rapier import drawing as rapier_drawing
+from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, PRIMES, REAR
+from loomopt.mechanisms import rapier_drive
+from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.picture import shapes
+from loomopt.picture.shapes import LAYERS, Circle, Line, Text
+from loomopt.views import dxf, figure, svg
+
+
+def paper():
+    """Return the drive that [Hong17] prints, by the kernel's closed-form construction."""
+    printed = {"l1": 0.076385, "l2": 0.275705, "l3": 0.684, "l71": 0.773, "l3p": 0.180, "l4": 0.012, "l6": 0.185}
+    printed |= {"phi30": math.radians(80.48), "alpha": math.radians(30), "i1": 300 / 18, "i2": 1.0, "wheel": 0.240}
+    given = Dimensions(**printed, l5=math.nan, C0x=math.nan, C0y=math.nan, phi40=math.nan)
+    swing = Sley(maths.FLOAT, given).centres.swing
+    layout = rapier_drive.construct(maths.FLOAT, given, given.phi30 - swing, math.radians(24.35))
+    found = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - given.l4, "phi40": layout.phi40}
+    return dataclasses.asdict(given) | found
+
+
+PAPER = paper()
+SIZES = ("l1", "l2", "l3", "l3p", "l4", "l5", "l6")
+WIDER = PAPER | {"l4": 0.03, "l6": 0.2, "alpha": math.radians(40), "phi40": PAPER["phi40"] + 0.2}
+"""Another drive that assembles all round."""
+
+
+def texts(drawn):
+    return [primitive for primitive in drawn.primitives if isinstance(primitive, Text)]
+
+
+def links(drawn, layer):
+    """Return the links of a position as pairs of points."""
+    return [p.points for p in drawn.primitives if isinstance(p, Line) and p.layer == layer]
+
+
+def travel(design, phi1):
+    """Return the rapier's travel, m, and its derivative at crank angles."""
+    d = Dimensions(*(design[field.name] for field in dataclasses.fields(Dimensions)))
+    stand = Sley(maths.numpy(), d).stand
+    front = Pose(maths.numpy(), d, stand, np.array(0.0)).relative
+    pose = Pose(maths.numpy(), d, stand, phi1)
+    return d.travel * pose.phi63(front), d.travel * pose.phi63_1
+
+
+@pytest.mark.parametrize("layer", [FRONT, REAR, OVER])
+@pytest.mark.parametrize("design", [PAPER, WIDER])
+def test_links_are_drawn_at_full_scale_and_meet(design, layer):
+    drawn = links(rapier_drawing.linkage(design, ""), layer)
+    assert [math.dist(*link) for link in drawn] == pytest.approx([1e3 * design[name] for name in SIZES], rel=1e-11)
+    at = {name: point for ends, link in zip(LINKS, drawn, strict=True) for name, point in zip(ends, link, strict=True)}
+    for ends, link in zip(LINKS, drawn, strict=True):
+        assert [at[name] for name in ends] == list(link)
+    assert at["B0"] == (0, 0)
+    assert math.dist(at["A0"], at["B0"]) == pytest.approx(1e3 * design["l71"], rel=1e-12)
+    assert at["C0"] == pytest.approx((1e3 * design["C0x"], 1e3 * design["C0y"]), rel=1e-12)
+
+
+def test_crank_and_rod_are_in_line_in_both_dead_centres():
+    for layer, length in ((FRONT, 76.385 + 275.705), (REAR, 275.705 - 76.385)):
+        (a0, _), (_, b1), *_ = links(rapier_drawing.linkage(PAPER, ""), layer)
+        assert math.dist(a0, b1) == pytest.approx(length, rel=1e-10)
+
+
+@pytest.mark.parametrize("design", [PAPER, WIDER])
+def test_the_hand_over_is_where_the_travel_is_greatest(design):
+    found = rapier_drawing.positions(design)
+    S, _ = travel(design, np.linspace(0, 2 * np.pi, 100_001))
+    at, rate = travel(design, np.array(found.phi1[OVER]))
+    assert abs(rate) < 1e-12
+    assert 0 <= at - S.max() < 1e-8
+    assert found.phi63 * found.dimensions.travel == pytest.approx(float(at), rel=1e-12)
+
+
+def test_labels_carry_lengths_angles_the_stroke_and_the_three_positions():
+    drawn = rapier_drawing.linkage(PAPER, "Rapier")
+    shown = [text.text for text in texts(drawn)]
+    for part in ("Rapier", "l1 = 76.385", "l2 = 275.705", "l3 = 684", "l71 = 773", "l3p = 180", "l4 = 12", "l6 = 185"):
+        assert part in shown
+    assert {"l5 = 495.065", "α = 30.00°", "swing = 13.01°", "φ63 max = 24.33°", "A0", "B0", "C0", "fell"} <= set(shown)
+    legend = " | ".join(shown)
+    assert "stroke = i1 i2 wheel/2 φ63 max = 849.23" in legend
+    assert "front dead centre, crank at 0.00°" in legend
+    assert "rear dead centre, crank at 185.58°" in legend  # K = 174.42/185.58 as [Hong17] prints, 0.94
+    assert "hand-over, crank at 182.53°" in legend
+    names = {name for text in shown for name in text.split(", ")}
+    assert {f"{joint}{prime}" for joint in ("A", "B1", "B2", "C", "D") for prime in PRIMES.values()} <= names
+
+
+def test_both_cranks_have_their_circles_and_d_its_path_through_every_position():
+    drawn = rapier_drawing.linkage(WIDER, "")
+    circles = [p.radius for p in drawn.primitives if isinstance(p, Circle) and p.layer == "paths"]
+    assert circles == pytest.approx([76.385, 30], rel=1e-12)
+    (path,) = [p for p in drawn.primitives if isinstance(p, Line) and p.closed]
+    for layer in PRIMES:
+        *_, (_, d) = links(drawn, layer)
+        assert min(math.dist(d, point) for point in path.points) < 1.5
+
+
+@pytest.mark.parametrize("design", [PAPER, WIDER])
+def test_no_two_texts_overlap_and_all_stand_on_the_sheet(design):
+    drawn = rapier_drawing.linkage(
+        design, "The rapier drive, drawn with a rather long title that runs over two lines " * 2
+    )
+    boxes = [shapes.text_box(text, drawn.height) for text in texts(drawn)]
+    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
+    sheet = shapes.extent(drawn)
+    assert all(sheet.left < box.left and box.right < sheet.right for box in boxes)
+    assert {primitive.layer for primitive in drawn.primitives} <= LAYERS.keys()
+
+
+def test_joints_are_written_in_mm_with_every_digit():
+    rows = list(csv.DictReader(io.StringIO(rapier_drawing.joints_csv(PAPER))))
+    at = {row["joint"]: (float(row["x [mm]"]), float(row["y [mm]"])) for row in rows}
+    assert len(at) == len(rows) == 3 + 3 * 5
+    for position, prime in PRIMES.items():
+        assert {row["joint"] for row in rows if row["position"] == position} >= {f"A{prime}", f"D{prime}"}
+        for (one, other), name in zip(LINKS, SIZES, strict=True):
+            ends = [at[joint if joint in at and joint.endswith("0") else joint + prime] for joint in (one, other)]
+            assert math.dist(*ends) == pytest.approx(1e3 * PAPER[name], rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"l1": 0.5}, "fails"),
+        ({"l5": 0.3}, r"farther apart than l5 \+ l6"),
+        ({"l5": 0.9}, "closer than l5 and l6 differ"),
+    ],
+)
+def test_a_drive_that_does_not_assemble_is_refused(change, reason):
+    for draw in (rapier_drawing.joints_csv, lambda design: rapier_drawing.linkage(design, "")):
+        with pytest.raises(BadInput, match=reason):
+            draw(PAPER | change)
+
+
+def test_a_refused_sley_is_named_by_its_own_lengths():
+    with pytest.raises(BadInput, match=r"l1 \+ l71 < l2 \+ l3"):
+        rapier_drawing.linkage(PAPER | {"l1": 0.2}, "")
+
+
+def test_svg_dxf_and_png_hold_the_drive(tmp_path):
+    drawn = rapier_drawing.linkage(PAPER, "Rapier")
+    assert 'data-layer="hand-over"' in svg.render(drawn)
+    dxf.write(drawn, tmp_path / "a.dxf")
+    document = ezdxf.readfile(tmp_path / "a.dxf")
+    assert not document.audit().errors
+    for layer in PRIMES:
+        lines = document.modelspace().query(f'LINE[layer=="{layer}"]')
+        lengths = [line.dxf.start.distance(line.dxf.end) for line in lines]
+        assert lengths == pytest.approx([1e3 * PAPER[name] for name in SIZES], rel=0, abs=1e-8)
+    figure.draw(drawn, tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
