@@ -1,23 +1,22 @@
 """What a solve is asked for, checked before anything is computed."""
 
-from typing import Any
-
 from loomopt.errors import BadInput
+from loomopt.scenes import Scene
 
 ACCURACY = 1e-8
 TIGHTEST = 1e-11
 
 
-def target_name(scene: Any, target: str | None) -> str:
+def target_name(scene: Scene, target: str | None) -> str:
     """Return the target's name, the job's default without one."""
-    name = target or scene.job.default_target
-    if name not in scene.job.targets:
+    name = target or scene.schema.default_target
+    if name not in scene.schema.targets:
         raise BadInput(
-            f"job {scene.job.name} has no target {name}",
+            f"job {scene.job} has no target {name}",
             file=scene.origin,
             key="--target",
             value=name,
-            allowed=", ".join(scene.job.targets),
+            allowed=", ".join(scene.schema.targets),
             remedy="Choose one of them.",
         )
     return name

@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.program.program import Integral, Program
+from loomopt.cycle import Where
+from loomopt.program.model import Integral
+from loomopt.program.program import Program
+from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler, Tally
 
 MOST_BOXES = 20_000
@@ -20,7 +23,7 @@ STRIPS = 2048
 """Boxes of one piece over which a mean is enclosed."""
 
 
-CycleRow = tuple[str, float, tuple[int, float] | None]
+CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""
 
 
@@ -33,25 +36,18 @@ class Bound:
     angle: float | None = None
 
 
-class Boxes:
-    """One design, ready to be bounded: its numbers as balls."""
+class Boxes(Reading):
+    """One design read in balls, ready to be bounded."""
 
     def __init__(self, sampler: Sampler) -> None:
-        self.sampler, self.model = sampler, sampler.model
-        system = maths.balls()
-        self.maths = system
+        system, model = maths.balls(), sampler.model
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
-        self.given = self.model.given(system, exact)
-        corners = [corner for of_load in self.model.corners(system, self.given) for corner in of_load]
-        turns = [2 * system.pi * turn + corners[index] for index, turn in sampler.cycle.order]
-        self.starts = [*turns, turns[0] + 2 * system.pi] if turns else [system.number(0.0), 2 * system.pi]
+        super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
 
-    def bound(self, name: str, sign: float, limit: float, where: tuple[int, float] | None = None) -> Bound:
+    def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> Bound:
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
-        cycle, used = self.sampler.cycle, 0
-        for piece in range(cycle.pieces):
-            if where and cycle.switches[piece, where[0]] != where[1]:
-                continue
+        cycle, used = self.cycle, 0
+        for piece in map(int, np.flatnonzero(cycle.on(where))):
             boxes = [(0.0, 1.0)]
             while boxes:
                 low, high = boxes.pop()
@@ -69,13 +65,15 @@ class Boxes:
         return Bound("proven" if used else "undecided", used)
 
     def mean(self, integral: Integral) -> Any:
-        """Return a ball around an integral's mean over the pieces where its load's switch is 1.
+        """Return a ball around an integral's mean over its pieces.
 
         On each box the Taylor polynomial is integrated, what is left of it enclosed.
         """
-        cycle, half = self.sampler.cycle, 0.5 / STRIPS
+        if integral.angles:
+            return super().mean(integral)
+        half = 0.5 / STRIPS
         total, width = self.maths.number(0.0), self.maths.number(0.0)
-        for piece in np.flatnonzero(cycle.switches[:, integral.load] == 1.0):
+        for piece in np.flatnonzero(self.cycle.on(integral.where)):
             length = self.starts[piece + 1] - self.starts[piece]
             width = width + length
             for strip in range(STRIPS):
@@ -108,8 +106,8 @@ class Boxes:
         u = maths.ball_series(centre, half)
         begin, end = self.starts[piece : piece + 2]
         angle = begin + (end - begin) * u
-        switches = [float(switch) for switch in self.sampler.cycle.switches[piece]]
-        value = self.model.quantity(self.maths, self.given, name, angle, switches)
+        switch = {of: float(value) for of, value in self.cycle.switch(piece).items()}
+        value = self.quantity(name, angle, switch)
         return maths.ball_series(0.0, 0.0) * 0 + value
 
 
@@ -132,7 +130,7 @@ def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
 
 def cycle_rows(program: Program) -> list[CycleRow]:
     """Return each whole-cycle quantity of a program that counts, with its natural size and the pieces it counts on."""
-    found: list[CycleRow] = [(o.row, o.scale, None) for o in program.objectives if o.form == "peak"]
+    found: list[CycleRow] = [(row, o.scale, None) for o in program.objectives if o.form == "peak" for row in o.rows]
     found += [(limit.row, limit.scale, limit.where) for limit in program.limits if limit.family == "cycle"]
     return list(dict.fromkeys(found))
 
@@ -142,9 +140,7 @@ def between_points(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> f
     pieces, u = sampler.grid(points)
     worst = 0.0
     for name, scale, where in rows:
-        on = np.ones(len(u), dtype=bool)
-        if where:
-            on = sampler.cycle.switches[pieces, where[0]] == where[1]
+        on = sampler.cycle.on(where)[pieces]
         highest = float(sampler.heights(name, sampler.at(name, pieces[on], u[on])).max(initial=-np.inf))
         worst = max(worst, (highest - sampler.peak(name, where)) / scale)
     return worst

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 from loomopt.quantities import show
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
 
 FARTHEST = 4
@@ -12,10 +12,11 @@ FARTHEST = 4
 SAME = 1e-9
 """Share of an objective by which two sizes are equally good."""
 
-Solve = Callable[[Any], Solution]
+Solve = Callable[[Scene], Solution]
+Tried = tuple[float, Solution]
 
 
-def fitted(scene: Any, ideal: Solution, name: str, sizes: Sequence[float], solve: Solve) -> Solution:
+def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], solve: Solve) -> Solution:
     """Return the best optimum with `name` at one of `sizes` (SI, ascending), `ideal` itself where it is one already.
 
     solve(scene): the answer of a changed scene. On either side the nearest size with an admissible design is enough;
@@ -43,7 +44,7 @@ def fitted(scene: Any, ideal: Solution, name: str, sizes: Sequence[float], solve
     return replace(best, message=f"{best.message} {explanation}", explanation=explanation)
 
 
-def _until_admissible(scene: Any, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[tuple[float, Solution]]:
+def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[Tried]:
     """Yield sizes with their answers, ending with the first that is optimal."""
     bound = scene.bounds[name]
     for _, size in zip(range(FARTHEST), sizes, strict=False):
@@ -58,7 +59,7 @@ def _until_admissible(scene: Any, name: str, sizes: Iterator[float], solve: Solv
 def _better(one: Solution, other: Solution) -> bool:
     """Say whether one answer's objectives are less, level by level."""
     for level in one.certificate.levels if one.certificate else ():
-        a, b = one.figures[level.objective] or 0.0, other.figures[level.objective] or 0.0
+        a, b = one.figures.get(level.objective) or 0.0, other.figures.get(level.objective) or 0.0
         if abs(a - b) > SAME * max(abs(a), abs(b)):
             return a < b
     return False

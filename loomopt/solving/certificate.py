@@ -16,7 +16,6 @@ from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact, Row
-from loomopt.solving.excess import excesses
 from loomopt.solving.nnls import nnls
 from loomopt.solving.prices import priced
 from loomopt.solving.second_order import Lagrangian, least_on_cone
@@ -47,13 +46,19 @@ def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certif
         return Certificate(False, (reason,), (), math.inf, math.inf, False, False)
 
 
+def _sized(sampler: Sampler, limit: Limit) -> float:
+    """Return how far a limit is exceeded, in its natural size; an equality how far it is missed."""
+    excess = sampler.excess(limit)
+    return abs(excess) if limit.sign == 0 else excess
+
+
 class _Trial:
     """One design before the court: rows, gradients, and what the levels have settled so far."""
 
     def __init__(self, program: Program, x: dict[str, float], sampler: Sampler, settings: Settings) -> None:
         self.program, self.x, self.sampler, self.accuracy = program, x, sampler, settings.accuracy
         self.checked = settings.checked
-        self.excess = excesses(program, sampler)
+        self.excess = {k: _sized(sampler, limit) for k, limit in enumerate(program.limits)}
         self.limits = [row for k, limit in enumerate(program.limits) for row in self._limit_rows(k, limit)]
         self.pieces = [self._pieces(objective) for objective in program.objectives]
         self.rows = self.limits + [row for pieces in self.pieces for row in pieces]
@@ -72,7 +77,7 @@ class _Trial:
         """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
         if limit.sign != 0 and self.excess[k] < -ACTIVE:
             return []
-        if limit.weight and self.sampler.static[limit.weight] == 0.0:
+        if limit.weight and self.sampler.single(limit.weight) == 0.0:
             # Where the weight vanishes it can still grow, to second order: the limit keeps the row from below only.
             limit = replace(limit, sign=-1)
             return [Row(limit.name, limit.scale, 1.0, limit=limit, place=k)] if self.program.limits[k].sign <= 0 else []
@@ -87,7 +92,7 @@ class _Trial:
         if objective.form == "value":
             return [Row(objective.figure, objective.scale, 1.0, objective=objective)]
         if objective.form == "magnitude":
-            value = self.sampler.static[objective.row]
+            value = self.sampler.single(objective.row)
             signs = (1.0, -1.0) if abs(value) <= FEASIBILITY * objective.scale else (float(np.sign(value)),)
             return [Row(objective.figure, objective.scale, sign, objective=objective) for sign in signs]
         found = self.sampler.extremes(objective.row)
@@ -284,9 +289,7 @@ class _Trial:
             return (row.node.height - (row.limit.bound if row.limit else 0.0)) / row.scale
         if row.limit is None:
             return 0.0
-        values = self.sampler.given.values
-        values = values if row.limit.family == "variable" else {**values, **self.sampler.figures}
-        return float(row.limit.residual(values, row.limit.value)) / row.scale
+        return self.sampler.excess(row.limit)
 
     def _correct(self, back: Floats, directions: Floats, bends: Floats, multipliers: Floats) -> None:
         """Keep Newton's step: back onto the binding rows, and along curved directions (variables, k) down the slope.

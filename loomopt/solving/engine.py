@@ -7,11 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from loomopt.jobs.tasks import TASKS, Task
+from loomopt.jobs import registry
+from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
 from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
 from loomopt.program.program import Objective, Program
 from loomopt.program.sampling import Sampler, Tally
+from loomopt.scenes import Scene
 from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
@@ -32,19 +34,19 @@ CORRECTIONS, PRECISE = 4, 1e-9
 STRONGER, STRONGEST_PENALTY = 100.0, 1e7
 
 
-def evaluate(scene: Any, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
+def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI; today's without one), nothing optimised.
 
     Raises BadInput for a design that does not assemble.
     """
-    task = TASKS[scene.job.name]
-    full = {**task.today(scene), **(design or {})}
-    program = task.program(scene, target or scene.job.default_target)
-    return report.evaluation(scene, task, program, full)
+    job = registry.of(scene)
+    full = {**job.today(scene), **(design or {})}
+    program = job.program(scene, target or scene.schema.default_target)
+    return report.evaluation(scene, job, program, full)
 
 
 def solve(
-    scene: Any,
+    scene: Scene,
     target: str | None = None,
     *,
     accuracy: float = ACCURACY,
@@ -65,16 +67,16 @@ def solve(
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     began, evaluated = time.perf_counter(), Tally.positions
-    task, target = TASKS[scene.job.name], target_name(scene, target)
-    task.demand(scene, target)
+    job, target = registry.of(scene), target_name(scene, target)
+    job.demand(scene, target)
     check_numbers(accuracy, starts)
     imported = _import_solver()
-    program = task.program(scene, target)
-    search = _Search(scene, task, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
+    program = job.program(scene, target)
+    search = _Search(scene, job, program, Settings(accuracy, callback=_callback(on_iteration)), seed)
     same = near is not None and near.point is not None and near.point.structure == program.structure
     search.run(starts, near.point if near and same else None, on_start)
     answer = search.answer(target)
-    for name, sizes in task.sizes(scene).items() if answer.status == "optimal" else ():
+    for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
     answer = proven(scene, target, answer) if prove and answer.certificate else answer
@@ -106,8 +108,8 @@ def _callback(on_iteration: Callable[[int], None] | None) -> Any:
 class _Search:
     """The hunt for the best certified design, from one start or many."""
 
-    def __init__(self, scene: Any, task: Task, program: Program, settings: Settings, seed: int) -> None:
-        self.scene, self.task, self.program, self.settings, self.seed = scene, task, program, settings, seed
+    def __init__(self, scene: Scene, job: Job, program: Program, settings: Settings, seed: int) -> None:
+        self.scene, self.job, self.program, self.settings, self.seed = scene, job, program, settings, seed
         self.points: list[Point] = []
         self.built, self.spent, self.certified = 0.0, 0.0, 0.0
         self.best: Point | None = None
@@ -195,11 +197,9 @@ class _Search:
 
     def _judged(self, x: Mapping[str, float]) -> tuple[dict[str, float], Certificate]:
         """Return x (SI) after the silent levels, and its certificate."""
-        task, program = self.task, self.program
-        x, settled = settle(
-            program, task.tidy(program, x), task.moves(program), lambda move, at: task.wish(self.scene, move, at)
-        )
-        exact = task.values(program, task.design(program, x))
+        job, program = self.job, self.program
+        x, settled = settle(program, job.tidy(program, x))
+        exact = job.values(program, job.design(program, x))
         return x, replace(certify(program, exact, self.settings.accuracy), settled=settled)
 
     def _corrected(self, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:
@@ -220,12 +220,12 @@ class _Search:
 
     def answer(self, target: str) -> Solution:
         """Return the solution, or the reason there is none."""
-        scene, task, program = self.scene, self.task, self.program
+        scene, job, program = self.scene, self.job, self.program
         solver = {"status": "Not_Assembled", "iterations": 0, "starts": len(self.points), "starts_at_best": 0}
         solver["accuracy"] = self.settings.accuracy
-        before = report.evaluation(scene, task, program, task.today(scene))
+        before = report.evaluation(scene, job, program, job.today(scene))
         if self.best is None:
-            tried = [*exchange.starts(program, MORE_STARTS, self.seed), task.values(program, task.today(scene))]
+            tried = [*exchange.starts(program, MORE_STARTS, self.seed), job.values(program, job.today(scene))]
             from loomopt.solving.elastic import clash
 
             began = time.perf_counter()
@@ -238,18 +238,18 @@ class _Search:
             if self.points:
                 solver["status"] = self.points[0].status
                 solver["iterations"] = sum(point.iterations for point in self.points)
-            design = task.design(program, found.x) if found.x else task.today(scene)
-            here = report.evaluation(scene, task, program, design)
-            return report.without_optimum(target, here, found, solver, before, task.explain(scene, found.limits))
+            design = job.design(program, found.x) if found.x else job.today(scene)
+            here = report.evaluation(scene, job, program, design)
+            return report.without_optimum(target, here, found, solver, before, job.explain(scene, found.limits))
         same = [p for p in self.points if p.reached and self._compare(p, self.best) == 0]
         solver |= {
             "status": self.best.status,
             "iterations": self.best.iterations,
             "starts_at_best": len(same),
         }
-        here = report.evaluation(scene, task, program, task.design(program, self.x))
+        here = report.evaluation(scene, job, program, job.design(program, self.x))
         assert self.certificate is not None
-        answer = report.with_optimum(scene, target, here, self.certificate, solver, before)
+        answer = report.with_optimum(job, scene, target, here, self.certificate, solver, before)
         return replace(answer, point=self.best, optima=self._optima())
 
     def _optima(self) -> tuple[tuple[Mapping[str, float | None], int], ...]:
@@ -267,10 +267,7 @@ class _Search:
         sampler = sampler_at(self.program, point.x)
         if sampler is None:
             return {}
-        return {
-            o.figure: sampler.peak(o.row) if o.form == "peak" else sampler.figures[o.figure]
-            for o in self.program.objectives
-        }
+        return {o.figure: _figure(sampler, o) for o in self.program.objectives}
 
 
 def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[float, ...]:
@@ -278,12 +275,11 @@ def _objectives(program: Program, x: tuple[tuple[str, float], ...]) -> tuple[flo
     sampler = sampler_at(program, dict(x))
     if sampler is None:
         return (math.inf,) * len(program.objectives)
-    return tuple(_reached(sampler, objective) / objective.scale for objective in program.objectives)
+    return tuple(sampler.merit(objective) / objective.scale for objective in program.objectives)
 
 
-def _reached(sampler: Sampler, objective: Objective) -> float:
-    """Return what an objective's row is worth, SI."""
-    if objective.form == "peak":
-        return sampler.peak(objective.row)
-    value = sampler.figures[objective.row]
-    return abs(value) if objective.form == "magnitude" else value
+def _figure(sampler: Sampler, objective: Objective) -> float:
+    """Return the figure of an objective, SI: with its sign where it is a number of its own."""
+    if objective.form != "peak" and objective.figure in sampler.figures:
+        return sampler.figures[objective.figure]
+    return float(sampler.merit(objective) ** (1 / objective.power))

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.balance import Given, total
 from loomopt.cycle import Floats
 from loomopt.program.program import Limit, Objective, Program
+from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
 
 DIGITS = 40
@@ -41,11 +41,6 @@ class Row:
     def quantity(self) -> str:
         """The name of the value the row reads."""
         return self.limit.row if self.limit else self.objective.row if self.objective else self.name
-
-    @property
-    def reads(self) -> tuple[str, ...]:
-        """The names of all values the row reads."""
-        return (self.quantity, self.limit.weight) if self.limit else (self.quantity,)
 
 
 class Exact:
@@ -103,67 +98,35 @@ class Exact:
     def _along(self, direction: Sequence[Any], step: Any) -> list[Any]:
         return [x + step * d for x, d in zip(self.base, direction, strict=True)]
 
-    def _given(self, scaled: Sequence[Any]) -> Given:
+    def _reading(self, scaled: Sequence[Any]) -> Reading:
+        """Return the design at variables in their own scale, ready to be read."""
+        model = self.program.model
         x = {name: value * scale for name, value, scale in zip(self.names, scaled, self.scales, strict=True)}
-        return self.program.model.given(self.maths, {**self.parameters, **x})
+        given = model.given(self.maths, {**self.parameters, **x})
+        return Reading(model, self.maths, given, self.sampler.cycle, self.sampler.stills)
 
     def _rows(self, scaled: Sequence[Any]) -> list[Any]:
         """Return every row's value at variables in their own scale."""
-        model, given = self.program.model, self._given(scaled)
-        wanted = {name for row in self.rows if not row.node for name in row.reads}
-        static = {**given.values, **model.static(self.maths, given, self.sampler.front, wanted)}
-        for integral in model.integrals:
-            if {integral.name, integral.root} & wanted:
-                static[integral.name] = self._mean(given, integral)
-                static[integral.root] = self.maths.sqrt(static[integral.name])
-        return [self._row(k, row, given, static) for k, row in enumerate(self.rows)]
+        reading = self._reading(scaled)
+        return [self._row(k, row, reading) for k, row in enumerate(self.rows)]
 
-    def _row(self, k: int, row: Row, given: Given, static: dict[str, Any]) -> Any:
+    def _row(self, k: int, row: Row, reading: Reading) -> Any:
+        size = self.number(row.scale)
         if row.node:
-            value = self._at(given, row.quantity, row.node.piece, self.u[k])
+            value = reading.at(row.quantity, row.node.piece, self.u[k])
             bound = self.number(row.limit.bound) if row.limit else 0
-            return (self.number(row.sign) * value - bound) / self.number(row.scale)
+            return (self.number(row.sign) * value - bound) / size
         if row.limit:
-            values = given.values if row.limit.family == "variable" else static
-            return row.limit.residual(values, self.number(row.limit.value)) / self.number(row.scale)
-        return self.number(row.sign) * static[row.quantity] / self.number(row.scale)
-
-    def _at(self, given: Given, name: str, piece: int, u: Any) -> Any:
-        """Return a whole-cycle quantity at a node of this design's own corners."""
-        angle, switches = self._angle(given, piece, u), list(self.sampler.cycle.switches[piece])
-        return self.program.model.quantity(self.maths, given, name, angle, switches)
-
-    def _angle(self, given: Given, piece: int, u: Any) -> Any:
-        cycle, corners = self.sampler.cycle, self.program.model.corners(self.maths, given)
-        flat = [corner for of_load in corners for corner in of_load]
-        if not flat:
-            return 2 * self.maths.pi * u
-        (first, turn), (second, later) = cycle.order[piece], cycle.order[(piece + 1) % cycle.pieces]
-        later += (piece + 1) // cycle.pieces
-        start, end = flat[first] + 2 * self.maths.pi * turn, flat[second] + 2 * self.maths.pi * later
-        return start + u * (end - start)
-
-    def _mean(self, given: Given, integral: Any) -> Any:
-        """Return an integral's mean by the sampler's own rule, node by node."""
-        if integral.angles:
-            fixed = zip(integral.angles, integral.data, strict=True)
-            model = self.program.model
-            values = [model.quantity(self.maths, given, integral.quantity, self.number(a), [d]) for a, d in fixed]
-            return total(values) / len(values)
-        weighted, widths = [], []
-        for piece, u, weight in zip(*self.sampler.quadrature(integral), strict=True):
-            width = self._angle(given, int(piece), 1) - self._angle(given, int(piece), 0)
-            weighted.append(float(weight) * width * self._at(given, integral.quantity, int(piece), float(u)))
-            widths.append(float(weight) * width)
-        return total(weighted) / total(widths)
+            return reading.excess(row.limit) / size
+        return self.number(row.sign) * reading.single(row.quantity) / size
 
     def _settled(self, row: Row) -> Any:
         """Return u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
         assert row.node is not None
-        u, step, given = self.number(row.node.u), self.number(SECOND_STEP), self._given(self.base)
+        u, step, here = self.number(row.node.u), self.number(SECOND_STEP), self._reading(self.base)
         if self._at_corner(row.node):
             return u
-        low, mid, high = (self._at(given, row.quantity, row.node.piece, u + k * step) for k in (-1, 0, 1))
+        low, mid, high = (here.at(row.quantity, row.node.piece, u + k * step) for k in (-1, 0, 1))
         bend = (high - 2 * mid + low) / step**2
         shift = -(high - low) / (2 * step * bend) if bend else self.number(0)
         return u + shift if abs(shift) < self.number("1e-3") else u
@@ -180,12 +143,12 @@ class Exact:
             return np.zeros(len(directions)), 0.0
         factor = self.number(row.sign) / self.number(row.scale)
 
-        def value(given: Given, place: Any) -> Any:
-            return factor * self._at(given, row.quantity, row.node.piece, place)  # type: ignore[union-attr]
+        def value(reading: Reading, place: Any) -> Any:
+            return factor * reading.at(row.quantity, row.node.piece, place)  # type: ignore[union-attr]
 
-        here = self._given(self.base)
+        here = self._reading(self.base)
         slope = (value(here, u + step) - value(here, u - step)) / (2 * step)
         bend = (value(here, u + step) - 2 * value(here, u) + value(here, u - step)) / step**2
-        moved = [self._given(self._along(direction, step)) for direction in directions]
-        slopes = [(value(given, u + step) - value(given, u - step)) / (2 * step) for given in moved]
+        moved = [self._reading(self._along(direction, step)) for direction in directions]
+        slopes = [(value(reading, u + step) - value(reading, u - step)) / (2 * step) for reading in moved]
         return np.array([float((after - slope) / step) for after in slopes]), float(bend)

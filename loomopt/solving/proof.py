@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from loomopt import designs
+from loomopt.cycle import Where
 from loomopt.errors import BadInput
-from loomopt.jobs.tasks import TASKS, Task
-from loomopt.program.numbers import numbers
+from loomopt.jobs import registry
+from loomopt.jobs.base import Job
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
+from loomopt.scenes import Scene
 from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
@@ -63,7 +65,7 @@ class Proofs:
         return {"problem": self.problem, "target": self.target, "proofs": [dict(vars(proof)) for proof in self.proofs]}
 
 
-def prove(scene: Any, design: Mapping[str, float], target: str | None = None, slack: float = SLACK) -> Proofs:
+def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, slack: float = SLACK) -> Proofs:
     """Return the proofs of a design's limits (SI; what it does not name is today's).
 
     slack: what is left open, relative to each quantity's largest magnitude over the cycle. Raises BadInput.
@@ -72,12 +74,12 @@ def prove(scene: Any, design: Mapping[str, float], target: str | None = None, sl
         allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
         remedy = "Write --slack 1e-8, or leave it out."
         raise BadInput("the slack is out of range", key="--slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
-    task, name = TASKS[scene.job.name], target_name(scene, target)
-    task.demand(scene, name)
-    full = {**task.today(scene), **design}
-    own, asked = task.adopted(scene, full, name)
-    program = task.program(own, asked)
-    court = _Court(own, task, program, full, slack)
+    job, name = registry.of(scene), target_name(scene, target)
+    job.demand(scene, name)
+    full = {**job.today(scene), **design}
+    own, asked = job.adopted(scene, full, name)
+    program = job.program(own, asked)
+    court = _Court(own, job, program, full, slack)
     return Proofs(scene.name, name, tuple(_merged(list(court.proofs()))))
 
 
@@ -94,19 +96,18 @@ def _merged(found: list[Proof]) -> Iterator[Proof]:
 class _Court:
     """One design, its program, and its numbers as balls."""
 
-    def __init__(self, scene: Any, task: Task, program: Program, design: Mapping[str, float], slack: float) -> None:
-        self.scene, self.task, self.program, self.slack = scene, task, program, slack
+    def __init__(self, scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float) -> None:
+        self.scene, self.job, self.program, self.slack = scene, job, program, slack
         self.words = Words(scene)
-        known = numbers(scene)
-        full = {name.rpartition(".")[2]: name for name in (*known, *(v.name for v in program.variables))}
-        chosen = {full.get(name, name): value for name, value in design.items()}
+        known = job.numbers(scene)
+        chosen = {scene.full(name): value for name, value in design.items()}
         # What the target's program does not choose is the design's own too, and today's where it names nothing.
         parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
         program = replace(program, parameters=parameters)
-        values = {**parameters, **task.values(program, {**known, **chosen})}
+        values = {**parameters, **job.values(program, {**known, **chosen})}
         self.sampler = Sampler(program.model, values)
         self.boxes = Boxes(self.sampler)
-        self.whole = task.sampler(scene, design)
+        self.whole = job.sampler(scene, design)
         self.whole_boxes = Boxes(self.whole)
 
     def proofs(self) -> Iterator[Proof]:
@@ -116,7 +117,7 @@ class _Court:
         for name, (quantity, most) in self.whole.model.assembly.items():
             peak = self.whole.peak(quantity)
             yield self._row(self.whole, self.whole_boxes, name, name, quantity, most, peak)
-        for figure, quantity in self.task.peaks(self.whole.model).items():
+        for figure, quantity in self.job.peaks(self.whole.model).items():
             peak = self.whole.peak(quantity)
             if math.isfinite(peak):
                 text = f"{figure} as claimed"
@@ -136,7 +137,7 @@ class _Court:
         quantity: str,
         bound: float,
         peak: float,
-        where: tuple[int, float] | None = None,
+        where: Where | None = None,
     ) -> Proof:
         """Bound one quantity on boxes; both signs where its magnitude counts."""
         slack = self.slack * _largest(sampler, quantity)
@@ -149,16 +150,11 @@ class _Court:
 
     def _static(self, limit: Limit) -> Proof:
         """Enclose one value of the design alone."""
-        maths, given = self.boxes.maths, self.boxes.given
-        known = {**given.values, **self.program.model.static(maths, given, self.sampler.front)}
-        for integral in self.program.model.integrals:
-            if {integral.name, integral.root} & {limit.row}:
-                known[integral.name] = self.boxes.mean(integral)
-                known[integral.root] = known[integral.name].sqrt()
-        residual = limit.residual(known, maths.number(limit.value)) + maths.number(0.0)
-        weight = float(known[limit.weight]) if limit.weight else 1.0
+        residual = self.boxes.excess(limit) + self.boxes.maths.number(0.0)
+        weight = float(self.boxes.single(limit.weight)) if limit.weight else 1.0
         residual = residual / weight if weight else residual
-        size = max(abs(float(known[limit.row])) / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
+        value = abs(float(self.boxes.single(limit.row)))
+        size = max(value / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
         excess = abs(residual) if limit.sign == 0 else residual
         slack = self.slack * size
         status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
@@ -172,7 +168,7 @@ def _largest(sampler: Sampler, quantity: str) -> float:
     return float(np.abs(sampler.at(quantity, pieces, u)).max())
 
 
-def proven(scene: Any, target: str, answer: Solution) -> Solution:
+def proven(scene: Scene, target: str, answer: Solution) -> Solution:
     """Return an answer whose certificate says that everything is proven, or why it is not."""
     found = prove(scene, designs.flat(answer.design), target)
     assert answer.certificate is not None

@@ -4,28 +4,31 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt import designs
-from loomopt.jobs.tasks import Task
+from loomopt.jobs.base import Job
+from loomopt.program import numbers
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
+from loomopt.scenes import Scene
 from loomopt.solving.certificate import FEASIBILITY
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
 
 
-def evaluation(scene: Any, task: Task, program: Program, design: Mapping[str, float]) -> Evaluation:
+def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
     """Return a design's figures and limits, each limit judged from the figures alone."""
-    figures = task.figures(scene, design)
+    figures = job.figures(scene, design)
     words = Words(scene)
-    named = {name.rpartition(".")[2]: value for name, value in design.items()}
-    shown = designs.packed(named, scene.job.lists)
+    labels = numbers.labels(scene)
+    named = {labels.get(name, name): value for name, value in design.items()}
+    shown = designs.packed(named, scene.schema.lists)
     return Evaluation(
         problem=scene.name,
         effects=tuple(scene.effects),
         design=shown,
         figures=figures,
         units={name: words.si(name) for name in (*shown, *figures)},
-        limits=_findings(program, figures, named, task.sampler(scene, design)),
+        limits=_findings(program, figures, named, job.sampler(scene, design)),
     )
 
 
@@ -59,7 +62,8 @@ def _findings(
 
 
 def with_optimum(
-    scene: Any,
+    job: Job,
+    scene: Scene,
     target: str,
     here: Evaluation,
     certificate: Certificate,
@@ -69,7 +73,7 @@ def with_optimum(
     """Return the answer of a design that was reached: optimal if certified, else uncertified."""
     prices = _prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
-    headline = scene.job.headline(scene, target, here.figures)
+    headline = job.say(scene, target, here.figures)
     if passed:
         message = " ".join([headline, _stops(prices)]).strip()
     else:

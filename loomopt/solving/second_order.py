@@ -86,12 +86,7 @@ class Lagrangian:
 
     def _objective(self, sampler: Sampler, place: int) -> float:
         objective = self.program.objectives[place]
-        value = sampler.peak(objective.row) if objective.form == "peak" else sampler.figures[objective.row]
-        return float(abs(value) if objective.form == "magnitude" else value) / objective.scale
+        return sampler.merit(objective) / objective.scale
 
     def _limit(self, sampler: Sampler, place: int) -> float:
-        limit = self.program.limits[place]
-        if limit.family == "cycle":
-            return (sampler.peak(limit.row, limit.where) - limit.bound) / limit.scale
-        values = {**sampler.given.values, **sampler.figures}
-        return float(limit.residual(values, limit.value)) / limit.scale
+        return sampler.excess(self.program.limits[place])

@@ -1,15 +1,18 @@
 """Limits, prices and relaxations in the designer's own words and units."""
 
 import math
-from typing import Any
 
+from loomopt.owned import label
 from loomopt.program.program import Limit
-from loomopt.quantities import SI_UNIT, factor, kind_of, show
+from loomopt.quantities import SI_UNIT, factor, quantity_of, show
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
 SIDES = {-1: "min", 0: "equal", 1: "max"}
+UNKNOWN = "number"
+"""The kind of what no table names, such as a variable that only the target's task has."""
 
 
 def outward(value: float, side: int) -> float:
@@ -28,26 +31,25 @@ def _grouped(unit: str) -> str:
 class Words:
     """The vocabulary of one scene: kinds and units of its variables and figures."""
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
 
     def kind(self, name: str) -> str:
         """Return what kind of quantity a variable, figure or limit is."""
-        job = self.scene.job
-        if name in job.variables:
-            return str(job.variables[name])
-        if name in job.figures:
-            return str(job.figures[name].kind)
-        if name in job.lists:
-            return str(job.lists[name])
-        if name in job.margins:
-            return str(job.margins[name])
-        models = [job.operation, job.mechanism, *(type(own) for own in self.scene.effects.values())]
-        return next(kind_of(model, name) for model in models if name in model.model_fields)
+        schema = self.scene.schema
+        if name in schema.figures and name not in schema.variables:
+            return schema.figures[name].kind
+        for kinds in (schema.variables, schema.lists, schema.margins):
+            if name in kinds:
+                return kinds[name]
+        places = [(model, key, key) for model in (schema.operation, schema.mechanism) for key in model.model_fields]
+        places += [(e.own, key, label(e, key)) for e in self.scene.active for key in e.own.model_fields]
+        found = next((quantity_of(model, key) for model, key, called in places if called == name), None)
+        return found.kind if found else UNKNOWN
 
     def unit(self, name: str) -> str:
         """Return the unit a designer reads it in."""
-        return str(self.scene.unit(name, self.kind(name)))
+        return self.scene.unit(name, self.kind(name))
 
     def si(self, name: str) -> str:
         """Return its SI unit."""
@@ -59,7 +61,7 @@ class Words:
 
     def limit(self, limit: Limit) -> str:
         """Return a limit as a phrase: "l1 >= 30 mm"."""
-        if limit.name in self.scene.job.margins:
+        if limit.name in self.scene.schema.margins:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
 
