@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
-from loomopt.jobs import load, scene
+from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY, check_numbers
@@ -24,7 +24,7 @@ __all__ = ["Answer", "Scene", "evaluate", "load", "prove", "scene", "simulate", 
 class Answer(Solution):
     """A solved target that shows itself: as tables, as curves, and in Jupyter."""
 
-    scene: Any = field(default=None, repr=False)
+    scene: Scene = field(kw_only=True, repr=False)
 
     def table(self) -> "pd.DataFrame":
         """Return the design and its figures beside today's machine and the limits, in the scene's own units."""

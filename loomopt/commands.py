@@ -1,15 +1,15 @@
 """The commands that show: scenes, figures of a design, curves, drawings, proofs. Nothing is optimised here."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from loomopt import api
-from loomopt.jobs import JOBS, load
-from loomopt.packaged import problem_names
-from loomopt.scene_errors import refusal, unknown
+from loomopt.jobs import registry
+from loomopt.scene_errors import refusal
+from loomopt.scenes import Scene
 from loomopt.shell import DIFFERS, read_design, read_number, read_scene, remark
 from loomopt.solving.asked import check_numbers
 from loomopt.solving.solution import Evaluation
@@ -25,11 +25,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
 
-def remarked(scene: Any, design: Any) -> None:
+def remarked(scene: Scene, design: Mapping[str, Any]) -> None:
     """Say on stderr what a reader of a design's figures should know."""
-    from loomopt.views import job_views
-
-    for text in job_views.view(scene).remarks(scene, design):
+    for text in registry.of(scene).views.remarks(scene, design):
         remark(f"Remark: {text}.")
 
 
@@ -44,21 +42,20 @@ def list_problems() -> None:
     """List the packaged problems and their targets."""
     from loomopt.views import layout, scene_view
 
-    layout.show(scene_view.listing([load(name) for name in problem_names()]))
+    layout.show(scene_view.listing([registry.load(name) for name in registry.problems()]))
 
 
 def new(
-    job: Annotated[str, typer.Argument(help=f"One of: {', '.join(JOBS)}.")],
+    job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")],
     file: Annotated[Path, typer.Argument(help="The scene to write; it must not exist yet.")],
 ) -> None:
     """Write a commented scene to start from."""
     from loomopt.files import atomically
 
-    if job not in JOBS:
-        raise unknown("job", job, JOBS, "", "")
+    template = registry.template(job)
     if file.exists():
         raise refusal("the file exists already", str(file), remedy="Choose another name, or remove it first")
-    atomically(file, lambda place: _write(place, JOBS[job].template))
+    atomically(file, lambda place: _write(place, template))
     remark(f"Wrote {file}. Next: loomopt show {file}, then loomopt solve {file}")
 
 

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from loomopt.errors import BadInput
+from loomopt.owned import label
 from loomopt.quantities import Quantity, quantity_of
 from loomopt.scene_errors import refusal, unknown
+from loomopt.scenes import Scene
 
 LARGEST_FILE = 1_000_000
 """Bytes; an answer has a few thousand."""
@@ -19,7 +21,7 @@ _ALLOWED = "a finite number in SI units, not negative"
 _GIVE = "Give the JSON that `loomopt solve --json` prints, or its design object"
 
 
-def read(path: Path, scene: Any) -> dict[str, float]:
+def read(path: Path, scene: Scene) -> dict[str, float]:
     """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
     origin = str(path)
     try:
@@ -64,12 +66,12 @@ def _place(key: str, name: str) -> int | None:
     return int(number) if number != key and number.isdigit() else None
 
 
-def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]:
+def checked(data: Any, scene: Scene, origin: str = "<design>") -> dict[str, float]:
     """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput."""
     kinds = _numbers(scene)
-    lists = {name: Quantity(kind) for name, kind in scene.job.lists.items()}
+    lists = {name: Quantity(kind) for name, kind in scene.schema.lists.items()}
     if not isinstance(data, Mapping) or not data:
-        known = ", ".join(scene.job.variables)
+        known = ", ".join(scene.schema.variables)
         raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
     data = {name: value for name, value in data.items() if name not in lists} | _listed(data, lists, origin)
     for name, value in data.items():
@@ -83,7 +85,7 @@ def checked(data: Any, scene: Any, origin: str = "<design>") -> dict[str, float]
             allowed = f"{_ALLOWED}; {kinds[name].range}" if number else _ALLOWED
             raise refusal("no design can have it", origin, f"design.{name}", value, allowed, "Correct the number")
     design = {name: float(value) for name, value in data.items()}
-    fault = scene.job.fault({**scene.mechanism, **design})
+    fault = scene.schema.fault({**scene.mechanism, **design})
     if fault:
         raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy="Correct its lengths")
     return design
@@ -101,11 +103,14 @@ def _listed(data: Mapping[str, Any], lists: Mapping[str, Quantity], origin: str)
     return found
 
 
-def _numbers(scene: Any) -> dict[str, Quantity]:
+def _numbers(scene: Scene) -> dict[str, Quantity]:
     """Return what kind of quantity each number of a scene is that a design may hold."""
-    models = [scene.job.mechanism, scene.job.operation, *(type(own) for own in scene.effects.values())]
-    found = {name: quantity_of(model, name) for model in models for name in model.model_fields}
-    first = {name: found[name] for name in scene.job.variables}
+    found: dict[str, Quantity | None] = {}
+    for model in (scene.schema.mechanism, scene.schema.operation):
+        found |= {name: quantity_of(model, name) for name in model.model_fields}
+    for effect in scene.active:
+        found |= {label(effect, key): quantity_of(effect.own, key) for key in effect.own.model_fields}
+    first = {name: found[name] for name in scene.schema.variables}
     return {name: quantity for name, quantity in {**first, **found}.items() if quantity}
 
 

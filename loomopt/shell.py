@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Any
 
 from loomopt import designs
-from loomopt.jobs import load
+from loomopt.jobs.registry import load
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 

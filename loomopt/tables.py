@@ -5,8 +5,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
+from loomopt.program import curves as cycle_curves
 from loomopt.program import sparse_curves
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.units import factor
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 VERSIONED = ("loomopt", "casadi", "numpy")
 
 
-def provenance(scene: Any, **more: object) -> dict[str, str]:
+def provenance(scene: Scene, **more: object) -> dict[str, str]:
     """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
     import importlib.metadata
 
@@ -27,7 +29,7 @@ def provenance(scene: Any, **more: object) -> dict[str, str]:
     return {"scene": scene.name, "scene_hash": scene.hash, **told, **versions, "date": today}
 
 
-def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
+def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     """Return one row per design variable and figure: today, design, limits and unit, in the scene's own units."""
     import pandas as pd
 
@@ -39,14 +41,14 @@ def answer(solution: Evaluation, scene: Any) -> "pd.DataFrame":
     return frame.set_index("name")
 
 
-def rows(solution: Evaluation, scene: Any, before: Evaluation | None = None) -> list[dict[str, Any]]:
+def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -> list[dict[str, Any]]:
     """Return the rows of `answer` as plain data; a figure the scene cannot have is left out; before: today's."""
     words = Words(scene)
     before = before or (solution.before if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
     found = []
     for name, value in {**solution.design, **solution.figures}.items():
-        if value is None or name == "change" or name in scene.job.lists:
+        if value is None or name == "change" or name in scene.schema.lists:
             continue
         unit = words.unit(name)
         size, limit = factor(unit), limits.get(name)
@@ -58,20 +60,21 @@ def rows(solution: Evaluation, scene: Any, before: Evaluation | None = None) -> 
     return found
 
 
-def curves(scene: Any, design: Mapping[str, float], accuracy: float | None = None) -> "pd.DataFrame":
+def curves(scene: Scene, design: Mapping[str, float], accuracy: float | None = None) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
     """
     import pandas as pd
 
-    task = TASKS[scene.job.name]
-    full = {**task.today(scene), **designs.flat(design)}
+    job = registry.of(scene)
+    sampler = job.sampler(scene, {**job.today(scene), **designs.flat(design)})
+    shown = job.columns(scene, sampler)
     more: dict[str, object] = {}
     if accuracy is None:
-        columns = task.curves(scene, full)
+        columns = cycle_curves.curves(sampler, shown)
     else:
-        columns, error = sparse_curves.curves(task, scene, full, accuracy)
+        columns, error = sparse_curves.curves(sampler, shown, accuracy)
         more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))

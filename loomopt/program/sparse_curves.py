@@ -1,12 +1,14 @@
 """Curves in as few rows as an accuracy asks for: coarse equal steps, and rows added where a column is largest."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from loomopt.cycle import SAME_ANGLE, TURN, Floats
+from loomopt.program import curves as even
 from loomopt.program import spikes
+from loomopt.program.curves import ANGLE, Columns
+from loomopt.program.sampling import Sampler
 
 STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
 """Equal steps of one turn that are begun with, by accuracy; no stretch between corners gets fewer than an eighth."""
@@ -16,26 +18,24 @@ NEARLY = 0.8
 LEVEL = 2e-13
 """Share of a top by which rows beside it may differ on a level."""
 MOST_ROWS = 20_000
-ANGLE = "phi [rad]"
 
 
-def curves(task: Any, scene: Any, design: Mapping[str, float], accuracy: float) -> tuple[dict[str, Floats], float]:
+def curves(sampler: Sampler, columns: Columns, accuracy: float) -> tuple[dict[str, Floats], float]:
     """Return the curves (SI), and an estimate of the relative error of each column's largest magnitude.
 
-    task: the job's functions. Around every top rows are added between it and its neighbours, in thirds and at the
-    vertex of their parabola, until what the top may still rise (no more than it stands above them) is small enough.
+    Around every top rows are added between it and its neighbours, in thirds and at the vertex of their parabola, until
+    what the top may still rise (no more than it stands above them) is small enough.
     """
     steps = next(count for least, count in STEPS if accuracy >= least)
-    sampler = task.sampler(scene, design)
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
     also += [spikes.graded(centre) for centre in sampler.singular]
     for _ in range(ROUNDS):
-        columns = task.curves(scene, design, steps, np.concatenate(also))
-        added, left = _around_tops(columns, accuracy / 10)
-        if not added or len(columns[ANGLE]) > MOST_ROWS:
+        found = even.curves(sampler, columns, steps, np.concatenate(also))
+        added, left = _around_tops(found, accuracy / 10)
+        if not added or len(found[ANGLE]) > MOST_ROWS:
             break
         also.append(np.array(added))
-    return columns, max(left, ROUNDING)
+    return found, max(left, ROUNDING)
 
 
 def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from loomopt import tables
+from loomopt.scenes import Scene
 from loomopt.studies import optima, readings
 from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.subject import Subject
@@ -68,7 +69,7 @@ class Study:
 
 
 def study(
-    scene: Any,
+    scene: Scene,
     full: bool = False,
     on_run: Callable[[str], None] | None = None,
     ladders: Sequence[Ladders] = LADDERS,
@@ -78,7 +79,7 @@ def study(
 
 
 def climbs(
-    scene: Any,
+    scene: Scene,
     full: bool = False,
     on_run: Callable[[str], None] | None = None,
     ladders: Sequence[Ladders] = LADDERS,
@@ -90,7 +91,7 @@ def climbs(
             yield ladder, tuple(climbed(ladder, FULL_REPEATS if full else QUICK_REPEATS, on_run))
 
 
-def concluded(scene: Any, climbs: Sequence[Climb], full: bool = False) -> Study:
+def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Study:
     """Return what ladders and their rows come to."""
     orders: dict[str, float] = {}
     knees: dict[str, Setting] = {}

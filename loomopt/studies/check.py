@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt import tables
 from loomopt.errors import BadInput
-from loomopt.jobs import load
-from loomopt.jobs.tasks import TASKS
-from loomopt.packaged import problem_names, results_path
+from loomopt.jobs import registry
+from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
@@ -38,36 +37,36 @@ class Outcome:
 
 
 def check(problems: Iterable[str] = (), folder: Path | None = None) -> Iterable[Outcome]:
-    """Yield an outcome for every target of the named scenes (all packaged ones without a name).
+    """Yield an outcome for every target of the named scenes (all packaged ones, and plug-ins', without a name).
 
     Raises BadInput for a name that is not packaged.
     """
-    known = problem_names()
-    names = list(problems) or known
+    known = registry.problems()
+    names = list(problems) or list(known)
     for name in names:
         if name not in known:
             raise BadInput(f"{name} is not a packaged scene", value=name, allowed=", ".join(known), remedy="Name one.")
     for name in names:
-        scene = load(name)
+        scene = registry.load(name)
         for target in served(scene):
             found = engine.solve(scene, target)
-            path = (folder or results_path()) / f"{name}.{target}.csv"
+            path = (folder or registry.results(scene)) / f"{name}.{target}.csv"
             yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
 
 
-def served(scene: Any) -> list[str]:
+def served(scene: Scene) -> list[str]:
     """Return the targets that a scene has what they need for."""
     found = []
-    for target in scene.job.targets:
+    for target in scene.schema.targets:
         try:
-            TASKS[scene.job.name].demand(scene, target)
+            registry.of(scene).demand(scene, target)
         except BadInput:
             continue
         found.append(target)
     return found
 
 
-def reference(found: Solution, scene: Any) -> "pd.DataFrame":
+def reference(found: Solution, scene: Scene) -> "pd.DataFrame":
     """Return the table that stands for an answer: status, figures, design, what binds; SI, one row."""
     import pandas as pd
 
@@ -75,14 +74,14 @@ def reference(found: Solution, scene: Any) -> "pd.DataFrame":
     figures = {**found.figures, **found.design}
     lists = {
         f"{name}_{k} [{found.units[name]}]": v
-        for name in scene.job.lists
+        for name in scene.schema.lists
         for k, v in enumerate(found.design.get(name, ()))
     }
     if found.status == "infeasible":
         figures = {}
         columns["clash"] = " | ".join(found.clash)
         columns |= {f"needed {r.limit} {r.side}{' alone' if r.alone else ''} [SI]": r.needed for r in found.relaxation}
-    single = {k: value for k, value in figures.items() if value is not None and k not in scene.job.lists}
+    single = {k: value for k, value in figures.items() if value is not None and k not in scene.schema.lists}
     columns |= {f"{k} [{found.units[k]}]": value for k, value in single.items()} | lists
     if found.certificate:
         columns["binding"] = " | ".join(sorted(f"{price.limit} {price.side}" for price in found.binding))
@@ -98,8 +97,8 @@ def write(folder: Path) -> list[Path]:
     from loomopt.files import atomically
 
     written = []
-    for name in problem_names():
-        scene = load(name)
+    for name in registry.problems():
+        scene = registry.load(name)
         for target in served(scene):
             text = tables.csv(reference(engine.solve(scene, target), scene))
             path = folder / f"{name}.{target}.csv"

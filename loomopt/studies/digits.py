@@ -5,20 +5,21 @@ Each whole-cycle value stands on its own extreme, found by Newton's method in th
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from loomopt import maths
-from loomopt.cycle import Cycle, Floats
+from loomopt.cycle import Floats
+from loomopt.maths import Maths, Number
 from loomopt.nlp.point import Point
 from loomopt.nlp.polish import BINDING
-from loomopt.program.program import Model, Program
+from loomopt.program.program import Program
+from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
 
 DIGITS = 40
-STEP, SLOPE_STEP = "1e-12", "1e-20"
-"""Steps of central differences in u, and of one-sided ones in the design."""
+STEP, SLOPE_STEP = 12, 20
+"""Decimals of the steps of central differences in u, and of one-sided ones in the design."""
 NEWTON, FAR = 4, 1e-3
 """Newton steps toward an extreme, and the largest that is one."""
 TIED = 1e-9
@@ -31,56 +32,38 @@ TURNS, FLAT = 3, 1e-7
 """Newton steps along open directions, and the curvature below which nothing changes along one, in natural sizes."""
 
 
-class Precise:
-    """One design in mpmath; values: numbers by name, SI, floats or mpmath; cycle: its pieces in float64."""
-
-    def __init__(self, model: Model, values: Mapping[str, Any], cycle: Cycle, digits: int = DIGITS) -> None:
-        self.maths, self.model, self.cycle = maths.mpmath(digits), model, cycle
-        number: Callable[[Any], Any] = self.maths.number
-        self.given = model.given(self.maths, {name: number(value) for name, value in values.items()})
-        corners = [angle for of in model.corners(self.maths, self.given) for angle in of]
-        turn = 2 * self.maths.pi
-        self.starts = [corners[place] + turn * turns for place, turns in cycle.order] or [number(0.0)]
-        self.starts.append(self.starts[0] + turn)
-
-    def static(self, front: Sequence[float], names: Sequence[str]) -> dict[str, Any]:
-        """Return single values by name: numbers of the scene, and what follows from them alone."""
-        return {**self.given.values, **self.model.static(self.maths, self.given, front, names)}
-
-    def at(self, name: str, piece: int, u: Any) -> Any:
-        """Return a quantity at a node."""
-        start, end = self.starts[piece : piece + 2]
-        switches = list(self.cycle.switches[piece])
-        return self.model.quantity(self.maths, self.given, name, start + u * (end - start), switches)
-
-    def extreme(self, name: str, near: Extreme) -> Any:
-        """Return a quantity at the extreme near one found in float64; an extreme at a piece's end stays there."""
-        number: Callable[[Any], Any] = self.maths.number
-        u, step = number(near.u), number(STEP)
-        for _ in range(NEWTON if 0.0 < near.u < 1.0 else 0):
-            low, mid, high = (self.at(name, near.piece, u + k * step) for k in (-1, 0, 1))
-            bend = (high - 2 * mid + low) / step**2
-            shift = -(high - low) / (2 * step * bend) if bend else 0 * u
-            if abs(shift) > FAR:
-                break
-            u += shift
-        return self.at(name, near.piece, u)
+def tiny(system: Maths, decimals: int) -> Number:
+    """Return a step of so many decimals."""
+    return system.number(10.0) ** -decimals
 
 
-def precise(sampler: Sampler, digits: int = DIGITS) -> Precise:
+def precise(sampler: Sampler, digits: int = DIGITS) -> Reading:
     """Return a sampled design in many digits."""
-    return Precise(sampler.model, {**sampler.values, **sampler.hints}, sampler.cycle, digits)
+    return sampler.read(maths.mpmath(digits))
 
 
-def peak(sampler: Sampler, name: str, signed: bool = False) -> Any:
+def extreme(exact: Reading, name: str, near: Extreme) -> Number:
+    """Return a quantity at the extreme near one found in float64; an extreme at a piece's end stays there."""
+    u, step = exact.maths.number(near.u), tiny(exact.maths, STEP)
+    for _ in range(NEWTON if 0.0 < near.u < 1.0 else 0):
+        low, mid, high = (exact.at(name, near.piece, u + k * step) for k in (-1, 0, 1))
+        bend = (high - 2 * mid + low) / step**2
+        shift = -(high - low) / (2 * step * bend) if bend else 0 * u
+        if abs(shift) > FAR:
+            break
+        u += shift
+    return exact.at(name, near.piece, u)
+
+
+def peak(sampler: Sampler, name: str, signed: bool = False) -> Number:
     """Return the largest |quantity| over the cycle (of a signed one, value; signed: take it so) in 40 digits."""
     exact = precise(sampler)
     found = sampler.extremes(name)
     plain = signed or name in sampler.model.signed
-    heights = [extreme.value if plain else abs(extreme.value) for extreme in found]
+    heights = [each.value if plain else abs(each.value) for each in found]
     top = max(heights)
     near = [e for e, height in zip(found, heights, strict=True) if height >= top - TIED * max(abs(top), 1e-300)]
-    values = [exact.extreme(name, extreme) for extreme in near]
+    values = [extreme(exact, name, each) for each in near]
     return max(value if plain else abs(value) for value in values)
 
 
@@ -92,8 +75,8 @@ class Optimum:
     directions in which nothing changes at all; flat: how many of these there are.
     """
 
-    x: Mapping[str, Any]
-    objectives: tuple[Any, ...]
+    x: Mapping[str, Number]
+    objectives: tuple[Number, ...]
     uncertainty: float
     design_uncertainty: float
     flat: int
@@ -104,8 +87,9 @@ class _Rows:
 
     def __init__(self, program: Program, point: Point, x: Mapping[str, float], digits: int) -> None:
         self.program, self.point = program, point
-        self.number: Callable[[Any], Any] = maths.mpmath(digits).number
-        self.digits, self.fixed = digits, {}
+        self.maths = maths.mpmath(digits)
+        self.fixed: dict[str, Number] = {}
+        self.number: Callable[[Number], Number] = self.maths.number
         prices = point.raw["lam_x"]
         self.free = []
         for k, variable in enumerate(program.variables):
@@ -127,62 +111,57 @@ class _Rows:
         self.families: list[tuple[str, float, float]] = [(o.row, 0.0, o.scale) for o in self.peaks]
         self.families += [(limit.row, limit.bound, limit.scale) for limit in limits]
 
-    def variables(self, unknown: Sequence[Any]) -> dict[str, Any]:
+    def variables(self, unknown: Sequence[Number]) -> dict[str, Number]:
         """Return every variable, SI."""
         pairs = zip(self.free, unknown, strict=False)
         return self.fixed | {v.name: value * self.number(v.scale) for v, value in pairs}
 
-    def design(self, unknown: Sequence[Any]) -> Precise:
+    def design(self, unknown: Sequence[Number]) -> Reading:
         """Return the design of the unknowns."""
         values = {**self.program.parameters, **self.sampler.hints, **self.variables(unknown)}
-        return Precise(self.program.model, values, self.sampler.cycle, self.digits)
+        given = self.sampler.model.given(self.maths, {name: self.number(value) for name, value in values.items()})
+        return Reading(self.sampler.model, self.maths, given, self.sampler.cycle, self.sampler.stills)
 
-    def names(self) -> list[str]:
-        """Return the single values that rows and objectives read."""
-        read = {name for limit in self.static for name in (limit.row, limit.weight) if name}
-        return sorted(read | {o.row for o in self.program.objectives})
-
-    def values(self, unknown: Sequence[Any]) -> list[Any]:
+    def values(self, unknown: Sequence[Number]) -> list[Number]:
         """Return every row: 0 where it is met."""
         exact, number = self.design(unknown), self.number
-        single = exact.static(self.sampler.front, self.names())
-        found = [limit.residual(single, number(limit.value)) / number(limit.scale) for limit in self.static]
-        found += [single[o.row] / number(o.scale) for o in self.zero]
+        found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
+        found += [exact.single(o.row) / number(o.scale) for o in self.zero]
         tops = unknown[len(self.free) :]
         for k, ((name, limit, scale), binding) in enumerate(zip(self.families, self.point.binding, strict=True)):
             bound = tops[k] if k < len(self.peaks) else number(limit) / number(scale)
             for node in binding:
-                found.append(number(node.sign) * exact.extreme(name, node) / number(scale) - bound)
+                found.append(number(node.sign) * extreme(exact, name, node) / number(scale) - bound)
         return found
 
-    def slopes(self, unknown: Sequence[Any]) -> Floats:
+    def slopes(self, unknown: Sequence[Number]) -> Floats:
         """Return (rows, unknowns): first derivatives by one-sided differences."""
-        step, base = self.number(SLOPE_STEP), self.values(unknown)
+        step, base = tiny(self.maths, SLOPE_STEP), self.values(unknown)
         columns = []
         for place in range(len(unknown)):
             moved = self.values(moved_by(unknown, place, step))
             columns.append([float((after - before) / step) for after, before in zip(moved, base, strict=True)])
         return np.array(columns, dtype=float).T.reshape(len(base), len(unknown))
 
-    def objective(self, unknown: Sequence[Any]) -> Any:
+    def objective(self, unknown: Sequence[Number]) -> Number:
         """Return the last objective, to which the earlier ones leave what they do not decide."""
         last = self.program.objectives[-1]
         if last.form == "peak":
             return unknown[-1]
-        return self.design(unknown).static(self.sampler.front, [last.row])[last.row] / self.number(last.scale)
+        return self.design(unknown).single(last.row) / self.number(last.scale)
 
-    def gradient(self, unknown: Sequence[Any]) -> Floats:
+    def gradient(self, unknown: Sequence[Number]) -> Floats:
         """Return the last objective's first derivatives."""
-        step, base = self.number(SLOPE_STEP), self.objective(unknown)
+        step, base = tiny(self.maths, SLOPE_STEP), self.objective(unknown)
         moved = (moved_by(unknown, place, step) for place in range(len(unknown)))
         return np.array([float((self.objective(each) - base) / step) for each in moved])
 
-    def moved(self, unknown: Sequence[Any], by: Floats, size: Any) -> list[Any]:
+    def moved(self, unknown: Sequence[Number], by: Floats, size: Number) -> list[Number]:
         """Return the unknowns after a step, size · by."""
         return [value + self.number(float(part)) * size for value, part in zip(unknown, by, strict=True)]
 
 
-def moved_by(unknown: Sequence[Any], place: int, step: Any) -> list[Any]:
+def moved_by(unknown: Sequence[Number], place: int, step: Number) -> list[Number]:
     """Return the unknowns with one of them changed."""
     return [value + step * (k == place) for k, value in enumerate(unknown)]
 
@@ -202,15 +181,15 @@ def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int 
         if not step:
             break
         unknown, missed = _met(rows, rows.moved(unknown, way, rows.number(1.0)))
-    single = rows.design(unknown).static(rows.sampler.front, rows.names())
+    exact = rows.design(unknown)
     reached = iter(unknown[len(rows.free) :])
     objectives = tuple(
-        next(reached) * rows.number(o.scale) if o.form == "peak" else single[o.row] for o in program.objectives
+        next(reached) * rows.number(o.scale) if o.form == "peak" else exact.single(o.row) for o in program.objectives
     )
     return Optimum(rows.variables(unknown), objectives, missed + curved * step**2, missed + step, flat)
 
 
-def _met(rows: _Rows, unknown: list[Any]) -> tuple[list[Any], float]:
+def _met(rows: _Rows, unknown: list[Number]) -> tuple[list[Number], float]:
     """Return the unknowns moved, least change, onto what binds, and the largest row that is still not met."""
     back = np.linalg.pinv(rows.slopes(unknown), rcond=RANK)
     residual = rows.values(unknown)
@@ -225,7 +204,7 @@ def _met(rows: _Rows, unknown: list[Any]) -> tuple[list[Any], float]:
     return unknown, float(max((abs(value) for value in residual), default=missed))
 
 
-def _open(rows: _Rows, unknown: Sequence[Any]) -> tuple[Floats, float, float, int]:
+def _open(rows: _Rows, unknown: Sequence[Number]) -> tuple[Floats, float, float, int]:
     """Return Newton's step along what is left open, its size, the largest curvature, and how many ways are flat."""
     slopes, gradient = rows.slopes(unknown), rows.gradient(unknown)
     _, sizes, basis = np.linalg.svd(slopes.reshape(-1, len(unknown)))
@@ -233,9 +212,9 @@ def _open(rows: _Rows, unknown: Sequence[Any]) -> tuple[Floats, float, float, in
     if not len(free):
         return np.zeros(len(unknown)), 0.0, 0.0, 0
     prices = np.linalg.lstsq(slopes.T, -gradient, rcond=None)[0]
-    step = rows.number(STEP)
+    step = tiny(rows.maths, STEP)
 
-    def lagrangian(by: Floats) -> Any:
+    def lagrangian(by: Floats) -> Number:
         at = rows.moved(unknown, by, step)
         priced = zip(prices.tolist(), rows.values(at), strict=True)
         return rows.objective(at) + sum(rows.number(price) * value for price, value in priced)

@@ -10,19 +10,14 @@ from loomopt.nlp import exchange
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point, Settings
 from loomopt.program.sampling import Sampler
+from loomopt.program.studied import Family
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
-from loomopt.studies import digits, limit_law
+from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference, Setting
 from loomopt.studies.subject import Subject, Target
 
-EXCHANGE, UNIFORM, TOLERANCE, HESSIAN, INTERVALS = (
-    "exchange",
-    "uniform points",
-    "IPOPT tolerance",
-    "Hessian",
-    "spline intervals",
-)
+EXCHANGE, UNIFORM, TOLERANCE, HESSIAN = "exchange", "uniform points", "IPOPT tolerance", "Hessian"
 CLAIM = "claimed peak"
 """Whole-cycle rows as the solver states them, against the same rows true over the whole cycle."""
 
@@ -53,8 +48,9 @@ def ladders(subject: Subject, amount: Amount) -> Iterator[Ladder]:
         yield _uniform(target, amount.points)
         yield _tolerance(target, amount.tolerances)
         yield _hessian(target)
-        if target.name == "law":
-            yield _intervals(target, amount.intervals)
+        family = subject.studied.family
+        if family and family.target == target.name:
+            yield _family(target, family, amount.intervals)
 
 
 def _reference(target: Target, quantity: str) -> Reference | None:
@@ -93,7 +89,7 @@ def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
 def _unrefined(target: Target, sampler: Sampler) -> float:
     """Return by how much refined peaks, as a certificate reads them, miss those of 40 digits, in natural sizes."""
     program, worst = target.program, 0.0
-    rows = {o.row: o.scale for o in program.objectives if o.form == "peak"}
+    rows = {row: o.scale for o in program.objectives if o.form == "peak" for row in o.rows}
     rows |= {limit.row: limit.scale for limit in program.limits if limit.family == "cycle"}
     for name, scale in rows.items():
         worst = max(worst, abs(float(digits.peak(sampler, name) - sampler.peak(name)) / scale))
@@ -181,15 +177,12 @@ def _hessian(target: Target) -> Ladder:
     return _solves(target, HESSIAN, ("limited-memory", "exact"), asked, None)
 
 
-def _intervals(target: Target, intervals: Sequence[int]) -> Ladder:
-    """Return free cam laws of more and more intervals, against the limit over all laws."""
+def _family(target: Target, family: Family, counts: Sequence[int]) -> Ladder:
+    """Return optima over finer and finer sets of designs, against the limit that they tend to."""
     quantity = target.quantity(target.figure)
 
-    def law(count: int) -> Any:
-        return target.scene.set("targets.law.intervals", count)
-
     def run(count: int) -> tuple[Target, Point]:
-        own = Target(law(count), target.name)
+        own = Target(target.scene.set(family.key, count), target.name)
         return own, _solved(own, Settings())
 
     def read(count: int, result: tuple[Target, Point]) -> Outcome:
@@ -201,7 +194,7 @@ def _intervals(target: Target, intervals: Sequence[int]) -> Ladder:
     def reference(_: str) -> Reference | None:
         if target.optimum is None:
             return None
-        value = limit_law.least_stiffness(target.scene, float(target.optimum.x["K1"]))
+        value = family.limit(target.scene, target.optimum.x)
         return None if value is None else Reference(value)
 
-    return Ladder(INTERVALS, (quantity,), tuple(intervals), run, read, reference, lambda count: 1 / count)
+    return Ladder(family.method, (quantity,), tuple(counts), run, read, reference, lambda count: 1 / count)

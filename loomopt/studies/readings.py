@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.cycle import SAME_ANGLE, TURN, Floats
+from loomopt.cycle import SAME_ANGLE, TURN, Floats, Node
 from loomopt.maths import Maths, Number
 from loomopt.nlp import slopes
 from loomopt.program.sampling import Sampler, Tally
+from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
 
-SAMPLED, REFINED, DWELL = "sampled points", "refined points", "dwell_after"
+SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"
 SAMPLES = (36, 72, 144, 360, 720, 3600, 36000, 100000)
 REFINED_FROM = (90, 180, 360, 720, 1440)
@@ -30,8 +31,8 @@ def ladders(subject: Subject) -> Iterator[Ladder]:
     if subject.peaks:
         yield _sampled(subject)
         yield _refined(subject)
-    if subject.scene.job.name == "rapier" and "s_dwell" in subject.scene.operation:
-        yield _dwell(subject)
+    if subject.studied.crossing:
+        yield _crossing(subject, subject.studied.crossing)
     yield from _derivatives(subject)
     yield _numbers(subject)
 
@@ -49,7 +50,7 @@ def _sampled(subject: Subject) -> Ladder:
         away = np.mod(TURN * (np.arange(count, dtype=np.float64) + 0.5) / count + np.pi, TURN) - np.pi
         for figure, (name, signed) in subject.peaks.items():
             centre, half = windows[figure]
-            values = sampler.at(name, *_located(sampler, centre + away))
+            values = sampler.at(name, *sampler.cycle.located(centre + away))
             heights = values if signed else sampler.heights(name, values)
             found[figure] = float(np.max(heights[np.abs(away) <= half], initial=-np.inf))
         return found
@@ -64,14 +65,6 @@ def _window(sampler: Sampler, name: str, signed: bool) -> tuple[float, float]:
     alike = [angle for angle, height in heights.items() if height >= (1 - ALIKE) * heights[centre]]
     ways = [abs((angle - centre + np.pi) % TURN - np.pi) for angle in alike if angle != centre]
     return centre, min((way / 2 for way in ways if way > SAME_ANGLE), default=np.pi)
-
-
-def _located(sampler: Sampler, angles: Floats) -> tuple[Any, Floats]:
-    """Return the nodes (pieces, u) at crank angles, rad."""
-    starts = sampler.cycle.starts
-    turned = starts[0] + np.mod(angles - starts[0], TURN)
-    pieces = np.clip(np.searchsorted(starts, turned, side="right") - 1, 0, sampler.cycle.pieces - 1)
-    return pieces, (turned - starts[pieces]) / (starts[pieces + 1] - starts[pieces])
 
 
 def _refined(subject: Subject) -> Ladder:
@@ -89,36 +82,37 @@ def _refined(subject: Subject) -> Ladder:
     return _today(subject, REFINED, tuple(subject.peaks), REFINED_FROM, run, lambda count: 1 / count)
 
 
-def _dwell(subject: Subject) -> Ladder:
-    """Return the dwell read off equal points, which begin where the true dwell ends half a step from one."""
-    sampler = subject.sampler
-    room = float(sampler.given.values["s_dwell"])
-    true = _dwell_end(subject)
+def _crossing(subject: Subject, crossing: Crossing) -> Ladder:
+    """Return a crossing read off equal points, which begin where the true one lies half a step from one."""
+    sampler, figure = subject.sampler, crossing.figure
+    level = float(sampler.given.values[crossing.level])
+    true = _crossed(subject, crossing)
 
     def run(count: int) -> dict[str, float]:
         step = TURN / count
         first = (float(true) / step + 0.5) % 1.0
         angles: Floats = step * (first + np.arange(count, dtype=np.float64))
-        travel = np.abs(sampler.at("S", *_located(sampler, angles)))
-        outside = np.flatnonzero(travel > room)
-        return {DWELL: float(angles[outside[0] - 1]) if outside.size and outside[0] else 0.0}
+        sizes = np.abs(sampler.at(crossing.quantity, *sampler.cycle.located(angles)))
+        outside = np.flatnonzero(sizes > level)
+        return {figure: float(angles[outside[0] - 1]) if outside.size and outside[0] else 0.0}
 
     def reference(quantity: str) -> Reference:
         return Reference(true)
 
-    ladder = _today(subject, SAMPLED, (DWELL,), SAMPLES, run, lambda count: 1 / count)
-    return Ladder(ladder.method, (DWELL,), SAMPLES, run, ladder.read, reference, ladder.step)
+    ladder = _today(subject, SAMPLED, (figure,), SAMPLES, run, lambda count: 1 / count)
+    return Ladder(ladder.method, (figure,), SAMPLES, run, ladder.read, reference, ladder.step)
 
 
-def _dwell_end(subject: Subject) -> Any:
-    """Return the crank angle, rad, at which the head leaves the dwell, in 40 digits."""
-    near = subject.task.figures(subject.scene, subject.task.today(subject.scene))[DWELL]
-    exact = subject.exact
-    angle, room = exact.maths.number(float(near or 0.0)), exact.given.values["s_dwell"]
+def _crossed(subject: Subject, crossing: Crossing) -> Number:
+    """Return the crank angle, rad, of a crossing in many digits, by Newton's method."""
+    near = subject.job.figures(subject.scene, subject.job.today(subject.scene))[crossing.figure] or 0.0
+    exact, cycle = subject.exact, subject.sampler.cycle
+    switch, step = cycle.switch(cycle.place(near)[0]), digits.tiny(exact.maths, digits.SLOPE_STEP)
+    angle, level = exact.maths.number(near), exact.given.values[crossing.level]
     for _ in range(digits.NEWTON):
-        pose = subject.pose(exact.maths, exact.given, angle, ())
-        sign = 1 if pose.q > 0 else -1
-        angle -= (sign * pose.q - room) / (sign * pose.q1)
+        low, value, high = (exact.quantity(crossing.quantity, angle + k * step, switch) for k in (-1, 0, 1))
+        sign = 1 if value > 0 else -1
+        angle -= 2 * step * (sign * value - level) / (sign * (high - low))
     return angle
 
 
@@ -137,31 +131,29 @@ def _today(
 
 def _derivatives(subject: Subject) -> Iterator[Ladder]:
     """Yield three ways to the second derivative of the displacement, from the displacement or in closed form."""
-    name, model, given = subject.readings.motion, subject.sampler.model, subject.sampler.given
-    angles, switches = subject.positions
-    numpy = maths.numpy()
+    name, model, given = subject.studied.motion, subject.sampler.model, subject.sampler.given
+    pieces, angles = subject.positions
+    cycle = subject.sampler.cycle
 
     def displaced(moved: Floats) -> Floats:
         Tally.positions += POSITIONS
-        found = subject.pose(numpy, given, moved, list(switches)).q
-        return np.broadcast_to(np.asarray(found, dtype=float), moved.shape)
+        return _each(subject.output(maths.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
 
     def closed(_: str) -> dict[str, Any]:
         Tally.positions += POSITIONS
-        found = subject.pose(numpy, given, angles, list(switches)).q2
-        return {name: np.broadcast_to(np.asarray(found, dtype=float), angles.shape)}
+        return {name: _each(subject.output(maths.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles)}
 
     def formula(system: Maths, phi: Number, places: Sequence[Number]) -> Number:
         symbols = model.given(system, {**subject.sampler.values, **subject.sampler.hints})
-        return subject.pose(system, symbols, phi, places).q
+        return subject.output(system, symbols, Node(phi, dict(zip(cycle.names, places, strict=True)))).q
 
     @functools.cache
     def automatic() -> Callable[[Floats, Floats], Floats]:
-        return slopes.second(formula, len(switches))
+        return slopes.second(formula, len(cycle.names))
 
     def differentiated(_: str) -> dict[str, Any]:
         Tally.positions += POSITIONS
-        return {name: automatic()(angles, switches)}
+        return {name: automatic()(angles, cycle.switches[pieces].T)}
 
     def differences(step: float) -> dict[str, Any]:
         low, mid, high = (displaced(angles + k * step) for k in (-1, 0, 1))
@@ -172,23 +164,24 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
     yield _today(subject, DIFFERENCES, (name,), STEPS, differences, float)
 
 
+def _each(values: Number, angles: Floats) -> Floats:
+    """Return one value per angle: a formula may give a number."""
+    return np.broadcast_to(np.asarray(values, dtype=float), angles.shape)
+
+
 def _numbers(subject: Subject) -> Ladder:
     """Return closed forms in float64, one by one and at once, and in 40 digits, against 60."""
-    name, static, sampler = subject.readings.motion, subject.readings.static, subject.sampler
-    known = tuple(figure for figure in static if figure in sampler.static)
-    angles, switches = subject.positions
+    name, sampler = subject.studied.motion, subject.sampler
+    known = tuple(figure for figure in subject.studied.static if figure in sampler.static)
+    pieces, angles = subject.positions
 
     def run(system: str) -> dict[str, Any]:
         Tally.positions += POSITIONS + len(known)
-        if system == "mpmath 40":
-            exact = digits.precise(sampler)
-            single = exact.static(sampler.front, known)
-            return {name: subject.motion(exact.maths, exact.given)} | {figure: single[figure] for figure in known}
-        given = sampler.model.given(maths.FLOAT, {**sampler.values, **sampler.hints})
-        single = sampler.model.static(maths.FLOAT, given, sampler.front, known)
-        if system == "float64":
-            return {name: subject.motion(maths.FLOAT, given)} | {figure: single[figure] for figure in known}
-        found = subject.pose(maths.numpy(), given, angles, list(switches)).q2
-        return {name: np.broadcast_to(np.asarray(found, dtype=float), angles.shape)} | dict(single)
+        exact = digits.precise(sampler) if system == "mpmath 40" else sampler.read(maths.FLOAT)
+        single = {figure: exact.single(figure) for figure in known}
+        if system != "NumPy":
+            return {name: subject.motion(exact.maths, exact.given), **single}
+        node = Node(angles, sampler.cycle.switch(pieces))
+        return {name: _each(subject.output(maths.numpy(), exact.given, node).q2, angles), **single}
 
     return _today(subject, NUMBERS, (name, *known), SYSTEMS, run)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from loomopt import files as store
+from loomopt import files
 from loomopt.picture.panels import ANGLE, Panel, each, split
 from loomopt.picture.shapes import (
     CAPITAL,
@@ -47,7 +47,7 @@ def draw(drawing: Drawing, path: Path) -> None:
 
     Raises BadInput for any other suffix.
     """
-    if store.suffix(path, SUFFIXES) == ".svg":
+    if files.suffix(path, SUFFIXES) == ".svg":
         path.write_text(svg.render(drawing), encoding="utf-8")
         return
     box = extent(drawing)
@@ -80,8 +80,8 @@ def curves(
     today's machine, drawn beside where a panel asks for it. angle: what phi is.
     Raises BadInput as `draw` does, and ValueError where there is no column.
     """
-    store.suffix(path, SUFFIXES)
-    panels = panels or each(None, None, frame.columns)
+    files.suffix(path, SUFFIXES)
+    panels = panels or each(frame.columns)
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
     with _own_style():

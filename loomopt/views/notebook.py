@@ -1,19 +1,20 @@
 """How an answer shows itself in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
 
 from html import escape
-from typing import Any
 
+from loomopt.jobs import registry
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
-from loomopt.views import job_views, svg, terminal
+from loomopt.views import svg, terminal
 from loomopt.views.layout import Grid, spaced
 
 
-def answer(solution: Solution, scene: Any) -> str:
+def answer(solution: Solution, scene: Scene) -> str:
     """Return an answer as HTML: what was found, design beside today, what binds, certificate, and the mechanism
     where the scene gives what a drawing needs."""
     shown = terminal.solution(solution, scene)
     parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
-    view = job_views.view(scene)
+    view = registry.of(scene).views
     drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, solution.design))
     return f"<div>{''.join(parts)}{drawn}</div>"
 

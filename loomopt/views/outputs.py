@@ -5,15 +5,18 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt import __version__, tables
 from loomopt.designs import flat
 from loomopt.errors import BadInput
 from loomopt.files import atomically, suffix
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
-from loomopt.views import job_views
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
@@ -48,7 +51,7 @@ def _put(content: str, place: Path) -> None:
     place.write_text(content, encoding="utf-8")
 
 
-def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
+def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg where there is one to draw.
 
     Returns the files.
@@ -60,7 +63,7 @@ def answer(folder: Path, solution: Solution, scene: Any) -> list[Path]:
         "table.csv": tables.csv(tables.answer(solution, scene)),
         "curves.csv": tables.csv(tables.curves(scene, solution.design)),
     }
-    view = job_views.view(scene)
+    view = registry.of(scene).views
     if not view.missing(scene):
         contents["linkage.svg"] = svg.render(view.linkage(scene, solution.design))
     try:
@@ -83,7 +86,7 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
 
 
-def curves(path: Path, scene: Any, design: Mapping[str, float], accuracy: float | None = None) -> None:
+def curves(path: Path, scene: Scene, design: Mapping[str, float], accuracy: float | None = None) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows."""
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy)
@@ -92,27 +95,28 @@ def curves(path: Path, scene: Any, design: Mapping[str, float], accuracy: float 
     elif ending == ".parquet":
         atomically(path, frame.to_parquet)
     else:
-        from loomopt.views import figure
-
-        atomically(path, functools.partial(_figure, figure.curves, frame, scene, flat(design)))
+        atomically(path, functools.partial(_figure, frame, scene, flat(design)))
 
 
-def _figure(draw: Any, frame: Any, scene: Any, design: Mapping[str, float], place: Path) -> None:
+def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path) -> None:
     """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
-    task, view = TASKS[scene.job.name], job_views.view(scene)
+    from loomopt.views import figure
+
+    job, view = registry.of(scene), registry.of(scene).views
     panels = view.panels(scene, design, tuple(frame.columns))
     today = None
     if design and any(panel.today for panel in panels):
         before = tables.curves(scene, {})
         today = before, view.panels(scene, {}, tuple(before.columns))
-    draw(frame, place, scene.title, task.marks(scene, {**task.today(scene), **design}), panels, today, view.angle)
+    marks = view.marks(scene, {**job.today(scene), **design})
+    figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
 
 
-def linkage(path: Path, scene: Any, design: Mapping[str, float]) -> None:
+def linkage(path: Path, scene: Scene, design: Mapping[str, float]) -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
     from loomopt.views import dxf, svg
 
-    ending, view = suffix(path, DRAWINGS), job_views.view(scene)
+    ending, view = suffix(path, DRAWINGS), registry.of(scene).views
     if ending == ".csv":
         text(path, view.joints_csv(scene, design))
     elif ending == ".svg":
@@ -121,9 +125,9 @@ def linkage(path: Path, scene: Any, design: Mapping[str, float]) -> None:
         atomically(path, functools.partial(dxf.write, view.linkage(scene, design)))
 
 
-def picture(path: Path, scene: Any, design: Mapping[str, float]) -> None:
+def picture(path: Path, scene: Scene, design: Mapping[str, float]) -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.views import figure
 
     suffix(path, PICTURES)
-    atomically(path, functools.partial(figure.draw, job_views.view(scene).linkage(scene, design)))
+    atomically(path, functools.partial(figure.draw, registry.of(scene).views.linkage(scene, design)))

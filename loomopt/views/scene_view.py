@@ -8,43 +8,44 @@ from typing import Any
 import numpy as np
 
 from loomopt.designs import flat
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
+from loomopt.owned import label, owned
+from loomopt.program import curves as cycle_curves
+from loomopt.scenes import Scene
 from loomopt.solving.words import Words
-from loomopt.views import job_views
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""
 
 
-def listing(scenes: Iterable[Any]) -> Grid:
+def listing(scenes: Iterable[Scene]) -> Grid:
     """Return the packaged scenes: title, targets, source."""
     lines: list[tuple[str, str]] = []
     for scene in scenes:
         lines += [
             (scene.name, scene.title),
-            ("", f"job {scene.job.name}; targets {', '.join(scene.job.targets)}"),
+            ("", f"job {scene.job}; targets {', '.join(scene.schema.targets)}"),
             ("", f"source: {scene.source or 'not given'}"),
         ]
     return Grid("", ("problem", "what it is"), tuple(lines))
 
 
-def parts(scene: Any) -> list[str | Grid]:
+def parts(scene: Scene) -> list[str | Grid]:
     """Return the tables of `loomopt show`."""
     words = Words(scene)
     lines = []
-    for key, value in _values(scene):
-        name = key.split(".")[2 if key.startswith("effects.") else 1]
+    for key, name, value in _values(scene):
         number = isinstance(value, int | float)
         unit = words.si(name) if number else "1"
         size = f"{value:.9g}" if number else listed(value)
         lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
-    effects = tuple((name, scene.job.effects[name].summary) for name in scene.effects)
-    off = [name for name in scene.job.effects if name not in scene.effects]
-    figures = tuple((figure.name, figure.text) for figure in scene.job.figures.values())
+    effects = tuple((name, scene.schema.effects[name].summary) for name in scene.effects)
+    off = [name for name in scene.schema.effects if name not in scene.effects]
+    figures = tuple((figure.name, figure.text) for figure in scene.schema.figures.values())
     return [
         f"{scene.name}: {scene.title}",
-        f"Job: {scene.job.name}, {scene.job.title}",
+        f"Job: {scene.job}, {scene.schema.title}",
         f"Source: {scene.source or 'not given'}",
         Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
         Grid("Effects that are on", ("effect", "what it is"), effects),
@@ -54,10 +55,10 @@ def parts(scene: Any) -> list[str | Grid]:
     ]
 
 
-def _targets(scene: Any) -> list[tuple[str, str, str]]:
+def _targets(scene: Scene) -> list[tuple[str, str, str]]:
     """Return each target with what the scene expects of it."""
     lines = []
-    for name, target in scene.job.targets.items():
+    for name, target in scene.schema.targets.items():
         expected = getattr(scene.targets[name], "expected", None) or {}
         lines.append((name, target.text, ", ".join(f"{key} = {value}" for key, value in expected.items())))
     return lines
@@ -68,41 +69,42 @@ def listed(values: Any) -> str:
     return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
 
 
-def _values(scene: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the dotted key of each number, word and list, with its SI value."""
+def _values(scene: Scene) -> Iterator[tuple[str, str, Any]]:
+    """Yield the dotted key of each number, word and list, what a designer calls it, and its SI value."""
     for table in ("operation", "mechanism"):
         for name, value in getattr(scene, table).items():
-            yield f"{table}.{name}", value
-    for effect, own in scene.effects.items():
-        for name, value in own.model_dump().items():
+            yield f"{table}.{name}", name, value
+    for effect in scene.active:
+        for key, value in scene.effects[effect.name].model_dump().items():
             if isinstance(value, int | float | str):
-                yield f"effects.{effect}.{name}", value
+                yield f"effects.{owned(effect, key)}", label(effect, key), value
     for table in ("bounds", "limits"):
         for name, limit in getattr(scene, table).items():
             for end in ("min", "max"):
                 if (value := getattr(limit, end)) is not None:
-                    yield _ended(scene, f"{table}.{name}", end), value
+                    yield _ended(scene, f"{table}.{name}", end), name, value
 
 
-def _ended(scene: Any, key: str, end: str) -> str:
+def _ended(scene: Scene, key: str, end: str) -> str:
     """Return the key of a limit's end; a limit given as one value has no ends."""
     return key if scene.given(key) else f"{key}.{end}"
 
 
-def equations(scene: Any) -> list[str]:
+def equations(scene: Scene) -> list[str]:
     """Return the equations a scene really uses, as text, those of one name together."""
-    found = job_views.view(scene).equations(scene)
+    found = registry.of(scene).views.equations(scene)
     groups = itertools.groupby(found, key=lambda equation: equation.name)
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
-def curves(scene: Any, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
+def curves(scene: Scene, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
     """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
-    task = TASKS[scene.job.name]
-    full = {**task.today(scene), **flat(design)}
-    columns = dict(task.curves(scene, full))
+    job = registry.of(scene)
+    full = {**job.today(scene), **flat(design)}
+    sampler = job.sampler(scene, full)
+    columns = cycle_curves.curves(sampler, job.columns(scene, sampler))
     angle = np.degrees(columns.pop("phi [rad]"))
-    places = {name: math.degrees(value) for name, value in _single(task.marks(scene, full)).items()}
+    places = {name: math.degrees(value) for name, value in _single(job.views.marks(scene, full)).items()}
     rows = [
         k
         for k, a in enumerate(angle)

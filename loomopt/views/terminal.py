@@ -1,20 +1,24 @@
 """What a person sees of an answer: a sentence, short tables, the certificate in one line."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING
 
+from loomopt.jobs import registry
+from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.units import factor
-from loomopt.views import job_views
 from loomopt.views.layout import Grid, joined
+
+if TYPE_CHECKING:
+    from loomopt.solving.proof import Proofs
 
 NEGLIGIBLE = 1e-8
 """Shown as 0 when below this share of the largest number in the same unit."""
 
 
-def solution(answer: Solution, scene: Any) -> list[str | Grid]:
+def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = "relaxed" if answer.relaxation else "design"
     parts: list[str | Grid] = [f"{answer.problem}, {answer.target}: {answer.status}"]
@@ -22,7 +26,7 @@ def solution(answer: Solution, scene: Any) -> list[str | Grid]:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]
     elif answer.status == "optimal":
-        parts.append(scene.job.headline(scene, answer.target, answer.figures))
+        parts.append(registry.of(scene).say(scene, answer.target, answer.figures))
     else:
         parts.append(answer.message)
     parts += [answer.explanation] if answer.explanation else []
@@ -41,7 +45,7 @@ def solution(answer: Solution, scene: Any) -> list[str | Grid]:
     return parts
 
 
-def evaluation(found: Evaluation, scene: Any, before: Evaluation | None) -> list[str | Grid]:
+def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> list[str | Grid]:
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok)
     held = f"NOT admissible: {broken}" if broken else "all limits held"
@@ -49,7 +53,7 @@ def evaluation(found: Evaluation, scene: Any, before: Evaluation | None) -> list
     return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
 
-def comparison(found: Evaluation, scene: Any, before: Evaluation | None, heading: str) -> Grid:
+def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits."""
     table = rows(found, scene, before)
     sizes: dict[str, float] = {}
@@ -73,9 +77,9 @@ def comparison(found: Evaluation, scene: Any, before: Evaluation | None, heading
     return Grid("", (*first, heading, "unit", "limits"), tuple(lines), right=tuple(range(1, len(first) + 1)))
 
 
-def lists(found: Evaluation, scene: Any) -> list[str]:
+def lists(found: Evaluation, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
-    told = job_views.view(scene).lists
+    told = registry.of(scene).views.lists
     return [
         f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; see --json"
         for name, values in found.design.items()
@@ -128,7 +132,7 @@ def certificate(answer: Solution) -> list[str]:
     return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
 
 
-def _starts(answer: Solution, scene: Any) -> str:
+def _starts(answer: Solution, scene: Scene) -> str:
     """Return how many starts found the best, and what other optima there are."""
     solver, words = answer.solver, Words(scene)
     if not solver["starts_at_best"]:
@@ -146,7 +150,7 @@ def _starts(answer: Solution, scene: Any) -> str:
     return text + (f". Other optima: {'; '.join(others)}" if others else "")
 
 
-def proofs(found: Any) -> list[str | Grid]:
+def proofs(found: "Proofs") -> list[str | Grid]:
     """Return the parts of a proof: a sentence, and what was shown of each limit."""
     missed = dict.fromkeys(proof.limit for proof in found.proofs if proof.status != "proven")
     said = f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"

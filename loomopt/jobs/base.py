@@ -1,0 +1,139 @@
+"""All that the rest of the house knows of a job: one object. What few jobs need has a default here."""
+
+import abc
+from collections.abc import Mapping, Sequence
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from loomopt.errors import BadInput
+from loomopt.picture.job_views import JobViews
+from loomopt.program import numbers
+from loomopt.program.curves import Columns
+from loomopt.program.model import JobModel
+from loomopt.program.program import Numbers, Program
+from loomopt.program.sampling import Sampler
+from loomopt.program.studied import Studied
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+
+Figures = Mapping[str, float | None]
+
+
+class Job(abc.ABC):
+    """A loom mechanism and what can be asked of it; all numbers SI."""
+
+    name: str
+
+    # What every job says.
+
+    @abc.abstractmethod
+    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
+        """Return what a scene may hold; document: the raw scene, on which that may depend."""
+
+    @abc.abstractmethod
+    def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:
+        """Return the mechanism with the effects the scene calls for; design: whose own parts take the scene's place."""
+
+    @abc.abstractmethod
+    def program(self, scene: Scene, target: str) -> Program:
+        """Return a target as a task: structure and numbers. Raises BadInput."""
+
+    @abc.abstractmethod
+    def design(self, program: Program, x: Numbers) -> dict[str, float]:
+        """Return the design a person reads, by full names, from the NLP's variables."""
+
+    @abc.abstractmethod
+    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
+        """Return every figure of the job; None for one whose numbers the scene does not have."""
+
+    @abc.abstractmethod
+    def say(self, scene: Scene, target: str, figures: Figures) -> str:
+        """Return one sentence on what an optimum of the target is worth."""
+
+    @abc.abstractmethod
+    def columns(self, scene: Scene, sampler: Sampler) -> Columns:
+        """Return what the curves over the cycle show of the motion, and what force and torque are called."""
+
+    @property
+    @abc.abstractmethod
+    def views(self) -> JobViews:
+        """The job's own pictures, equations and remarks; imported when it is first asked for."""
+
+    @property
+    @abc.abstractmethod
+    def resources(self) -> Traversable:
+        """The folder with the job's template.toml, and problems/ and results/ where it brings any."""
+
+    # What few jobs say otherwise.
+
+    def demand(self, scene: Scene, target: str) -> None:
+        """Raise BadInput where a target speaks of what the scene does not have."""
+        demand(scene, target)
+
+    def today(self, scene: Scene) -> dict[str, float]:
+        """Return today's design by full names, with every other number that the scene frees."""
+        known, variables = self.numbers(scene), scene.schema.variables
+        others = [scene.full(name) for name, bound in scene.bounds.items() if name not in variables and bound.free]
+        return {name: known[name] for name in (*variables, *others)}
+
+    def numbers(self, scene: Scene) -> dict[str, float]:
+        """Return every number of the scene by full name."""
+        return numbers.numbers(scene)
+
+    def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
+        """Return all numbers of a design, by any name of each; a number it does not name stays the scene's."""
+        return self.numbers(scene) | {scene.full(name): value for name, value in design.items()}
+
+    def sampler(self, scene: Scene, design: Numbers) -> Sampler:
+        """Return a design ready to be sampled."""
+        return Sampler(self.model(scene, design), self.numbers_of(scene, design))
+
+    def values(self, program: Program, design: Numbers) -> dict[str, float]:
+        """Return the NLP's variables of a design."""
+        return program.completed({**program.parameters, **design})
+
+    def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
+        """Return the NLP's variables without what is only rounding."""
+        return dict(x)
+
+    def peaks(self, model: JobModel) -> Mapping[str, str]:
+        """Return the figures that are extremes over the cycle, with their quantities."""
+        return {name: name for name in model.quantities}
+
+    def studied(self, scene: Scene) -> Studied:
+        """Return what studies read: the default target, and every figure that is the largest |value| of a quantity."""
+        peaks = {name: (name, False) for name in self.model(scene).quantities}
+        return Studied((scene.schema.default_target,), peaks)
+
+    def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
+        """Return the scene whose own are a design's lists, and the target whose limits it keeps."""
+        return scene, target
+
+    def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
+        """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending."""
+        return numbers.sizes(scene)
+
+    def explain(self, scene: Scene, clash: Sequence[str]) -> str:
+        """Return what physics says of why the limits `clash` (phrases) do; "" where it says nothing."""
+        return numbers.explained(scene, self.numbers(scene), clash)
+
+
+def demand(scene: Scene, target: str) -> None:
+    """Raise BadInput where the scene lacks a number or an effect that its target needs."""
+    asked = scene.schema.targets[target]
+    for name in asked.needs:
+        if name not in scene.operation:
+            raise BadInput(
+                f"target {target} needs {name}",
+                file=scene.origin,
+                key=f"operation.{name}",
+                remedy=f"Give operation.{name}, or choose another target.",
+            )
+    for name in asked.needs_effects:
+        if name not in scene.effects:
+            raise BadInput(
+                f"target {target} needs the effect {name}",
+                file=scene.origin,
+                key=f"effects.{name}",
+                remedy=f"Add the table [effects.{name}], or choose another target.",
+            )
