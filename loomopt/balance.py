@@ -10,29 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from loomopt.effects.kinds import Load, Motion, State
 from loomopt.maths import Maths, Number
-from loomopt.schema import Load, Values
+from loomopt.schema import Values
 
-
-class Motion:
-    """What every pose knows: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
-
-    q: Number
-    q1: Number
-    q2: Number
-    omega: Number
-    omega_dot: Number
-
-    @property
-    def velocity(self) -> Number:
-        """q˙ = q' ω."""
-        return self.q1 * self.omega
-
-    @property
-    def acceleration(self) -> Number:
-        """q¨ = q'' ω² + q' ω̇; the second term only where the speed changes."""
-        steady = self.q2 * self.omega**2
-        return steady if self.omega_dot is None else steady + self.q1 * self.omega_dot
+Acting = Load[Any] | State[Any]
 
 
 @dataclass(frozen=True)
@@ -54,22 +36,22 @@ class Pose(Motion):
 
 @dataclass(frozen=True)
 class Given:
-    """All numbers of a scene in one number system: `values` by name, `own` values of each effect."""
+    """All numbers of a scene in one number system: `values` by name, `own` values of each effect.
+
+    cases: the same of every further set of scene numbers (several fabrics on one machine).
+    """
 
     values: Values
     own: Mapping[str, Values]
+    cases: tuple["Given", ...] = ()
 
 
 def terms(
-    maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]
-) -> Iterator[tuple[Load, Number]]:
-    """Yield each load with its term; switches[i] says which of its formulas holds (see `Load.switch`)."""
-    for load, switch in zip(loads, switches, strict=True):
-        yield load, _term(maths, load, pose, given, switch)
-
-
-def _term(maths: Maths, load: Load, pose: Motion, given: Given, switch: Number) -> Number:
-    return load.force(maths, pose, given.values, given.own[load.name], switch)
+    maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
+) -> Iterator[tuple[Acting, Number]]:
+    """Yield each load with its term; switch: by a load's name, which of its formulas holds (see `Load.switch`)."""
+    for load in loads:
+        yield load, load.force(maths, pose, given.values, given.own[load.name], switch.get(load.name, 0))
 
 
 def total(numbers: Sequence[Number]) -> Number:
@@ -82,15 +64,22 @@ def total(numbers: Sequence[Number]) -> Number:
     return result
 
 
-def output_force(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:
+def carried(loads: Sequence[Acting]) -> frozenset[str]:
+    """Return the names of the loads that move with a coordinate of their own: its force stands for them."""
+    return frozenset(name for load in loads if isinstance(load, State) for name in load.carries)
+
+
+def output_force(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
     """Return Q, N or N·m: what the mechanism must supply at its output."""
-    acting = [(load, switch) for load, switch in zip(loads, switches, strict=True) if load.acts == "output"]
-    return total([_term(maths, load, pose, given, switch) for load, switch in acting])
+    gone = carried(loads)
+    acting = [load for load in loads if load.acts == "output" and load.name not in gone]
+    return total([term for _, term in terms(maths, acting, pose, given, switch)])
 
 
-def crank_torque(maths: Maths, loads: Sequence[Load], pose: Motion, given: Given, switches: Sequence[Number]) -> Number:
+def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
     """Return the torque on the crank, N·m: Q q' and the drive's own terms."""
-    found = list(terms(maths, loads, pose, given, switches))
+    gone = carried(loads)
+    found = list(terms(maths, [load for load in loads if load.name not in gone], pose, given, switch))
     output = [term for load, term in found if load.acts == "output"]
     drive = [term for load, term in found if load.acts == "drive"]
     return total([total(output) * pose.q1, *drive] if output else drive)

@@ -5,30 +5,43 @@ one piece and u = 0 of the next. As a function of the design, a node's angle is 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.maths import Number
-from loomopt.schema import Switched
+from loomopt.schema import Values
 
 TURN = 2 * math.pi
 SAME_ANGLE = 1e-12
 """rad; a piece that ends this close before an angle is taken to end at it."""
 Floats = NDArray[np.float64]
+Pieces = NDArray[np.intp]
+Where = tuple[str, float]
+"""A switch by name, and its value on the pieces that are meant."""
+
+
+class Node(NamedTuple):
+    """A position of the cycle in one number system: crank angle, rad, and the switches there by name."""
+
+    phi: Number
+    switch: Values
 
 
 @dataclass(frozen=True)
 class Cycle:
     """The pieces of one turn at one design.
 
-    starts: (pieces + 1,) crank angles, rad, the last one turn after the first; switches: (pieces, switched);
-    order: for each start, its corner's place in the declared list and the turns added to it (empty without corners).
+    starts: (pieces + 1,) crank angles, rad, the last one turn after the first; names: of the switches; switches:
+    (pieces, names); order: for each start, its corner's place in the declared list and the turns added to it (empty
+    without corners).
     """
 
     starts: Floats
+    names: tuple[str, ...]
     switches: Floats
     order: tuple[tuple[int, int], ...]
 
@@ -37,7 +50,17 @@ class Cycle:
         """Number of pieces."""
         return len(self.starts) - 1
 
-    def angles(self, pieces: NDArray[np.intp], u: Floats) -> Floats:
+    def switch(self, pieces: Pieces | int) -> dict[str, Number]:
+        """Return the switches on a piece, or on each of several, by name."""
+        return dict(zip(self.names, self.switches[pieces].T, strict=True))
+
+    def on(self, where: Where | None) -> NDArray[np.bool_]:
+        """Say of each piece whether it is meant; all are without `where`."""
+        if where is None:
+            return np.ones(self.pieces, dtype=bool)
+        return np.asarray(self.switches[:, self.names.index(where[0])] == where[1])
+
+    def angles(self, pieces: Pieces, u: Floats) -> Floats:
         """Return crank angles, rad, of nodes (pieces, u)."""
         return self.starts[pieces] * (1 - u) + self.starts[pieces + 1] * u
 
@@ -52,12 +75,21 @@ class Cycle:
         weights[second[0]] += u
         return TURN * (first[1] * (1 - u) + wrapped * u), weights
 
-    def located(self, angle: float) -> tuple[int, float]:
-        """Return the node (piece, u) at a crank angle in rad."""
-        turned = self.starts[0] + (angle - self.starts[0]) % TURN
-        piece = min(max(int(np.searchsorted(self.starts, turned, side="right")) - 1, 0), self.pieces - 1)
-        start, end = self.starts[piece : piece + 2]
-        return piece, float((turned - start) / (end - start))
+    def begins(self, corners: Sequence[Number], pi: Number) -> list[Number]:
+        """Return `starts` in another number system: corners: as declared, flat, rad; pi: that system's own."""
+        found = [corners[place] + 2 * pi * turn for place, turn in self.order] or [0 * pi]
+        return [*found, found[0] + 2 * pi]
+
+    def located(self, angles: Floats) -> tuple[Pieces, Floats]:
+        """Return the nodes (pieces, u) at crank angles in rad."""
+        turned = self.starts[0] + np.mod(angles - self.starts[0], TURN)
+        pieces = np.clip(np.searchsorted(self.starts, turned, side="right") - 1, 0, self.pieces - 1)
+        return pieces, (turned - self.starts[pieces]) / (self.starts[pieces + 1] - self.starts[pieces])
+
+    def place(self, angle: float) -> tuple[int, float]:
+        """Return the node (piece, u) at one crank angle in rad."""
+        pieces, u = self.located(np.array([angle]))
+        return int(pieces[0]), float(u[0])
 
     def piece_before(self, angle: float) -> int:
         """Return the piece that ends at, or holds, a crank angle in rad."""
@@ -65,25 +97,25 @@ class Cycle:
         return int(np.argmin(ahead))
 
 
-def split(switched: Sequence[Switched], corners: Sequence[Sequence[float]]) -> Cycle:
-    """Return the cycle's pieces from each one's corners, rad (an empty sequence for one without corners)."""
-    flat = [angle for of_load in corners for angle in of_load]
-    if not flat:
+def split(corners: Sequence[float], names: Sequence[str], read: Callable[[float], Sequence[float]]) -> Cycle:
+    """Return the cycle's pieces from the corners declared, rad; read(angle): the switches at a crank angle inside one."""
+    if not corners:
         starts = np.array([0.0, TURN])
-        return Cycle(starts, _switches(switched, corners, starts), ())
-    base = flat[0]
-    turns = [-math.floor((angle - base) / TURN) for angle in flat]
+        return Cycle(starts, tuple(names), _switches(starts, read), ())
+    base = corners[0]
+    turns = [-math.floor((angle - base) / TURN) for angle in corners]
     placed = sorted(
-        (angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(flat, turns, strict=True))
+        (angle + TURN * turn, index, turn) for index, (angle, turn) in enumerate(zip(corners, turns, strict=True))
     )
     starts = np.array([angle for angle, _, _ in placed] + [placed[0][0] + TURN])
-    return Cycle(starts, _switches(switched, corners, starts), tuple((index, turn) for _, index, turn in placed))
+    order = tuple((index, turn) for _, index, turn in placed)
+    return Cycle(starts, tuple(names), _switches(starts, read), order)
 
 
-def _switches(switched: Sequence[Switched], corners: Sequence[Sequence[float]], starts: Floats) -> Floats:
+def _switches(starts: Floats, read: Callable[[float], Sequence[float]]) -> Floats:
     """Return each switch on each piece, read at the piece's middle."""
     middles = (starts[:-1] + starts[1:]) / 2
-    return np.array([[each.switch(m, tuple(c)) for each, c in zip(switched, corners, strict=True)] for m in middles])
+    return np.array([read(float(middle)) for middle in middles], dtype=np.float64).reshape(len(middles), -1)
 
 
 def node_angle(offset: Number, coefficients: Sequence[Number], corners: Sequence[Number]) -> Number:

@@ -2,6 +2,7 @@
 
 import difflib
 import os
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from loomopt.errors import BadInput
@@ -13,19 +14,23 @@ def _folder(name: str) -> Path:
     return package / name if (package / name).is_dir() else package.parent / name
 
 
+def problems(folders: Iterable[Path] = ()) -> dict[str, Path]:
+    """Return the files of the packaged scenes by name, in alphabetical order, and of those in other folders."""
+    found = {path.stem: path for folder in folders for path in folder.glob("*.toml")}
+    found |= {path.stem: path for path in _folder("problems").glob("*.toml")}
+    return dict(sorted(found.items()))
+
+
 def problem_names() -> list[str]:
     """Return the names of the packaged scenes, in alphabetical order."""
-    return sorted(path.stem for path in _folder("problems").glob("*.toml"))
+    return list(problems())
 
 
-def problem_path(name: str) -> Path:
-    """Return the file of a packaged scene. Raises BadInput, with the nearest name, for an unknown one."""
-    known = problem_names()
-    if name in known:
-        return _folder("problems") / f"{name}.toml"
+def unknown_problem(name: str, known: Mapping[str, Path]) -> BadInput:
+    """Return the error, with the nearest name, for a scene that is not packaged."""
     near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
     hint = f'perhaps "{near[0]}" is meant' if near else "see `loomopt list`"
-    raise BadInput(
+    return BadInput(
         "there is no packaged scene of this name",
         file=clean(name, 80),
         value=shown(name),
@@ -44,13 +49,8 @@ def results_path() -> Path:
     return _folder("results")
 
 
-def locate(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a scene: text with a separator or ending in .toml is a path, else a packaged name.
-
-    Raises BadInput for an unknown name; whether a path can be read is seen when it is read.
-    """
+def is_path(name_or_path: str | os.PathLike[str]) -> bool:
+    """Say whether text is a path: with a separator, or ending in .toml; else it is a packaged name."""
     text = os.fspath(name_or_path)
     separators = {os.sep, os.altsep or os.sep}
-    if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or separators & set(text):
-        return Path(text)
-    return problem_path(text)
+    return isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or bool(separators & set(text))

@@ -1,15 +1,21 @@
 """The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from loomopt.effects.kinds import UNBUILT, Check, Effect, instance
+from loomopt.owned import label
 from loomopt.quantities import Quantity, quantity_of, unit_of
 from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
-from loomopt.schema import Check, Job, Table
+from loomopt.scene_schema import SceneSchema
+from loomopt.schema import Figure, Table
 from loomopt.units import QuantityError
+
+if TYPE_CHECKING:
+    from loomopt.scenes import Jobs
 
 _Model = TypeVar("_Model", bound=Table)
 
@@ -43,12 +49,17 @@ class Limit:
 
 
 class Place(NamedTuple):
-    """Where a number stands: table and key; what it may be; whether the scene has a value for it."""
+    """Where a number stands: table and key; what a designer calls it; what it may be.
+
+    given: whether the scene has a value for it; waits: whether the values of its effect, which is off, are at hand.
+    """
 
     table: str
     key: str
+    label: str
     quantity: Quantity
     given: bool
+    waits: bool = False
 
 
 def table(raw: Any, origin: str, path: str) -> Mapping[str, Any]:
@@ -70,7 +81,7 @@ def checked(model: type[_Model], raw: Any, origin: str, path: str) -> _Model:
         raise invalid(error, model, origin, path) from None
 
 
-def problem(raw: Any, jobs: Mapping[str, Job], origin: str) -> Problem:
+def problem(raw: Any, jobs: "Jobs", origin: str) -> Problem:
     """Return [problem], its name fit for a file name and its job one of `jobs`."""
     found = checked(Problem, raw, origin, "problem")
     if not found.name.replace("-", "").replace("_", "").isalnum() or len(found.name) > 64:
@@ -78,7 +89,7 @@ def problem(raw: Any, jobs: Mapping[str, Job], origin: str) -> Problem:
         allowed = "up to 64 letters, digits, - and _"
         raise refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy)
     if found.job not in jobs:
-        raise unknown("job", found.job, jobs, origin, "problem.job")
+        raise unknown("job", found.job, jobs.names(), origin, "problem.job")
     return found
 
 
@@ -93,61 +104,97 @@ def named(raw: Any, models: Mapping[str, type[Table]], what: str, origin: str, p
     }
 
 
-def demand(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table], origin: str) -> None:
+def effects(raw: Any, schema: SceneSchema, origin: str, path: str) -> dict[Effect, Table]:
+    """Return the effects whose tables stand in a table, in the order of the job, with their values."""
+    inner, found = table(raw, origin, path), {}
+    for name in inner:
+        if name not in schema.effects:
+            raise unknown("effect", name, schema.effects, origin, f"{path}.{name}")
+    for name, effect in schema.effects.items():
+        if name not in inner:
+            continue
+        if isinstance(effect, UNBUILT):
+            problem = f"effect {name} changes the motion itself, which no scene can ask for yet"
+            raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
+        if not effect.many:
+            found[effect] = checked(effect.own, inner[name], origin, f"{path}.{name}")
+            continue
+        for each, values in table(inner[name], origin, f"{path}.{name}").items():
+            found[instance(effect, each)] = checked(effect.own, values, origin, f"{path}.{name}.{each}")
+    return found
+
+
+def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], origin: str) -> None:
     """Raise BadInput where an active effect, or the job, needs a number that is not given."""
-    needs = [(key, f"job {job.name}") for key in job.needs]
-    needs += [(key, f"effect {name}") for name in effects for key in job.effects[name].needs]
+    needs = [(key, f"job {schema.name}") for key in schema.needs]
+    needs += [(key, f"effect {effect.name}") for effect in active for key in effect.needs]
     for key, who in needs:
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
             raise missing(type(tables[path]), origin, path, name, f"{who} needs it")
 
 
-def places(job: Job, tables: Mapping[str, Table], effects: Mapping[str, Table]) -> Iterator[Place]:
+def places(
+    schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], available: Mapping[Effect, Table]
+) -> Iterator[Place]:
     """Yield every place of a number in the job's tables, those of effects that are off included."""
-    models: dict[str, tuple[type[Table], Table | None]] = {
-        "operation": (job.operation, tables["operation"]),
-        "mechanism": (job.mechanism, tables["mechanism"]),
-    }
-    models |= {f"effects.{name}": (effect.own, effects.get(name)) for name, effect in job.effects.items()}
-    for path, (model, own) in models.items():
-        for key in model.model_fields:
-            quantity = quantity_of(model, key)
-            if quantity:
-                yield Place(path, key, quantity, own is not None and getattr(own, key) is not None)
+    for path, model in (("operation", schema.operation), ("mechanism", schema.mechanism)):
+        yield from _places(path, model, tables[path])
+    known = [*active, *available, *(effect for effect in schema.effects.values() if not effect.many)]
+    for effect in dict.fromkeys(known):
+        path, waits = f"effects.{effect.name}", effect in available
+        for place in _places(path, effect.own, active.get(effect)):
+            yield place._replace(label=label(effect, place.key), waits=waits)
 
 
-def bounds(raw: Any, job: Job, known: list[Place], available: Mapping[str, Any], origin: str) -> dict[str, Bound]:
+def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]:
+    for key in model.model_fields:
+        quantity = quantity_of(model, key)
+        if quantity:
+            yield Place(path, key, key, quantity, own is not None and getattr(own, key) is not None)
+
+
+def flat(raw: Any, known: Iterable[str], origin: str, path: str) -> dict[str, Any]:
+    """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m"."""
+    found: dict[str, Any] = {}
+    for name, value in table(raw, origin, path).items():
+        inner = {f"{name}.{key}": each for key, each in value.items()} if isinstance(value, Mapping) else {}
+        found |= inner if name not in known and inner.keys() & set(known) else {name: value}
+    return found
+
+
+def bounds(raw: Any, schema: SceneSchema, known: list[Place], origin: str) -> dict[str, Bound]:
     """Return [bounds]; known: places of the scene's numbers, any of which may be bounded.
 
     A bound on a number of an effect that is off waits for it: it is checked and left out.
     """
-    inner, found = table(raw, origin, "bounds"), {}
-    for name in inner:
-        waiting = [p for p in known if p.key == name and p.table.removeprefix("effects.") in available]
-        given = any(place.key == name and place.given for place in known)
-        quantity = waiting[0].quantity if waiting and not given else _bounded(name, job, known, origin)
-        bound = _bound(inner[name], quantity, origin, f"bounds.{name}")
+    found = {}
+    for name, each in flat(raw, {place.label for place in known}, origin, "bounds").items():
+        waiting = [p for p in known if p.label == name and p.waits]
+        given = any(place.label == name and place.given for place in known)
+        quantity = waiting[0].quantity if waiting and not given else _bounded(name, schema, known, origin)
+        bound = _bound(each, quantity, origin, f"bounds.{name}")
         if given or not waiting:
             found[name] = bound
     return found
 
 
-def _bounded(name: str, job: Job, known: list[Place], origin: str) -> Quantity:
+def _bounded(name: str, schema: SceneSchema, known: list[Place], origin: str) -> Quantity:
     """Return what a number to bound may be: a design variable, or the one number of that name."""
     key = f"bounds.{name}"
-    found = [place for place in known if place.key == name]
+    found = [place for place in known if place.label == name]
     given = [place for place in found if place.given]
-    if name in job.variables:
-        return next((place.quantity for place in found if place.table == "mechanism"), Quantity(job.variables[name]))
+    if name in schema.variables:
+        kind = Quantity(schema.variables[name])
+        return next((place.quantity for place in found if place.table == "mechanism"), kind)
     if not found:
-        names = [*job.variables, *sorted({place.key for place in known if place.given} - set(job.variables))]
+        names = [*schema.variables, *sorted({place.label for place in known if place.given} - set(schema.variables))]
         raise unknown("number to bound", name, names, origin, key)
     if not given:
-        where = " or ".join(f"{place.table}.{name}" for place in found)
+        where = " or ".join(f"{place.table}.{place.key}" for place in found)
         raise refusal(f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take the bound out")
     if len(given) > 1:
-        where = ", ".join(f"{place.table}.{name}" for place in given)
+        where = ", ".join(f"{place.table}.{place.key}" for place in given)
         raise refusal(f"{name} may mean {where}", origin, key, remedy="Take the bound out")
     return given[0].quantity
 
@@ -170,23 +217,24 @@ def _bound(raw: Any, quantity: Quantity, origin: str, key: str) -> Bound:
     return Bound(low, high, free, _unit(raw["min"]))
 
 
-def limits(raw: Any, job: Job, effects: Mapping[str, Table], origin: str) -> dict[str, Limit]:
+def limits(raw: Any, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, Limit]:
     """Return [limits]: figures of the job, and of the effects that are on."""
-    inner = table(raw, origin, "limits")
-    limitable = [name for name, figure in job.figures.items() if figure.sides]
+    inner = flat(raw, schema.figures, origin, "limits")
+    limitable = [name for name, figure in schema.figures.items() if figure.sides]
+    on = {effect.name for effect in active}
     for name in inner:
         if name not in limitable:
             raise unknown("figure to limit", name, limitable, origin, f"limits.{name}")
-        for other, effect in job.effects.items():
+        for other, effect in schema.effects.items():
             given = isinstance(effect, Check) and name in {*effect.quantities, *effect.rows}
-            if given and other not in effects:
+            if given and other not in on:
                 remedy = f"Put it on (--with {other}), or take the limit out"
                 raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
-    return {name: _limit(inner[name], job, name, origin) for name in inner}
+    return {name: _limit(inner[name], schema.figures[name], name, origin) for name in inner}
 
 
-def _limit(raw: Any, job: Job, name: str, origin: str) -> Limit:
-    figure, key = job.figures[name], f"limits.{name}"
+def _limit(raw: Any, figure: Figure, name: str, origin: str) -> Limit:
+    key = f"limits.{name}"
     sides = " and ".join(figure.sides)
     if not isinstance(raw, Mapping):
         remedy = f"Write a table with {sides}"

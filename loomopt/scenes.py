@@ -1,47 +1,93 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from loomopt import scene_tables as read
+from loomopt.effects.kinds import Effect
 from loomopt.frozen import freeze
+from loomopt.owned import label, owned
 from loomopt.quantities import unit_of
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
+from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
-from loomopt.schema import Job, Table
+from loomopt.schema import Table
 from loomopt.units import DISPLAY_UNIT, fits
 
+_Own = TypeVar("_Own", bound=Table)
+
 TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "targets")
+
+
+class Jobs(Protocol):
+    """Where a scene finds its job by name."""
+
+    def __contains__(self, name: object, /) -> bool:
+        """Say whether there is a job of a name."""
+
+    def names(self) -> Collection[str]:
+        """Return the names of all jobs."""
+
+    def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str], /) -> SceneSchema:
+        """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
 
 
 @dataclass(frozen=True)
 class Scene:
     """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
 
-    document: the raw tables, never to be changed; origin: the file they came from.
-    operation, mechanism: numbers given or defaulted; effects: those that are on, in the order of the job.
-    bounds: by name of number; limits: by name of figure; targets: every target of the job.
+    document: the raw tables, never to be changed; origin: the file they came from; schema: what its job declares.
+    operation, mechanism: numbers given or defaulted; tables: both as their models, words and lists too.
+    effects: tables of those that are on, in the order of the job, by name; active: the effects themselves.
+    bounds: by label of number; limits: by name of figure; targets: every target of the job.
     """
 
     document: Mapping[str, Any] = field(repr=False)
     origin: str
-    job: Job = field(repr=False)
+    schema: SceneSchema = field(repr=False)
+    jobs: Jobs = field(repr=False, compare=False)
     name: str
     title: str
     source: str = field(repr=False)
     operation: Mapping[str, float]
     mechanism: Mapping[str, float]
+    tables: Mapping[str, Table] = field(repr=False)
     effects: Mapping[str, Table]
+    active: tuple[Effect, ...] = field(repr=False)
     bounds: Mapping[str, Bound]
     limits: Mapping[str, Limit]
     targets: Mapping[str, Table] = field(repr=False)
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
-        freeze(self, "operation", "mechanism", "effects", "bounds", "limits", "targets")
+        freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
+
+    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str]]:
+        """Return how to make it again: from its tables, for formulas do not pickle."""
+        return build, (self.document, self.jobs, self.origin)
+
+    @property
+    def job(self) -> str:
+        """The name of its job."""
+        return self.schema.name
+
+    def own(self, model: type[_Own]) -> _Own | None:
+        """Return the table of an effect that is on, by the model of its values; None where it is off."""
+        return next((table for table in self.effects.values() if isinstance(table, model)), None)
+
+    def table(self, model: type[_Own]) -> _Own:
+        """Return [operation], [mechanism] or the table of a target, by its model."""
+        return next(each for each in (*self.tables.values(), *self.targets.values()) if isinstance(each, model))
+
+    def full(self, name: str) -> str:
+        """Return the full name of a number by what a designer calls it; any other name is one already."""
+        if name in self.mechanism or name in self.operation:
+            return name
+        labels = {label(e, key): owned(e, key) for e in reversed(self.active) for key in e.own.model_fields}
+        return labels.get(name, name)
 
     def given(self, key: str) -> str | None:
         """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
@@ -87,30 +133,30 @@ class Scene:
 
     def with_effect(self, name: str) -> "Scene":
         """Return the scene with an effect put on, its values from [available.NAME]."""
-        self._demand_effect(name)
+        parts = self._effect_path(name)
         if name in self.effects:
             return self
-        fields = self.job.effects[name].own.model_fields
+        fields = self._effect(name).own.model_fields
         keys = [f"effects.{name}.{key}" for key, info in fields.items() if info.is_required()]
-        if keys and looked_up(self.document, ("available", name)) is None:
+        if keys and looked_up(self.document, ("available", *parts)) is None:
             remedy = f"Set {', '.join(keys)} instead, which puts it on, or add the table [available.{name}]"
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
-        return self._rebuilt(_put_on(self.document, name))
+        return self._rebuilt(_put_on(self.document, *parts))
 
     def without_effect(self, name: str) -> "Scene":
         """Return the scene with an effect taken off; its values stay in [available.NAME]."""
-        self._demand_effect(name)
+        parts = self._effect_path(name)
         if name not in self.effects:
             return self
-        document = removed(self.document, "effects", name)
-        own, key = self.document["effects"][name], f"available.{name}"
-        return self._rebuilt(replaced(document, ("available", name), own, self.origin, key))
+        document = removed(self.document, "effects", *parts)
+        own, key = looked_up(self.document, ("effects", *parts)), f"available.{name}"
+        return self._rebuilt(replaced(document, ("available", *parts), own, self.origin, key))
 
     def free(self, names: Iterable[str] | str) -> "Scene":
         """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
         named = names.replace(",", " ").split() if isinstance(names, str) else list(names)
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
-        groups = {group: [n for n in of if n in ranges] for group, of in self.job.groups.items()}
+        groups = {group: [n for n in of if n in ranges] for group, of in self.schema.groups.items()}
         asked = [each for name in named for each in groups.get(name) or [name]]
         for name in asked:
             if name not in ranges:
@@ -127,9 +173,9 @@ class Scene:
         import hashlib
 
         content = {
-            "job": self.job.name,
-            "operation": dict(self.operation),
-            "mechanism": dict(self.mechanism),
+            "job": self.job,
+            "operation": given(self.tables["operation"]),
+            "mechanism": given(self.tables["mechanism"]),
             "effects": {name: own.model_dump() for name, own in self.effects.items()},
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
@@ -147,21 +193,32 @@ class Scene:
         raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
 
     def _rebuilt(self, document: Mapping[str, Any]) -> "Scene":
-        return build(document, {self.job.name: self.job}, self.origin)
+        return build(document, self.jobs, self.origin)
 
-    def _demand_effect(self, name: str) -> None:
-        if name not in self.job.effects:
-            raise unknown("effect", name, self.job.effects, self.origin, "effects")
+    def _effect(self, name: str) -> Effect:
+        """Return a declared effect; of an instance, its kind."""
+        return self.jobs.schema(self.job, self.document, (self._kind(name),)).effects[self._kind(name)]
+
+    def _kind(self, name: str) -> str:
+        """Return the kind of an effect as the command names it: "mass" of "mass.rod"."""
+        return name.split(".")[0]
+
+    def _effect_path(self, name: str) -> list[str]:
+        """Return where an effect's table stands inside [effects]; raises BadInput for one that is not declared."""
+        known = self.jobs.schema(self.job, self.document, (self._kind(name),)).effects
+        if self._kind(name) not in known:
+            raise unknown("effect", name, known, self.origin, "effects")
+        return name.split(".")
 
 
-def _put_on(document: Mapping[str, Any], effect: str) -> Mapping[str, Any]:
+def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
     """Move an effect's table from [available] to [effects]."""
-    own = looked_up(document, ("available", effect))
-    on = replaced(document, ("effects", effect), {} if own is None else own, "", f"effects.{effect}")
-    return on if own is None else removed(on, "available", effect)
+    own = looked_up(document, ("available", *effect))
+    on = replaced(document, ("effects", *effect), {} if own is None else own, "", f"effects.{'.'.join(effect)}")
+    return on if own is None else removed(on, "available", *effect)
 
 
-def build(document: Mapping[str, Any], jobs: Mapping[str, Job], origin: str) -> Scene:
+def build(document: Mapping[str, Any], jobs: Jobs, origin: str) -> Scene:
     """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
 
     Raises BadInput for the first thing that is wrong.
@@ -172,36 +229,44 @@ def build(document: Mapping[str, Any], jobs: Mapping[str, Job], origin: str) -> 
             raise unknown("table", name, TABLES, origin, name)
     raw: dict[str, Any] = {name: {} for name in TABLES} | original
     problem = read.problem(raw["problem"], jobs, origin)
-    job = jobs[problem.job]
+    named = [*read.table(raw["effects"], origin, "effects"), *read.table(raw["available"], origin, "available")]
+    schema = jobs.schema(problem.job, original, named)
     tables = {
-        "operation": read.checked(job.operation, raw["operation"], origin, "operation"),
-        "mechanism": read.checked(job.mechanism, raw["mechanism"], origin, "mechanism"),
+        "operation": read.checked(schema.operation, raw["operation"], origin, "operation"),
+        "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism"),
     }
-    models = {name: effect.own for name, effect in job.effects.items()}
-    effects = read.named(raw["effects"], models, "effect", origin, "effects")
-    read.named(raw["available"], models, "effect", origin, "available")
-    read.demand(job, tables, effects, origin)
-    places = list(read.places(job, tables, effects))
-    own_targets = {name: {} for name in job.targets} | dict(read.table(raw["targets"], origin, "targets"))
-    targets = {name: target.own for name, target in job.targets.items()}
+    active = read.effects(raw["effects"], schema, origin, "effects")
+    available = read.effects(raw["available"], schema, origin, "available")
+    read.demand(schema, tables, active, origin)
+    places = list(read.places(schema, tables, active, available))
+    own_targets = {name: {} for name in schema.targets} | dict(read.table(raw["targets"], origin, "targets"))
+    targets = {name: target.own for name, target in schema.targets.items()}
     scene = Scene(
         document=original,
         origin=clean(origin),
-        job=job,
+        schema=schema,
+        jobs=jobs,
         name=problem.name,
         title=clean(" ".join(problem.title.split())),
         source=clean(" ".join(problem.source.split())),
-        operation=_given(tables["operation"]),
-        mechanism=_given(tables["mechanism"]),
-        effects=effects,
-        bounds=read.bounds(raw["bounds"], job, places, raw["available"], origin),
-        limits=read.limits(raw["limits"], job, effects, origin),
+        operation=_numbers(tables["operation"]),
+        mechanism=_numbers(tables["mechanism"]),
+        tables=tables,
+        effects={effect.name: own for effect, own in active.items()},
+        active=tuple(active),
+        bounds=read.bounds(raw["bounds"], schema, places, origin),
+        limits=read.limits(raw["limits"], schema, tuple(active), origin),
         targets=read.named(own_targets, targets, "target", origin, "targets"),
     )
-    job.check(scene)
+    schema.check(scene)
     return scene
 
 
-def _given(table: Table) -> dict[str, float]:
-    """Return the values of a table that are given or defaulted."""
+def given(table: Table) -> dict[str, Any]:
+    """Return the values of a table that are given or defaulted, words and lists too."""
     return {name: value for name, value in table if value is not None}
+
+
+def _numbers(table: Table) -> dict[str, float]:
+    """Return the numbers of a table that are given or defaulted."""
+    return {name: value for name, value in table if isinstance(value, float)}

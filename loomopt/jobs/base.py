@@ -2,19 +2,22 @@
 
 import abc
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.resources.abc import Traversable
 from typing import Any
 
+from loomopt.cycle import Floats
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
 from loomopt.program import numbers
-from loomopt.program.curves import Columns
+from loomopt.program.curves import STEPS, Columns, curves
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
+from loomopt.units import SI_UNIT
 
 Figures = Mapping[str, float | None]
 
@@ -87,6 +90,15 @@ class Job(abc.ABC):
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
         """Return a design ready to be sampled."""
         return Sampler(self.model(scene, design), self.numbers_of(scene, design))
+
+    def curves(
+        self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
+    ) -> dict[str, Floats]:
+        """Return the curves of a design over one turn, units in the column names; figures of checks stand last."""
+        sampler = self.sampler(scene, design)
+        kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
+        checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
+        return curves(sampler, replace(self.columns(scene, sampler), checks=checks), steps, also)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Return the NLP's variables of a design."""

@@ -222,6 +222,35 @@ class DeadCentres:
         return -self.lengths.side * 2 * l1 * (l2 - l1) ** 2 / (l2 * self._areas[1])
 
 
+@dataclass(frozen=True)
+class Still(Pose):
+    """The linkage with crank and rod in line, exact: ψ' = 0, the rod turns against the crank, ψ'' in closed form."""
+
+    centres: "DeadCentres"
+
+    @functools.cached_property
+    def dyad(self) -> dyad.Dyad:
+        """Rod, in line with the crank, and rocker, from the triangle A C D."""
+        cos, sin, sides = self.maths.cos(self.phi), self.maths.sin(self.phi), self.lengths
+        rod = Vector(sides.l2 * cos, sides.l2 * sin)
+        rocker = Vector(self.crank.x + rod.x - sides.l4, self.crank.y + rod.y)
+        return dyad.Dyad(rod, rocker, 2 * (rod.x * rocker.y - rod.y * rocker.x))
+
+    @functools.cached_property
+    def _rates(self) -> tuple[Number, Number]:
+        return -self.lengths.l1 / self.lengths.l2, 0
+
+    @functools.cached_property
+    def psi_2(self) -> Number:
+        """ψ'' = l1 (l1 + l2)/(l2 l3 sin μ)."""
+        return self.centres.psi_2_front
+
+
+def front_pose(maths: Maths, lengths: Lengths, centres: "DeadCentres") -> Still:
+    """Return the linkage at front dead centre: crank and rod stretched."""
+    return Still(maths, lengths, centres.beta, centres)
+
+
 def dead_centres(maths: Maths, lengths: Lengths) -> DeadCentres:
     """Return both dead centres of a crank-rocker; lengths in m."""
     return DeadCentres(maths, lengths)

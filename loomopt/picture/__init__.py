@@ -1,0 +1,1 @@
+"""Shapes, panels and equation records: what jobs return and views render."""

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
 ANGLE = "phi [rad]"
@@ -51,6 +50,6 @@ def split(column: str) -> tuple[str, str]:
     return (match["name"], match["unit"]) if match else (column, "1")
 
 
-def each(scene: Any, design: Any, columns: Iterable[str]) -> tuple[Panel, ...]:
+def each(columns: Iterable[str]) -> tuple[Panel, ...]:
     """Return a panel for every column that has a unit."""
     return tuple(Panel((name,)) for name in columns if COLUMN.fullmatch(name) and name != ANGLE)

@@ -1,29 +1,29 @@
-"""A scene's numbers by one name each, whatever table they stand in."""
+"""A scene's numbers by one name each, whatever table they stand in; what its effects say of them."""
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
 
-from loomopt.program.program import Wish
+from loomopt.effects.kinds import Check
+from loomopt.owned import label, owned
+from loomopt.program.program import Limit, Move, Variable, Wish
+from loomopt.scenes import Scene
+
+LEAST_CHANGE = "least change from today"
+ROOM = 0.01
+"""Share of a bound's width that a start keeps from its ends."""
 
 
-def numbers(scene: Any) -> dict[str, float]:
-    """Return every number of the scene by name, SI; an effect's as `effect.key`."""
-    tables = {**scene.mechanism, **scene.operation}
-    found = {name: value for name, value in tables.items() if isinstance(value, float)}
-    for effect, own in scene.effects.items():
+def numbers(scene: Scene) -> dict[str, float]:
+    """Return every number of the scene by full name, SI."""
+    found = {**scene.mechanism, **scene.operation}
+    for effect, own in zip(scene.active, scene.effects.values(), strict=True):
         for key, value in own.model_dump().items():
             if isinstance(value, float | int):
-                found[f"{effect}.{key}"] = float(value)
+                found[owned(effect, key)] = float(value)
     return found
 
 
-def full_name(known: Mapping[str, float], name: str) -> str:
-    """Return a number's name among all numbers: an effect's own is `effect.key`."""
-    return name if name in known else next(key for key in known if key.endswith(f".{name}") and key[:6] != "today.")
-
-
-def words(scene: Any) -> tuple[tuple[str, str, str], ...]:
+def words(scene: Scene) -> tuple[tuple[str, str, str], ...]:
     """Return (effect, key, word) for every value that chooses an effect's formula."""
     return tuple(
         (name, key, value)
@@ -33,26 +33,109 @@ def words(scene: Any) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-def bounds(scene: Any, known: Mapping[str, float], names: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of `names` and of every bounded number, by full name, SI; held ones at today's."""
-    found = {name: (known[name], known[name]) for name in names}
+def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Return lower and upper bound of the design variables and of every bounded number, by full name, SI.
+
+    What is held stands at today's value.
+    """
+    found = {name: (known[name], known[name]) for name in scene.schema.variables}
     for name, bound in scene.bounds.items():
-        full = full_name(known, name)
+        full = scene.full(name)
         found[full] = (bound.min, bound.max) if bound.free else (known[full], known[full])
     return found
 
 
-def nearest_scale(
-    x: Mapping[str, float], old: Mapping[str, float], limited: Mapping[str, tuple[float, float]], along: Iterable[str]
-) -> Wish | None:
-    """Return x (SI) with `along` scaled in common to be nearest to today's, in bound widths; None without room."""
-    names = tuple(along)
-    widths = {name: limited[name][1] - limited[name][0] for name in names}
-    if min(widths.values()) <= 0.0:
-        return None
-    pull = math.fsum(x[n] * old[n] / widths[n] ** 2 for n in names)
-    factor = pull / math.fsum((x[n] / widths[n]) ** 2 for n in names)
-    scales = [sorted((limited[n][0] / x[n], limited[n][1] / x[n])) for n in names if x[n]]
-    factor = min(max(factor, max(low for low, _ in scales)), min(high for _, high in scales))
-    goal = {n: min(max(x[n] * factor, limited[n][0]), limited[n][1]) for n in names}
-    return Wish(goal, "least change from today")
+def labels(scene: Scene) -> dict[str, str]:
+    """Return what a designer calls each number of the effects that are on, by its full name."""
+    return {owned(effect, key): label(effect, key) for effect in scene.active for key in effect.own.model_fields}
+
+
+def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]:
+    """Return the bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
+    name, v = variable.called, variable
+    if v.lower == v.upper:
+        return [Limit(name, 0, v.name, v.lower, v.scale, "variable")]
+    ends = [(sign, value) for sign, value in ((-1, v.lower), (1, v.upper)) if math.isfinite(value)]
+    return [
+        Limit(name, sign, v.name, value, v.scale, "variable", relaxable=relaxable_from or sign > 0 or value > 0.0)
+        for sign, value in ends
+    ]
+
+
+def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
+    """Return the sides of a limit that are given: (0, value) where both are one."""
+    if low is not None and low == high:
+        return [(0, low)]
+    return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
+
+
+def demanded(
+    scene: Scene, checks: Iterable[Check], known: Mapping[str, float], sizes: Mapping[str, float]
+) -> list[Limit]:
+    """Return what checks demand of their rows and quantities while they are on.
+
+    sizes: natural size by row; the value asked, or 1, without one. What a table asks for may give way; what the nature
+    of the thing demands may not.
+    """
+    found = []
+    for check in checks:
+        for each in check.demands:
+            value = each.value if isinstance(each.value, float) else known[owned(check, each.value)]
+            firm = each.row in scene.schema.margins or not isinstance(each.value, str)
+            family = "cycle" if each.row in check.quantities else "static"
+            size = sizes.get(each.row) or abs(value) or 1.0
+            found.append(Limit(each.row, each.sign, each.row, value, size, family, relaxable=not firm))  # type: ignore[arg-type]
+    return found
+
+
+def inside(variables: Iterable[Variable], values: Mapping[str, float]) -> dict[str, float]:
+    """Return a start: values, or lower bounds, moved just inside the bounds of the variables."""
+    start = {}
+    for v in variables:
+        room = ROOM * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
+        start[v.name] = min(max(values.get(v.name, v.lower), v.lower + room), v.upper - room)
+    return start
+
+
+def distinct(starts: Sequence[dict[str, float]]) -> tuple[dict[str, float], ...]:
+    """Return starts without repeats."""
+    return tuple(start for place, start in enumerate(starts) if start not in starts[:place])
+
+
+def scale_move(
+    name: str, along: tuple[str, ...], known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
+) -> Move:
+    """Return the move that scales lengths in common, and would stay nearest to today's."""
+    today, ranges = ({n: of[n] for n in along if n in of} for of in (known, limited))  # type: ignore[index]
+    return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, ranges)  # type: ignore[arg-type]
+
+
+def axis_moves(scene: Scene, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> list[Move]:
+    """Return the moves along numbers of checks that may change nothing, and would stay nearest to today's."""
+    found = []
+    for check in (effect for effect in scene.active if isinstance(effect, Check)):
+        for axis in check.axes:
+            name = owned(check, axis.key)
+            if name in limited and limited[name][0] < limited[name][1]:
+                wish = (Wish("today", LEAST_CHANGE),)
+                found.append(Move(axis.name, (name,), "axis", wish, {name: known[name]}, {name: limited[name]}))
+    return found
+
+
+def sizes(scene: Scene) -> dict[str, Sequence[float]]:
+    """Return the freed numbers of effects, by label, that come in sizes only, with those sold, ascending."""
+    found: dict[str, Sequence[float]] = {}
+    for effect, own in zip(scene.active, scene.effects.values(), strict=True):
+        for key, sold in (effect.sold(own) if isinstance(effect, Check) else {}).items():
+            bound = scene.bounds.get(label(effect, key))
+            if bound is not None and bound.free and bound.min < bound.max:
+                found[label(effect, key)] = sold
+    return found
+
+
+def explained(scene: Scene, known: Mapping[str, float], clash: Sequence[str]) -> str:
+    """Return what the effects that are on say of why limits (phrases) clash; "" where they say nothing."""
+    limited = bounds(scene, known)
+    on = zip(scene.active, scene.effects.values(), strict=True)
+    told = [effect.explain(known, limited, own, clash) for effect, own in on if isinstance(effect, Check)]
+    return " ".join(text for text in told if text)

@@ -4,102 +4,34 @@ A program knows no grid and no solver. Its structure (what is in it) is apart fr
 serves every scene of the same structure.
 """
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
-from loomopt.balance import Given
+from loomopt.cycle import Where
 from loomopt.maths import Maths, Number
-from loomopt.schema import Load, Switched, Values
-
-
-@dataclass(frozen=True)
-class Integral:
-    """A mean of `quantity` over the crank angle; root: its square root.
-
-    Over the pieces where switch number `load` is 1; or, with `angles` (rad), over these alone, each with one number
-    of `data` in place of the last switch.
-    """
-
-    name: str
-    root: str
-    quantity: str
-    load: int = -1
-    angles: tuple[float, ...] = ()
-    data: tuple[float, ...] = ()
-
-
-class Model(Protocol):
-    """A mechanism with its effects, in every number system."""
-
-    @property
-    def key(self) -> Hashable:
-        """What distinguishes this model's formulas from another's."""
-
-    @property
-    def loads(self) -> tuple[Load, ...]:
-        """The loads of the balance, in order."""
-
-    @property
-    def switched(self) -> tuple[Switched, ...]:
-        """What has corners in the cycle: the loads first."""
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Whole-cycle quantities whose largest |value| is a figure."""
-
-    @property
-    def signed(self) -> frozenset[str]:
-        """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
-
-    @property
-    def bounded(self) -> frozenset[str]:
-        """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
-
-    @property
-    def assembly(self) -> Mapping[str, tuple[str, float]]:
-        """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
-
-    @property
-    def integrals(self) -> tuple[Integral, ...]:
-        """The means over part of the cycle this model knows."""
-
-    def given(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers and what follows from them at once, SI."""
-
-    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
-        """Return the corner angles, rad, of each thing that has any."""
-
-    def hints(self, given: Given) -> Mapping[str, float]:
-        """Return where corners that no formula gives lie, by name of value: what `corners` starts from."""
-
-    def singular(self, given: Given) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the mechanism comes within a hair of a singular position."""
-
-    def implied(self, values: Mapping[str, float]) -> Mapping[str, float]:
-        """Return the variables that follow from the others at a start; raises ValueError where it cannot move."""
-
-    def static(
-        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
-    ) -> dict[str, Number]:
-        """Return figures and rows that need one position only; `front` = the loads' switches there."""
-
-    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity at crank angle φ, rad."""
-
-    def front_angle(self, given: Given) -> Number:
-        """Return the crank angle of the position `static` speaks of, rad."""
+from loomopt.program.model import JobModel
+from loomopt.schema import Values
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A design variable of the NLP, SI: name among the model's values, bounds, scale, range of random starts."""
+    """A design variable of the NLP, SI: name among the model's values, bounds, scale, range of random starts.
+
+    label: what a designer calls it, its name without one.
+    """
 
     name: str
     lower: float
     upper: float
     scale: float
     range: tuple[float, float]
+    label: str = ""
+
+    @property
+    def called(self) -> str:
+        """What a designer calls it."""
+        return self.label or self.name
 
 
 @dataclass(frozen=True)
@@ -122,7 +54,7 @@ class Limit:
     weight: str = ""
     relaxable: bool = True
     complement: float = 0.0
-    where: tuple[int, float] | None = None
+    where: Where | None = None
     hidden: bool = False
 
     @property
@@ -146,6 +78,7 @@ class Objective:
     """One level of a target: least |row| ("magnitude"), least peak over the cycle ("peak") or least row ("value").
 
     figure: what the designer reads; scale: its natural size, SI; power: the figure's power that the row is.
+    others: more rows of the same form; combine: whether the worst of all counts, or their sum.
     """
 
     figure: str
@@ -153,6 +86,36 @@ class Objective:
     form: Literal["magnitude", "peak", "value"]
     scale: float
     power: int = 1
+    others: tuple[str, ...] = ()
+    combine: Literal["worst", "sum"] = "worst"
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """All rows it reads."""
+        return (self.row, *self.others)
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """The rows whose worst counts: the objective is the sum over the groups."""
+        return (self.rows,) if self.combine == "worst" else tuple((row,) for row in self.rows)
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it is one smooth function of the design."""
+        return self.form == "value" and len(self.groups) == len(self.rows)
+
+
+@dataclass(frozen=True)
+class Wish:
+    """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
+
+    when, above: it holds where that variable exceeds that value, SI; "" for always.
+    """
+
+    toward: Literal["today", "least", "most"]
+    reason: str
+    when: str = ""
+    above: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -160,32 +123,40 @@ class Move:
     """A direction that may leave everything unchanged, along straight lines in the NLP's variables.
 
     kind "scale": all of `along` grow in proportion; "axis": each of `along` changes by itself.
+    wishes: the first that holds is followed; today, bounds: of each of `along`, SI.
     """
 
     name: str
     along: tuple[str, ...]
     kind: Literal["scale", "axis"]
+    wishes: tuple[Wish, ...]
+    today: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class Wish:
-    """How far along a move the silent levels would go: each variable's new value, SI, and why."""
+Numbers = Mapping[str, float]
 
-    goal: Mapping[str, float]
-    reason: str
+
+def nothing_follows(model: JobModel, values: Numbers) -> Numbers:
+    """Return nothing: every variable stands for itself."""
+    return {}
 
 
 @dataclass(frozen=True)
 class Program:
     """The whole task: structure and numbers."""
 
-    model: Model
+    model: JobModel
     variables: tuple[Variable, ...]
     parameters: Mapping[str, float]
     limits: tuple[Limit, ...]
     objectives: tuple[Objective, ...]
     starts: tuple[Mapping[str, float], ...]
     """The job's own starts, by variable, SI."""
+    moves: tuple[Move, ...] = ()
+    """What the silent levels may move along, in order."""
+    follow: Callable[[JobModel, Numbers], Numbers] = field(default=nothing_follows, compare=False)
+    """follow(model, values): the variables that follow from the others; raises ValueError where it cannot move."""
 
     @property
     def structure(self) -> Hashable:
@@ -195,7 +166,7 @@ class Program:
             tuple(variable.name for variable in self.variables),
             tuple(self.parameters),
             tuple(limit.structure for limit in self.limits),
-            tuple((objective.row, objective.form) for objective in self.objectives),
+            tuple((objective.rows, objective.form, objective.combine) for objective in self.objectives),
         )
 
     @property
@@ -219,7 +190,7 @@ class Program:
     def completed(self, x: Mapping[str, float]) -> dict[str, float]:
         """Return x (SI) with the variables that follow from the others; raises ValueError where it cannot move."""
         given = {v.name: x.get(v.name, v.lower) for v in self.variables}
-        implied = self.model.implied({**self.parameters, **given})
+        implied = self.follow(self.model, {**self.parameters, **given})
         return {name: implied.get(name, value) for name, value in given.items()}
 
     def values(self, design: Mapping[str, Number], maths: Maths) -> dict[str, Number]:

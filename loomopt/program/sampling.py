@@ -6,13 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from loomopt import cycle, maths
+from loomopt import maths
 from loomopt.balance import Given
-from loomopt.cycle import TURN, Cycle, Floats
+from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.program import spikes
-from loomopt.program.program import Integral, Model
+from loomopt.program.model import Integral, JobModel, Stills
+from loomopt.program.program import Limit, Objective
+from loomopt.program.reading import Reading, quadrature
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -20,14 +21,6 @@ SAMPLES = 720
 """Samples of one turn from which extremes are refined; no piece gets fewer than an eighth of them."""
 CLOSER = 1 / 8
 """Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
-GAUSS_NODES = 32
-
-
-@functools.cache
-def gauss() -> tuple[Floats, Floats]:
-    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
-    return (nodes + 1) / 2, weights / 2
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class Extreme:
 
 
 @functools.cache
-def _grid(counts: tuple[int, ...]) -> tuple[NDArray[np.intp], Floats]:
+def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
     """Return nodes with so many evenly spread over each piece."""
     pieces = np.repeat(np.arange(len(counts)), counts)
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
@@ -85,31 +78,32 @@ class Tally:
 class Sampler:
     """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined."""
 
-    def __init__(self, model: Model, values: Mapping[str, float], samples: int = SAMPLES) -> None:
+    def __init__(self, model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> None:
         self.model, self.values, self.samples = model, dict(values), samples
-        self.given: Given = model.given(maths.FLOAT, values)
-        self.hints = dict(model.hints(self.given))
-        if self.hints:
-            self.given = model.given(maths.FLOAT, {**values, **self.hints})
-        self.corners = model.corners(maths.FLOAT, self.given)
+        given = model.given(maths.FLOAT, values)
+        self.hints = model.hints(given)
+        self.given: Given = model.given(maths.FLOAT, {**values, **self.hints}) if self.hints else given
+        self.cycle: Cycle = model.split(maths.FLOAT, self.given)
         self._extremes: dict[str, list[Extreme]] = {}
-        self.cycle: Cycle = cycle.split(model.switched, self.corners)
-
-    @property
-    def corner_count(self) -> int:
-        """Number of declared corners."""
-        return sum(len(of_load) for of_load in self.corners)
 
     @functools.cached_property
-    def front(self) -> list[float]:
-        """Each load's switch just before the position `static` speaks of."""
-        piece = self.cycle.piece_before(float(self.model.front_angle(self.given)))
-        return [float(switch) for switch in self.cycle.switches[piece]]
+    def corner_count(self) -> int:
+        """Number of declared corners."""
+        return len(self.cycle.order)
+
+    @functools.cached_property
+    def stills(self) -> Stills:
+        """The switches just before each event that a row stands at, by event and name."""
+        found = {}
+        for event in self.model.events_read:
+            piece = self.cycle.piece_before(float(self.model.event(maths.FLOAT, self.given, event)))
+            found[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
+        return found
 
     @functools.cached_property
     def static(self) -> dict[str, float]:
         """Figures that need one position only."""
-        return self.model.static(maths.FLOAT, self.given, self.front)
+        return self.model.static(maths.FLOAT, self.given, self.stills)
 
     @functools.cached_property
     def figures(self) -> dict[str, float]:
@@ -120,19 +114,55 @@ class Sampler:
             found[integral.root] = math.sqrt(found[integral.name])
         return found
 
-    def at(self, name: str, pieces: NDArray[np.intp], u: Floats) -> Floats:
+    def read(self, system: maths.Maths) -> Reading:
+        """Return the design in another number system."""
+        values = {name: system.number(value) for name, value in {**self.values, **self.hints}.items()}
+        return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
+
+    @functools.cached_property
+    def _reading(self) -> Reading:
+        return Reading(self.model, maths.FLOAT, self.given, self.cycle, self.stills)
+
+    def single(self, name: str) -> float:
+        """Return a figure, row or number of the design, SI."""
+        if name in self.static:
+            return self.static[name]
+        means = {each for integral in self.model.integrals for each in (integral.name, integral.root)}
+        return self.figures[name] if name in means else float(self._reading.single(name))
+
+    def excess(self, limit: Limit) -> float:
+        """Return how far a limit is exceeded, in its natural size; of an equality with its sign."""
+        if limit.family == "cycle":
+            return (self.peak(limit.row, limit.where) - limit.bound) / limit.scale
+        known = self.given.values if limit.family == "variable" else _Singles(self)
+        return float(limit.residual(known, limit.value)) / limit.scale
+
+    def merit(self, objective: Objective) -> float:
+        """Return what an objective is worth, SI: of a magnitude its size, of a peak the whole cycle's."""
+        return sum(max(self._merit(objective, row) for row in group) for group in objective.groups)
+
+    def _merit(self, objective: Objective, row: str) -> float:
+        if objective.form == "peak":
+            return self.peak(row)
+        value = self.single(row)
+        return abs(value) if objective.form == "magnitude" else value
+
+    def at(self, name: str, pieces: Pieces, u: Floats) -> Floats:
         """Return a quantity at nodes (pieces, u), SI."""
         result = np.empty(u.shape)
         Tally.positions += len(u)
         for begin in range(0, len(u), CHUNK):
             part = slice(begin, begin + CHUNK)
-            angles = self.cycle.angles(pieces[part], u[part])
-            switches = self.cycle.switches[pieces[part]].T
+            node = self.node(pieces[part], u[part])
             with np.errstate(invalid="ignore", divide="ignore"):
-                result[part] = self.model.quantity(maths.numpy(), self.given, name, angles, list(switches))
+                result[part] = self.model.quantity(maths.numpy(), self.given, name, node)
         return result
 
-    def grid(self, samples: int = 0) -> tuple[NDArray[np.intp], Floats]:
+    def node(self, pieces: Pieces, u: Floats) -> Node:
+        """Return nodes (pieces, u) with their crank angles, rad, and switches."""
+        return Node(self.cycle.angles(pieces, u), self.cycle.switch(pieces))
+
+    def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
         return _grid(self._counts(samples or self.samples))
 
@@ -141,15 +171,16 @@ class Sampler:
         widths = np.diff(self.cycle.starts).tolist()
         return tuple(max(samples // 8, math.ceil(samples * width / TURN)) + 1 for width in widths)
 
-    def extremes(self, name: str, where: tuple[int, float] | None = None) -> list[Extreme]:
+    def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.
 
-        where: (switch, its value) on the pieces they are asked for; every piece without it.
+        where: the pieces they are asked for; every piece without it.
         """
         if name not in self._extremes:
             self._extremes[name] = self._find_extremes(name)
         found = self._extremes[name]
-        return found if where is None else [e for e in found if self.cycle.switches[e.piece, where[0]] == where[1]]
+        on = self.cycle.on(where)
+        return [e for e in found if on[e.piece]]
 
     def _find_extremes(self, name: str) -> list[Extreme]:
         pieces, u = self.grid()
@@ -181,20 +212,19 @@ class Sampler:
         found = []
         for angle in (peak for centre in self.singular for peak in spikes.peaks(heights, centre)):
             value = float(self._at_angles(name, np.array([angle]))[0])
-            found.append(Extreme(*self.cycle.located(angle), value, signed=name in self.model.signed))
+            found.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
         return found
 
     def _at_angles(self, name: str, angles: Floats) -> Floats:
         """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
         Tally.positions += len(angles)
-        pieces = [self.cycle.located(float(angle))[0] for angle in angles]
-        switches = list(self.cycle.switches[pieces].T)
+        node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
         with np.errstate(invalid="ignore", divide="ignore"):
-            values = self.model.quantity(maths.numpy(), self.given, name, angles, switches)
+            values = self.model.quantity(maths.numpy(), self.given, name, node)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
     @functools.cached_property
-    def _ends(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _ends(self) -> tuple[Pieces, Pieces]:
         """Where pieces begin and end in the sampler's own grid."""
         counts = np.array(self._counts(self.samples))
         last = np.cumsum(counts) - 1
@@ -204,9 +234,7 @@ class Sampler:
         """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
         return values if name in self.model.signed else np.abs(values)
 
-    def _refine(
-        self, name: str, pieces: NDArray[np.intp], u: Floats, values: Floats, peaks: NDArray[np.intp]
-    ) -> list[Extreme]:
+    def _refine(self, name: str, pieces: Pieces, u: Floats, values: Floats, peaks: Pieces) -> list[Extreme]:
         """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak."""
         signed = name in self.model.signed
         piece, sign = pieces[peaks], np.ones(len(peaks)) if signed else np.sign(values[peaks])
@@ -231,23 +259,25 @@ class Sampler:
         """Return the crank angle of an extreme, rad."""
         return float(self.cycle.angles(np.array([extreme.piece]), np.array([extreme.u]))[0])
 
-    def peak(self, name: str, where: tuple[int, float] | None = None) -> float:
+    def peak(self, name: str, where: Where | None = None) -> float:
         """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
         return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
-
-    def quadrature(self, integral: Integral) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """Return nodes (pieces, u) and weights in u of the rule over the pieces where the load's switch is 1."""
-        active = np.flatnonzero(self.cycle.switches[:, integral.load] == 1.0)
-        nodes, weights = gauss()
-        return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
 
     def mean(self, integral: Integral) -> float:
         """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
-            data = [np.asarray(integral.data)]
-            angles = np.asarray(integral.angles)
-            values = self.model.quantity(maths.numpy(), self.given, integral.quantity, angles, data)
-            return float(np.mean(values))
-        pieces, u, weights = self.quadrature(integral)
+            node = Node(np.asarray(integral.angles), {"datum": np.asarray(integral.data)})
+            return float(np.mean(self.model.quantity(maths.numpy(), self.given, integral.quantity, node)))
+        pieces, u, weights = quadrature(self.cycle, integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
         return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))
+
+
+class _Singles(dict[str, float]):
+    """A design's single values by name, read when they are asked for."""
+
+    def __init__(self, sampler: Sampler) -> None:
+        self.sampler = sampler
+
+    def __missing__(self, name: str) -> float:
+        return self.sampler.single(name)

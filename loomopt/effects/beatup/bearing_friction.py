@@ -4,11 +4,11 @@ Output term T_c sgn q˙ + c q˙. The Coulomb torque jumps at both dead centres; 
 and both one-sided values are shown. The crank turns forward, so sgn q˙ depends on the crank angle alone.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import RotaryDamping, Torque
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -30,18 +30,21 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return -1.0 if (angle - front) % turn < (rear - front) % turn else 1.0
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return T_c sgn q˙ + c q˙, N·m."""
     return own["coulomb"] * switch + own["viscous"] * pose.velocity
 
 
 EFFECT = Load(
-    "bearing_friction",
-    "Coulomb and viscous friction of the rocking shaft",
-    Own,
-    "output",
-    force,
+    name="bearing_friction",
+    summary="Coulomb and viscous friction of the rocking shaft",
+    own=Own,
+    rank=70,
+    acts="output",
+    force=force,
     needs=("operation.speed",),
+    reads=("front dead centre", "rear dead centre"),
     corners=corners,
     switch=switch,
+    examples=({"coulomb": "2 N*m", "viscous": "0.05 N*m*s/rad"},),
 )

@@ -4,10 +4,10 @@ bearing_force F4 = (m4 + m4e) ψ˙² r [Yuan24, eq 11], r = (m4⁰ r4⁰ − m4e
 shaking_force = (m4 + m4e) |r| sqrt(ψ˙⁴ + ψ¨²), the whole inertia force of the same mass.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Check
 from loomopt.maths import Maths, Number
-from loomopt.schema import Check, Table, Values
+from loomopt.schema import Figure, Table, Values
 
 
 class Own(Table):
@@ -19,21 +19,27 @@ def moment(given: Values) -> Number:
     return given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
 
 
-def bearing_force(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+def bearing_force(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     """Return F4, N; negative where the counterweight outweighs the reed."""
     return moment(given) * pose.velocity**2
 
 
-def shaking_force(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+def shaking_force(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     """Return the force on the frame, N, with the sign of F4."""
     return moment(given) * maths.sqrt(pose.velocity**4 + pose.acceleration**2)
 
 
 EFFECT = Check(
-    "centrifugal",
-    "bearing load and shaking force of the unbalanced reed",
-    Own,
-    {"bearing_force": bearing_force, "shaking_force": shaking_force},
+    name="centrifugal",
+    summary="bearing load and shaking force of the unbalanced reed",
+    own=Own,
+    rank=80,
+    quantities={"bearing_force": bearing_force, "shaking_force": shaking_force},
     reads=("m4e", "r4e"),
     needs=("operation.speed", "mechanism.m4", "mechanism.r4"),
+    figures=(
+        Figure("bearing_force", "force", "peak centrifugal force on the rocking shaft", sides=("max",)),
+        Figure("shaking_force", "force", "peak inertia force of the reed on the frame", sides=("max",)),
+    ),
+    examples=({},),
 )

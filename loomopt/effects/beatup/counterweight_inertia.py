@@ -3,11 +3,11 @@
 Output term JS q¨, the J_s,4e of [Yuan24, eq 10]; it does not change with the counterweight's mass.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PositiveInertia
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -16,16 +16,24 @@ class Own(Table):
     JS: PositiveInertia
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def moved(given: Values, own: Values) -> Number:
+    """Return JS, kg·m²."""
+    return own["JS"]
+
+
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return JS q¨, N·m."""
-    return own["JS"] * pose.acceleration
+    return moved(given, own) * pose.acceleration
 
 
 EFFECT = Load(
-    "counterweight_inertia",
-    "counterweight about its own centre",
-    Own,
-    "output",
-    force,
+    name="counterweight_inertia",
+    summary="counterweight about its own centre",
+    own=Own,
+    rank=40,
+    acts="output",
+    force=force,
+    moved=moved,
     needs=("operation.speed",),
+    examples=({"JS": "0.01 kg*m^2"},),
 )

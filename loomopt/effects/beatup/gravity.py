@@ -4,11 +4,11 @@ Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt): the reed's
 shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. The rod's weight is left out.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Angle
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665
 """m/s²."""
@@ -21,18 +21,20 @@ class Own(Table):
     offset: Angle
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return −∂U/∂ψ, N·m (q = −ψ)."""
     moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
     return -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
 
 
 EFFECT = Load(
-    "gravity",
-    "weight of reed system and counterweight",
-    Own,
-    "output",
-    force,
+    name="gravity",
+    summary="weight of reed system and counterweight",
+    own=Own,
+    rank=60,
+    acts="output",
+    force=force,
     reads=("m4e", "r4e"),
     needs=("mechanism.m4", "mechanism.r4"),
+    examples=({"tilt": "-67 deg", "offset": "0 deg"},),
 )

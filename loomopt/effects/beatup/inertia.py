@@ -3,11 +3,11 @@
 Output term J4 q¨ with J4 = J4⁰ + m4e r4e² [Yuan24, eq 2 and 10]; rigid reed, fixed axis.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PositiveInertia
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -16,17 +16,25 @@ class Own(Table):
     J4: PositiveInertia
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def moved(given: Values, own: Values) -> Number:
+    """Return J4 = J4⁰ + s, kg·m² [Yuan24, eq 10]."""
+    return own["J4"] + given["s"]
+
+
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return (J4⁰ + s) q¨, N·m; s = m4e r4e² in kg·m²."""
-    return (own["J4"] + given["s"]) * pose.acceleration
+    return moved(given, own) * pose.acceleration
 
 
 EFFECT = Load(
-    "inertia",
-    "reed system about the rocking shaft",
-    Own,
-    "output",
-    force,
+    name="inertia",
+    summary="reed system about the rocking shaft",
+    own=Own,
+    rank=10,
+    acts="output",
+    force=force,
+    moved=moved,
     reads=("s",),
     needs=("operation.speed",),
+    examples=({"J4": "0.62 kg*m^2"},),
 )

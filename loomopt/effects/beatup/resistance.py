@@ -3,11 +3,11 @@
 Output term M_R = M0 cos(π(φ−β)/δ) for |φ−β| ≤ δ/2, else 0 [Yuan24, eq 3-4]; the corners move with the design.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PulseAngle
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -28,18 +28,21 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if (angle - begin) % turn < end - begin else 0.0
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return M_R, N·m."""
     return switch * given["M0"] * maths.cos(maths.pi * (pose.phi - given["beta"]) / own["pulse"])
 
 
 EFFECT = Load(
-    "resistance",
-    "beating-up resistance of the cloth",
-    Own,
-    "output",
-    force,
+    name="resistance",
+    summary="beating-up resistance of the cloth",
+    own=Own,
+    rank=20,
+    acts="output",
+    force=force,
     needs=("operation.M0",),
     corners=corners,
+    symbol="M_R",
     switch=switch,
+    examples=({"pulse": "29.8 deg"},),
 )

@@ -3,11 +3,11 @@
 Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis.
 """
 
-from typing import Any
-
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PositiveInertia
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -16,9 +16,18 @@ class Own(Table):
     J3: PositiveInertia
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return J3 q¨, N·m."""
     return own["J3"] * pose.acceleration
 
 
-EFFECT = Load("rocker_inertia", "rocker about the rocking shaft", Own, "output", force, needs=("operation.speed",))
+EFFECT = Load(
+    name="rocker_inertia",
+    summary="rocker about the rocking shaft",
+    own=Own,
+    rank=30,
+    acts="output",
+    force=force,
+    needs=("operation.speed",),
+    examples=({"J3": "0.05 kg*m^2"},),
+)

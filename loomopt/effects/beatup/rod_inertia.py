@@ -5,13 +5,15 @@ exact: ½ Je' ω² + Je ω̇ with Je = (m2 v_S2² + JS2 ω2²)/ω². The ratio s
 """
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import ValidationInfo, field_validator
 
+from loomopt.effects.beatup import ReedPose
+from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Length, PositiveInertia, PositiveMass, QuantityError
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -31,7 +33,7 @@ class Own(Table):
         return model
 
 
-def lumped(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+def lumped(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     """Return the torque of the two point masses, N·m."""
     at_rocker = own["m2"] * own["s2"] / given["today.l2"]
     torque = at_rocker * given["l3"] ** 2 * pose.q1 * pose.acceleration
@@ -40,7 +42,7 @@ def lumped(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
     return torque + (own["m2"] - at_rocker) * given["l1"] ** 2 * pose.omega_dot
 
 
-def exact(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
+def exact(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     """Return the torque of the rod as a rigid body, N·m."""
     rod = pose.joints
     s2 = own["s2"] * given["l2"] / given["today.l2"]
@@ -56,12 +58,24 @@ def exact(maths: Maths, pose: Any, given: Values, own: Values) -> Number:
     return torque + inertia * pose.omega_dot
 
 
-MODELS: dict[str, Callable[[Maths, Any, Values, Values], Number]] = {"lumped": lumped, "exact": exact}
+MODELS: dict[str, Callable[[Maths, ReedPose, Values, Values], Number]] = {"lumped": lumped, "exact": exact}
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return the crank torque that moves the rod, N·m, by the model the scene names."""
     return MODELS[own["model"]](maths, pose, given, own)
 
 
-EFFECT = Load("rod_inertia", "connecting rod", Own, "drive", force, needs=("operation.speed",))
+EFFECT = Load(
+    name="rod_inertia",
+    summary="connecting rod",
+    own=Own,
+    rank=50,
+    acts="drive",
+    force=force,
+    needs=("operation.speed",),
+    examples=(
+        {"m2": "1.5 kg", "s2": "32.5 mm", "JS2": "0.0005 kg*m^2", "model": "lumped"},
+        {"m2": "1.5 kg", "s2": "32.5 mm", "JS2": "0.0005 kg*m^2", "model": "exact"},
+    ),
+)

@@ -1,0 +1,1 @@
+"""Effects of the rapier drive: they read the head's travel alone."""

@@ -3,11 +3,10 @@
 Output term m S¨: the force the tape must carry; times S' it reaches the main shaft. Rigid tape.
 """
 
-from typing import Any
-
+from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PositiveMass
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -16,9 +15,18 @@ class Own(Table):
     mass: PositiveMass
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
     """Return m S¨, N."""
     return own["mass"] * pose.acceleration
 
 
-EFFECT = Load("head_inertia", "rapier head and tape", Own, "output", force, needs=("operation.speed",))
+EFFECT = Load(
+    name="head_inertia",
+    summary="rapier head and tape",
+    own=Own,
+    rank=10,
+    acts="output",
+    force=force,
+    needs=("operation.speed",),
+    examples=({"mass": "0.35 kg"},),
+)

@@ -4,11 +4,11 @@ Output term F sgn S˙: against the motion, so the drive must supply it. It chang
 """
 
 import math
-from typing import Any
 
+from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Force
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -31,11 +31,20 @@ def direction(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if passed % 2 else -1.0
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
     """Return F sgn S˙, N."""
     return own["force"] * switch
 
 
 EFFECT = Load(
-    "tape_friction", "friction of the tape in its guides", Own, "output", force, corners=corners, switch=direction
+    name="tape_friction",
+    summary="friction of the tape in its guides",
+    own=Own,
+    rank=20,
+    acts="output",
+    force=force,
+    reads=("turns",),
+    corners=corners,
+    switch=direction,
+    examples=({"force": "15 N"},),
 )

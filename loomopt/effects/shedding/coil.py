@@ -4,13 +4,15 @@ It takes no part in the balance: K1 (X + X0) stays the whole force of all spring
 must give K1, and keep what material, winding and space allow.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal
 
-from loomopt.maths import Maths, Number
-from loomopt.mechanisms.tension_spring import Coil, strength
+from loomopt.effects.kinds import Axis, Check, Demand
+from loomopt.maths import FLOAT, Maths, Number
+from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
 from loomopt.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
-from loomopt.schema import Check, Demand, Table, Values
+from loomopt.schema import Figure, Table, Values
 
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""
@@ -96,14 +98,62 @@ ROWS: dict[str, Callable[[Maths, Values, Values], Number]] = {
 
 MARGINS = {RATE: "stiffness", LEAST_INITIAL: "pressure", MOST_INITIAL: "pressure", OPENED: "force"}
 
-EFFECT = Check(
-    "coil",
-    "tension springs that can be made: stresses, hooks, surge, space",
-    Own,
-    {},
+FIGURES = (
+    Figure("coil_index", "number", "spring index D/d of the coils", sides=()),
+    Figure("shear_stress", "pressure", "largest shear stress of the coils", sides=("max",)),
+    Figure("shear_share", "number", "shear stress over tensile strength", sides=()),
+    Figure("bending_share", "number", "hook bending stress over tensile strength", sides=()),
+    Figure("surge_ratio", "number", "surge frequency over that of the cam", sides=()),
+    Figure("spring_length", "length", "length inside the hooks, fully stretched", sides=()),
+    Figure("spring_mass", "mass", "mass of the coils of all springs", sides=("max",)),
+)
+
+
+def sold(own: Own) -> Mapping[str, Sequence[float]]:
+    """Return the wire diameters that are sold, m, where the wire must be one of them."""
+    return {"wire": WIRES} if own.sizes == "preferred" else {}
+
+
+def explain(
+    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Own, clash: Iterable[str]
+) -> str:
+    """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
+
+    tau >= 2 K_W (X0 + travel) f sqrt(2 G rho) follows from rate, surge frequency and shear stress [Shigley, ch. 10].
+    """
+    named = {limit.split()[0] for limit in clash}
+    if "surge_ratio" not in named or not named & {"shear_share", "bending_share"}:
+        return ""
+    stretch = bounds["X0"][1] + known["travel"]
+    thinnest = bounds.get("coil.wire", (own.wire, own.wire))[0]
+    slimmest = Coil(1.0, INDEX[1], 1.0, own.shear_modulus, own.density, 0.0, own.elasticity)
+    surge = own.surge_ratio * known["speed"] / (2 * math.pi)
+    least = 2 * slimmest.wahl * stretch * surge * math.sqrt(2 * own.shear_modulus * own.density)
+    most = own.shear_share * strength(FLOAT, thinnest, own.strength, own.strength_exponent)
+    if least <= most:
+        return ""
+    return (
+        f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
+        f"{1e3 * stretch:.4g} mm carry at least {1e-6 * least:.4g} MPa of shear, whatever their size "
+        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {1e-6 * most:.4g} MPa at most. "
+        "Less preload asks for a stiffer spring. A lower speed, less travel or a softer cam law (target law) helps."
+    )
+
+
+EFFECT: Check[object] = Check(
+    name="coil",
+    summary="tension springs that can be made: stresses, hooks, surge, space",
+    own=Own,
+    rank=60,
     reads=("K1", "X0", "travel"),
     needs=("operation.speed",),
     rows=ROWS,
+    figures=FIGURES,
+    margins=MARGINS,
+    least="spring_mass",
+    axes=(Axis(name="initial tension", key="initial_tension"),),
+    sold=sold,
+    explain=explain,
     demands=(
         Demand("coil_index", -1, INDEX[0]),
         Demand("coil_index", 1, INDEX[1]),
@@ -115,5 +165,23 @@ EFFECT = Check(
         Demand(LEAST_INITIAL, -1, 0.0),
         Demand(MOST_INITIAL, -1, 0.0),
         Demand(OPENED, -1, 0.0),
+    ),
+    examples=(
+        {
+            "wire": "6 mm",
+            "diameter": "45 mm",
+            "turns": "8",
+            "initial_tension": "100 N",
+            "springs": "2",
+            "shear_modulus": "77.2 GPa",
+            "elasticity": "203.4 GPa",
+            "density": "7850 kg/m^3",
+            "strength": "1974 MPa",
+            "strength_exponent": "0.108",
+            "shear_share": "0.5",
+            "bending_share": "0.75",
+            "spring_length": "400 mm",
+            "surge_ratio": "13",
+        },
     ),
 )

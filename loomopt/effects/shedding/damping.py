@@ -1,10 +1,10 @@
 """Viscous damping of the heald frame in its guides: output term C X˙ [Qiu21, eq 4]."""
 
-from typing import Any
-
+from loomopt.effects.kinds import Load
+from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Damping
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -13,9 +13,18 @@ class Own(Table):
     C: Damping
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return C X˙, N."""
     return own["C"] * pose.velocity
 
 
-EFFECT = Load("damping", "viscous damping of the frame", Own, "output", force, needs=("operation.speed",))
+EFFECT = Load(
+    name="damping",
+    summary="viscous damping of the frame",
+    own=Own,
+    rank=40,
+    acts="output",
+    force=force,
+    needs=("operation.speed",),
+    examples=({"C": "35 N*s/m"},),
+)

@@ -4,11 +4,11 @@ It jumps where the frame starts and stops. In a dwell it is any value in [−F, 
 −1 for the least cam force, by which contact is judged, +1 for the largest.
 """
 
-from typing import Any
-
+from loomopt.effects.kinds import Load
+from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Force
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -17,9 +17,17 @@ class Own(Table):
     F: Force
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return F sgn X˙, N; in a dwell its worst value."""
     return own["F"] * maths.choose(pose.segment, (1, pose.worst, -1, pose.worst))
 
 
-EFFECT = Load("dry_friction", "Coulomb friction of the frame in its guides", Own, "output", force)
+EFFECT = Load(
+    name="dry_friction",
+    summary="Coulomb friction of the frame in its guides",
+    own=Own,
+    rank=50,
+    acts="output",
+    force=force,
+    examples=({"F": "20 N"},),
+)

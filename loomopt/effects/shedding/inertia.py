@@ -1,10 +1,10 @@
 """Inertia of the heald frame and what moves with it: output term M X¨ [Qiu21, eq 4]."""
 
-from typing import Any
-
+from loomopt.effects.kinds import Load
+from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Mass
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -13,9 +13,18 @@ class Own(Table):
     M: Mass
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return M X¨, N."""
     return own["M"] * pose.acceleration
 
 
-EFFECT = Load("inertia", "inertia of the heald frame", Own, "output", force, needs=("operation.speed",))
+EFFECT = Load(
+    name="inertia",
+    summary="inertia of the heald frame",
+    own=Own,
+    rank=30,
+    acts="output",
+    force=force,
+    needs=("operation.speed",),
+    examples=({"M": "37.68361265059934 kg"},),
+)

@@ -3,11 +3,11 @@
 A frame whose weight presses the roller on the cam instead has a negative G.
 """
 
-from typing import Any
-
+from loomopt.effects.kinds import Load
+from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
 from loomopt.quantities import SignedForce
-from loomopt.schema import Load, Table, Values
+from loomopt.schema import Table, Values
 
 
 class Own(Table):
@@ -16,9 +16,17 @@ class Own(Table):
     G: SignedForce
 
 
-def force(maths: Maths, pose: Any, given: Values, own: Values, switch: Number) -> Number:
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return −G, N."""
     return -own["G"]
 
 
-EFFECT = Load("weight", "weight of the heald frame", Own, "output", force)
+EFFECT = Load(
+    name="weight",
+    summary="weight of the heald frame",
+    own=Own,
+    rank=10,
+    acts="output",
+    force=force,
+    examples=({"G": "369.55 N"},),
+)

@@ -1,0 +1,1 @@
+"""The beatup job, in the files every job has."""

@@ -1,211 +1,187 @@
-"""The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24].
+"""The beat-up model: a four-bar crank-rocker whose reed must be balanced within the space [Yuan24].
 
 q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md = −M3 ψ' + drive terms.
 """
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from loomopt import balance
 from loomopt.balance import Given
-from loomopt.jobs.beatup.poses import FrontPose, ReedPose
+from loomopt.cycle import Node, Where
+from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
-from loomopt.program.program import Integral
-from loomopt.schema import Check, Load, Values
+from loomopt.program.kinematics import Arcs, Group, four_bar
+from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.schema import Values
 
-HAIR = 5e-4
-"""Share by which a dyad's triangle closes, below which peaks stand so close to it that even samples miss them."""
-
-ASSEMBLY_MARGIN = 1.001
-"""The dyad's triangle must close with this factor to spare at both ends."""
+FRONT, REAR = "front dead centre", "rear dead centre"
+LENGTHS = ("l1", "l2", "l3", "l4")
 
 
 @dataclass(frozen=True)
-class Beatup:
-    """The crank-rocker with the effects a scene calls for.
+class ReedPose(Motion):
+    """The pose at crank angles φ, rad, any shape: q = −ψ; what no load reads is not computed."""
 
-    options: (effect, key, word) for values that choose a formula.
-    """
+    phi: Number
+    omega: Number
+    joints: crank_rocker.Pose
+    omega_dot: Number = None
 
-    loads: tuple[Load, ...]
-    checks: tuple[Check, ...]
-    options: tuple[tuple[str, str, str], ...]
-    known: frozenset[str] = field(compare=False)
-    """Names of scene numbers that are given: figures whose numbers are missing are left out."""
-
-    @functools.cached_property
-    def key(self) -> Hashable:
-        """What distinguishes this model's formulas from another's."""
-        return "beatup", tuple(load.name for load in self.loads + self.checks), self.options, self.known
+    @property
+    def q(self) -> Number:
+        """−ψ, rad."""
+        return -self.joints.psi
 
     @functools.cached_property
-    def integrals(self) -> tuple[Integral, ...]:
-        """The mean square of M3 over the pulse, where the cloth resists."""
-        names = [load.name for load in self.loads]
-        return (
-            (Integral("pulse_mean_square", "pulse_rms", "M3_square", names.index("resistance")),)
-            if "resistance" in names
-            else ()
+    def q1(self) -> Number:
+        """−ψ'."""
+        return -self.joints.psi_1
+
+    @functools.cached_property
+    def q2(self) -> Number:
+        """−ψ''."""
+        return -self.joints.psi_2
+
+
+@dataclass(frozen=True)
+class FrontPose(Motion):
+    """The pose at front dead centre, exact: ψ' = 0, and ψ'' in closed form; joints from the positions at β."""
+
+    maths: Maths
+    values: Values
+    omega_dot: None = None
+    q1: int = 0
+
+    @property
+    def phi(self) -> Number:
+        """β, rad."""
+        return self.values["beta"]
+
+    @property
+    def omega(self) -> Number:
+        """Crank speed, rad/s."""
+        return self.values.get("speed")
+
+    @property
+    def q(self) -> Number:
+        """−ψ, rad."""
+        return -self.values["centres"].psi_front
+
+    @property
+    def q2(self) -> Number:
+        """−ψ''."""
+        return -self.values["centres"].psi_2_front
+
+    @functools.cached_property
+    def joints(self) -> crank_rocker.Pose:
+        """The linkage with crank and rod stretched."""
+        return crank_rocker.front_pose(self.maths, self.values["lengths"], self.values["centres"])
+
+
+def _obliquity(maths: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+    return pose().joints.obliquity
+
+
+@dataclass(frozen=True)
+class CrankRocker:
+    """The beat-up mechanism's motion: crank AB = l1 at φ, rod l2, rocker l3 at ψ, frame l4."""
+
+    structure: str = "beatup"
+    arcs: tuple[Arcs, ...] = ()
+    breaks: frozenset[str] = frozenset()
+
+    @functools.cached_property
+    def groups(self) -> Mapping[str, Group]:
+        """The dyad of rod and rocker: it comes nearest to folding and stretching at φ = 0 and π."""
+        found = four_bar(
+            lambda values: values["lengths"],
+            ("l1", "l2", "l3", "l4"),
+            lambda values: 0,
+            ("B to D < l2 + l3", "B to D > |l2 - l3|"),
+            _obliquity,
         )
+        return {"": Group(found.quantities, found.closes, found.rows, found.margins, (0.0, math.pi))}
 
-    @property
-    def switched(self) -> tuple[Load, ...]:
-        """What has corners: the loads."""
-        return self.loads
-
-    def hints(self, given: Given) -> dict[str, float]:
-        """Return nothing: every corner has a formula."""
-        return {}
-
-    def singular(self, given: Given) -> tuple[float, ...]:
-        """Return the crank angles, rad, 0 and π, where the dyad comes within a hair of folding or stretching."""
-        sides = given.values["lengths"]
-        far, fold = (sides.l2 + sides.l3) ** 2, (sides.l2 - sides.l3) ** 2
-        least = (1 - HAIR) ** 2
-        bases = {0.0: (sides.l4 - sides.l1) ** 2, math.pi: (sides.l4 + sides.l1) ** 2}
-        return tuple(angle for angle, base in bases.items() if base > least * far or fold > least * base)
-
-    def implied(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return nothing: no variable follows from the others."""
-        return {}
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Whole-cycle quantities whose largest |value| is a figure."""
-        return ("peak_torque", *(name for check in self.checks for name in check.quantities))
-
-    @property
-    def signed(self) -> frozenset[str]:
-        """No quantity: magnitudes count."""
-        return frozenset()
-
-    @property
-    def assembly(self) -> dict[str, tuple[str, float]]:
-        """The dyad's triangle closes: the square of its base B to D over what the links span, inside 1."""
-        return {"B to D < l2 + l3": ("span_far", 1.0), "B to D > |l2 - l3|": ("span_near", 1.0)}
-
-    @property
-    def bounded(self) -> frozenset[str]:
-        """None yet."""
-        return frozenset()
-
-    def given(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers with s = m4e r4e², kg·m², and both dead centres, rad."""
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
+        """Return s = m4e r4e², kg·m², and both dead centres, rad."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
         centres = crank_rocker.dead_centres(maths, lengths)
-        derived = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
-        if "s" not in values:
-            derived["s"] = values["m4e"] * values["r4e"] ** 2
-        own: dict[str, dict[str, Any]] = {effect.name: {} for effect in self.loads + self.checks}
-        for name, value in values.items():
-            effect, _, key = name.rpartition(".")
-            if effect in own:
-                own[effect][key] = value
-        for effect, key, word in self.options:
-            own[effect][key] = word
-        return Given(dict(values) | derived, own)
+        found = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
+        return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
 
-    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
-        """Return each load's corner angles, rad."""
-        return tuple(
-            load.corners(maths, given.values, given.own[load.name]) if load.corners else () for load in self.loads
-        )
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        """Return nothing: every event has a formula."""
+        return {}
 
-    def pose(self, maths: Maths, given: Given, phi: Number) -> ReedPose:
+    def pose(self, maths: Maths, given: Given, node: Node) -> ReedPose:
         """Return the pose at crank angles φ, rad."""
-        return ReedPose(phi, given.values.get("speed"), crank_rocker.Pose(maths, given.values["lengths"], phi))
+        pose = crank_rocker.Pose(maths, given.values["lengths"], node.phi)
+        return ReedPose(node.phi, given.values.get("speed"), pose)
 
-    def front_angle(self, given: Given) -> Number:
-        """Return β, rad."""
-        return given.values["beta"]
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
+        """Return the pose at front dead centre."""
+        return FrontPose(maths, given.values)
 
-    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity, SI, at crank angle φ, rad."""
-        if name in ("span_far", "span_near"):
-            span = crank_rocker.span_far if name == "span_far" else crank_rocker.span_near
-            return span(maths, given.values["lengths"], phi)
-        pose = self.pose(maths, given, phi)
-        if name == "obliquity":
-            return pose.joints.obliquity
-        if name == "peak_torque":
-            return balance.crank_torque(maths, self.loads, pose, given, switches)
-        if name == "M3_square":
-            return balance.output_force(maths, self.loads, pose, given, switches) ** 2
-        check = next(check for check in self.checks if name in check.quantities)
-        return check.quantities[name](maths, pose, given.values, given.own[check.name])
-
-    def static(
-        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
-    ) -> dict[str, Number]:
-        """Return figures and rows of front dead centre and of the linkage as a whole, SI; all it has without names."""
-        available = self._available(given)
-        wanted = available if names is None else [name for name in available if name in names]
-        return {name: self._static(maths, given, front, name) for name in wanted}
-
-    def _available(self, given: Given) -> list[str]:
-        """Return the names of the static figures and rows that the scene's numbers suffice for."""
-        values = given.values
-        found = [*LINKAGE, *ASSEMBLY, "r4e_square"]
-        found += [name for name in ("l1", "l2", "l3", "l4", "m4e", "r4e", "s") if name in values]
-        found += ["M3_fdc"] if any(load.acts == "output" for load in self.loads) else []
-        found += ["alpha_fdc"] if "speed" in values else []
-        found += ["J4"] if "inertia" in given.own else []
-        found += ["r4"] if {"m4", "r4", "m4e"} <= values.keys() else []
-        return found + (["change"] if "width.l1" in values else [])
-
-    def _static(self, maths: Maths, given: Given, front: Sequence[Number], name: str) -> Number:
-        """Return one static figure or row."""
-        values = given.values
-        if name in LINKAGE:
-            return LINKAGE[name](maths, values)
-        if name in ASSEMBLY:
-            return ASSEMBLY[name](values)
-        if name == "M3_fdc":
-            return balance.output_force(maths, self.loads, FrontPose(values), given, front)
-        if name == "J4":
-            own = given.own.get("counterweight_inertia", {})
-            return balance.total([given.own["inertia"]["J4"], values["s"], *own.values()])
-        return FIGURES[name](values) if name in FIGURES else values[name]
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return both dead centres, rad."""
+        return {FRONT: given.values["beta"], REAR: maths.pi + given.values["beta_r"]}
 
 
-def eccentricity(values: Values) -> Number:
+def eccentricity(at: Instant) -> Number:
     """Return r4 of reed and counterweight together, m [Yuan24, section on eq 10]."""
+    values = at.values
     moment = values["m4"] * values["r4"] - values["m4e"] * values["r4e"]
     return moment / (values["m4"] + values["m4e"])
 
 
-def change(values: Values) -> Number:
+def inertia(at: Instant) -> Number:
+    """Return J4 of reed and counterweight, kg·m² [Yuan24, eq 10]: all that moves with the reed."""
+    return balance.total([moved(at.values, at.given.own[name]) for name, moved in _moved(at.model.effects).items()])
+
+
+def _moved(effects: Iterable[Effect]) -> dict[str, Callable[[Values, Values], Number]]:
+    return {e.name: e.moved for e in effects if isinstance(e, Load) and e.moved}
+
+
+def change(names: Collection[str], at: Instant) -> Number:
     """Return Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
-    names = [name.removeprefix("width.") for name in values if name.startswith("width.")]
-    return balance.total(
-        [values[f"weight.{x}"] * ((values[x] - values[f"today.{x}"]) / values[f"width.{x}"]) ** 2 for x in names]
-    )
+    v = at.values
+    return balance.total([v[f"weight.{x}"] * ((v[x] - v[f"today.{x}"]) / v[f"width.{x}"]) ** 2 for x in names])
 
 
-LINKAGE: dict[str, Callable[[Maths, Values], Number]] = {
-    "swing": lambda maths, values: values["centres"].swing,
-    "theta": lambda maths, values: values["centres"].theta,
-    "beta": lambda maths, values: values["centres"].beta,
-    "mu_near": lambda maths, values: crank_rocker.transmission_angle_near(maths, values["lengths"]),
-    "mu_far": lambda maths, values: crank_rocker.transmission_angle_far(maths, values["lengths"]),
+ROWS: dict[str, Row] = {
+    "swing": Row(lambda at: at.values["centres"].swing),
+    "theta": Row(lambda at: at.values["centres"].theta),
+    "beta": Row(lambda at: at.values["centres"].beta),
+    "M3_fdc": Row(lambda at: at.force, event=FRONT),
+    "alpha_fdc": Row(lambda at: at.values["centres"].psi_2_front * at.values["speed"] ** 2, ("speed",)),
+    "r4": Row(eccentricity, ("m4", "r4", "m4e")),
+    "r4e_square": Row(lambda at: at.values["r4e"] ** 2),
 }
-"""Angles of the linkage, rad."""
+"""Figures and rows of front dead centre and of the linkage as a whole, SI."""
 
-FIGURES: dict[str, Callable[[Values], Number]] = {
-    "alpha_fdc": lambda values: values["centres"].psi_2_front * values["speed"] ** 2,
-    "r4": eccentricity,
-    "r4e_square": lambda values: values["r4e"] ** 2,
-    "change": change,
-}
-"""Other figures and rows, SI."""
 
-ASSEMBLY: dict[str, Callable[[Values], Number]] = {
-    "assembly: l1 + l4 < l2 + l3": lambda v: (v["l2"] + v["l3"]) - ASSEMBLY_MARGIN * (v["l1"] + v["l4"]),
-    "assembly: l1 + l2 < l3 + l4": lambda v: (v["l4"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l2"] - v["l3"]),
-    "assembly: l1 + l3 < l2 + l4": lambda v: (v["l4"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l3"] - v["l2"]),
-}
-"""By how much the dyad closes beyond the margin at φ = π and (twice) at φ = 0, m; never negative."""
+def model(
+    effects: tuple[Effect, ...],
+    words: tuple[tuple[str, str, str], ...],
+    known: frozenset[str],
+    pulse: Where,
+    changing: tuple[str, ...] = (),
+) -> JobModel:
+    """Return the crank-rocker with effects; changing: the design variables of the retrofit's norm, if that is asked.
+
+    pulse: the pieces of the cycle in which the cloth resists, which the figure pulse_rms is of.
+    """
+    reed = any("s" in effect.reads for effect in effects if effect.name in _moved(effects))
+    rows = ROWS | ({"J4": Row(inertia)} if reed else {})
+    rows |= {"change": Row(functools.partial(change, changing))} if changing else {}
+    square = {"M3_square": Quantity(lambda at: at.force**2, figure=False)}
+    resisted = any(effect.name == pulse[0] for effect in effects)
+    means = (Integral("pulse_mean_square", "pulse_rms", "M3_square", pulse),) if resisted else ()
+    peak = {"peak_torque": Quantity(lambda at: at.crank_torque)}
+    return JobModel(CrankRocker(), effects, words, peak | square, rows, integrals=means, known=known)

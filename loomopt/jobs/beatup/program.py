@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
 
+from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
-from loomopt.jobs.beatup.model import ASSEMBLY, Beatup
-from loomopt.jobs.beatup.scene import FIGURES, VARIABLES
-from loomopt.program.numbers import bounds as bounds_of
-from loomopt.program.numbers import full_name, words
-from loomopt.program.numbers import numbers as numbers_of
-from loomopt.program.program import Limit, Objective, Program, Variable
+from loomopt.jobs import base
+from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup.model import LENGTHS
+from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
+from loomopt.program import numbers as scene_numbers
+from loomopt.program.model import JobModel
+from loomopt.program.numbers import bound_limits, demanded, ends
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
-from loomopt.schema import Check, Load
+from loomopt.scene_tables import Limit as Limited
+from loomopt.scenes import Scene
+from loomopt.tolerances import NO_MASS
 
-LENGTHS = ("l1", "l2", "l3", "l4")
 COUNTERWEIGHT = ("m4e", "r4e")
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
@@ -25,73 +28,63 @@ SAMPLES = 180
 """Samples of one turn that are enough for a size."""
 MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
-CYCLE_FIGURES = ("peak_torque", "bearing_force", "shaking_force")
 
 
-def model(scene: Any, known: Mapping[str, float] | None = None) -> Beatup:
+def model(scene: Scene, known: Mapping[str, float] | None = None, target: str = "") -> JobModel:
     """Return the mechanism with the effects the scene calls for; known: its numbers, where they are at hand."""
-    effects = [scene.job.effects[name] for name in scene.effects]
-    return Beatup(
-        tuple(effect for effect in effects if isinstance(effect, Load)),
-        tuple(effect for effect in effects if isinstance(effect, Check)),
-        words(scene),
-        frozenset(known or numbers(scene)),
-    )
+    names = frozenset(known or numbers(scene))
+    changing = tuple(VARIABLES) if target == "retrofit" else ()
+    return beatup.model(scene.active, scene_numbers.words(scene), names, RESISTED, changing)
 
 
-def numbers(scene: Any) -> dict[str, float]:
+def numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by name, SI, today's lengths also as today.*."""
-    return numbers_of(scene) | {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
+    return scene_numbers.numbers(scene) | {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
 
 
-def today(scene: Any) -> dict[str, float]:
-    """Return today's design, SI, with every other number that the scene bounds."""
-    known = numbers(scene)
-    others = [full_name(known, name) for name in scene.bounds if name not in VARIABLES]
-    return {name: known[name] for name in (*VARIABLES, *others)}
-
-
-def bounds(scene: Any) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
-    return bounds_of(scene, numbers(scene), VARIABLES)
-
-
-def program(scene: Any, target: str) -> Program:
+def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
     known = numbers(scene)
-    limited = bounds_of(scene, known, VARIABLES)
-    physics = model(scene, known)
-    sizes = _Sizes(physics, known, limited)
+    limited = scene_numbers.bounds(scene, known)
+    physics = model(scene, known, target)
+    sizes = _Sizes(physics, scene, known, limited)
     direct = _reads_counterweight(scene, target, limited)
-    names = [name for name in limited if direct or name != "m4e"]
-    variables = [Variable(name, *limited[name], sizes.variable(name), limited[name]) for name in names]
-    if not direct:
-        most = limited["m4e"][1] * limited["r4e"][1] ** 2
-        variables.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, most)))
-    _demand_figures(scene, physics, sizes.sampler)
-    limits = [limit for variable in variables for limit in _bound_limits(scene, variable)]
+    variables = _variables(scene, sizes, limited, direct)
+    _demand_figures(scene, physics)
+    limits = [limit for v in variables if v.called in scene.bounds for limit in bound_limits(v, False)]
     limits += [] if direct else _mass_limits(limited["m4e"], sizes)
-    limits += [limit for name, limit in scene.limits.items() for limit in _figure_limits(name, limit, sizes)]
-    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in ASSEMBLY]
+    limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sizes)]
+    limits += demanded(scene, physics.checks, known, {})
+    margins = physics.kinematics.groups[""].margins
+    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in margins]
     limits += _target_limits(scene, target, sizes)
     taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
     starts = _starts(variables, known, direct, target == "retrofit")
-    return Program(physics, tuple(variables), parameters, tuple(limits), _objectives(target, sizes), starts)
+    moves = _moves(variables, known, limited)
+    objectives = _objectives(target, sizes)
+    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves)
 
 
 class _Sizes:
     """Natural sizes of this machine, SI, from today's design: what the NLP is scaled by."""
 
-    def __init__(self, physics: Beatup, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> None:
-        sampler = Sampler(physics, known, SAMPLES)
-        resistance = known.get("M0", 0.0) if "resistance.pulse" in known else 0.0
+    def __init__(
+        self,
+        physics: JobModel,
+        scene: Scene,
+        known: Mapping[str, float],
+        limited: Mapping[str, tuple[float, float]],
+    ) -> None:
+        sampler = Sampler(physics, known | _unchanged(physics), SAMPLES)
+        resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
-        self.known, self.limited, self.sampler = known, limited, sampler
+        self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
         self.length = known["l4"]
-        self.inertia = max(known.get("inertia.J4", 0.0), limited["m4e"][1] * limited["r4e"][1] ** 2) or 1.0
+        reed = max((float(own) for own in _reed(sampler)), default=0.0)
+        self.inertia = max(reed, limited["m4e"][1] * limited["r4e"][1] ** 2) or 1.0
         self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
         # What a design can change of the reed torque is its share beside the resistance.
         self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
@@ -105,43 +98,60 @@ class _Sizes:
 
     def figure(self, name: str) -> float:
         """Return the size of a figure."""
-        kind = FIGURES[name].kind
         if name == "peak_torque":
             return self.peak
-        if name in CYCLE_FIGURES:
+        if self.sampler.model.has_quantity(name):
             return self.sampler.peak(name) or 1.0
+        kind = self.scene.schema.figures[name].kind
         fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
         return fixed.get(kind) or abs(self.sampler.static[name]) or 1.0
 
 
-def demand(scene: Any, target: str) -> None:
+def _unchanged(physics: JobModel) -> dict[str, float]:
+    """Return values of the retrofit's norm for which nothing has changed: sizes do not depend on it."""
+    asked = physics.has_row("change")
+    parts = {"today": 0.0, "width": 1.0, "weight": 0.0}
+    return {f"{part}.{name}": value for name in VARIABLES for part, value in parts.items()} if asked else {}
+
+
+def _reed(sampler: Sampler) -> list[float]:
+    """Return today's inertia of the reed without a counterweight, kg·m², by each load that reads s."""
+    given, loads = sampler.given, [load for load in sampler.model.loads if isinstance(load, Load)]
+    own = [(load.moved, given.own[load.name]) for load in loads if load.moved and "s" in load.reads]
+    return [moved({**given.values, "s": 0.0}, values) for moved, values in own if moved]
+
+
+def _variables(scene: Scene, sizes: _Sizes, limited: Mapping[str, tuple[float, float]], direct: bool) -> list[Variable]:
+    """Return the variables; where mass and radius of the counterweight do not matter apart, s = m4e r4e² is one."""
+    labels = scene_numbers.labels(scene)
+    names = [name for name in limited if direct or name != "m4e"]
+    found = [Variable(n, *limited[n], sizes.variable(n), limited[n], labels.get(n, "")) for n in names]
+    if not direct:
+        most = limited["m4e"][1] * limited["r4e"][1] ** 2
+        found.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, most)))
+    return found
+
+
+def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
-    effects = [scene.job.effects[name] for name in scene.effects]
-    if not any(isinstance(effect, Load) and effect.acts == "output" for effect in effects):
+    if not any(isinstance(effect, Load) and effect.acts == "output" for effect in scene.active):
         raise BadInput(
             f"target {target} needs a reed torque, and no effect in the scene makes one",
             file=scene.origin,
             key="effects",
-            allowed=", ".join(scene.job.effects),
+            allowed=", ".join(scene.schema.effects),
             remedy="Add the table [effects.inertia] with J4, or another effect.",
         )
-    for name in scene.job.targets[target].needs_effects:
-        if name not in scene.effects:
-            raise BadInput(
-                f"target {target} needs the effect {name}",
-                file=scene.origin,
-                key=f"effects.{name}",
-                remedy=f"Add the table [effects.{name}], or choose another target.",
-            )
-    resisted = "M0" in scene.operation and "resistance" in scene.effects
-    if target == "torque" and scene.targets["torque"].M3_tolerance is None and not resisted:
+    base.demand(scene, target)
+    resisted = "M0" in scene.operation and RESISTED[0] in scene.effects
+    if target == "torque" and scene.table(TorqueTarget).M3_tolerance is None and not resisted:
         raise BadInput(
             "target torque needs a tolerance for the reed torque",
             file=scene.origin,
             key="targets.torque.M3_tolerance",
             remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of M0.',
         )
-    for name in scene.targets["retrofit"].weights if target == "retrofit" else ():
+    for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
         if name not in VARIABLES:
             raise BadInput(
                 f"{name} is no design variable",
@@ -152,10 +162,10 @@ def demand(scene: Any, target: str) -> None:
             )
 
 
-def _demand_figures(scene: Any, physics: Beatup, sampler: Sampler) -> None:
+def _demand_figures(scene: Scene, physics: JobModel) -> None:
     """Raise BadInput for a limit on a figure that nothing in the scene gives."""
     for name in scene.limits:
-        if not set(ROWS.get(name, (name,))) <= {*sampler.figures, *physics.quantities}:
+        if not all(physics.has_row(row) or physics.has_quantity(row) for row in ROWS.get(name, (name,))):
             raise BadInput(
                 f"nothing in the scene gives the figure {name}",
                 file=scene.origin,
@@ -165,27 +175,15 @@ def _demand_figures(scene: Any, physics: Beatup, sampler: Sampler) -> None:
             )
 
 
-def _reads_counterweight(scene: Any, target: str, limited: Mapping[str, tuple[float, float]]) -> bool:
+def _reads_counterweight(scene: Scene, target: str, limited: Mapping[str, tuple[float, float]]) -> bool:
     """Say whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
-    loads = [scene.job.effects[name] for name in scene.effects]
-    read = any(set(effect.reads) & set(COUNTERWEIGHT) for effect in loads if isinstance(effect, Load))
-    read = read or bool({"r4", "bearing_force", "shaking_force"} & set(scene.limits)) or target == "retrofit"
+    asked = set(scene.limits)
+    read = target == "retrofit" or "r4" in asked
+    for effect in scene.active:
+        judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.quantities, *effect.rows})
+        read = read or bool(set(effect.reads) & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
     fixed = all(limited[name][0] == limited[name][1] for name in COUNTERWEIGHT)
     return read or fixed or limited["r4e"][1] == 0.0
-
-
-def _bound_limits(scene: Any, variable: Variable) -> list[Limit]:
-    """Return the bounds of a variable the scene bounds, as limits; one that it leaves alone is held, not limited."""
-    label = variable.name.rpartition(".")[2]
-    if label not in scene.bounds or variable.name == "s":
-        return []
-    if variable.lower == variable.upper:
-        return [Limit(label, 0, variable.name, variable.lower, variable.scale, "variable")]
-    ends = ((-1, variable.lower), (1, variable.upper))
-    return [
-        Limit(label, sign, variable.name, value, variable.scale, "variable", relaxable=sign > 0 or value > 0.0)
-        for sign, value in ends
-    ]
 
 
 def _starts(
@@ -196,57 +194,72 @@ def _starts(
     Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and radius
     matter by themselves, little and much of it are optima of their own: then there is a second start.
     """
-    first = {}
-    for v in variables:
-        room = 0.01 * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
-        first[v.name] = min(max(known.get(v.name, 0.0), v.lower + room), v.upper - room)
+    first = scene_numbers.inside(variables, {v.name: known.get(v.name, 0.0) for v in variables})
 
     def using(shares: Mapping[str, float]) -> dict[str, float]:
         given = {v.name: v.range for v in variables if v.name in shares}
         return first | {name: low + shares[name] * (high - low) for name, (low, high) in given.items()}
 
-    found = [using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])]
-    return tuple(start for place, start in enumerate(found) if start not in found[:place])
+    return scene_numbers.distinct([using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])])
+
+
+def _moves(
+    variables: Sequence[Variable], known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
+) -> tuple[Move, ...]:
+    """Return the directions that may leave every figure unchanged: first the counterweight's, then a common scale."""
+    names = {variable.name for variable in variables}
+    most = limited["m4e"][1] * limited["r4e"][1] ** 2
+    used, above = ("s", NO_MASS * most) if "s" in names else ("m4e", 0.0)
+    wishes = {
+        "m4e": (Wish("least", "least added mass"),),
+        "r4e": (
+            Wish("most", "least added mass, so the largest radius", used, above),
+            Wish("today", "no mass, so the radius nearest today's"),
+        ),
+    }
+    axes = tuple(
+        Move("counterweight", (name,), "axis", wishes[name], {name: known[name]}, {name: limited[name]})
+        for name in COUNTERWEIGHT
+        if name in names and limited[name][0] < limited[name][1]
+    )
+    return (*axes, scene_numbers.scale_move("scale", LENGTHS, known, limited))
 
 
 def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
     """Return the counterweight's mass bounds as limits on s against r4e²."""
-    if mass[0] == mass[1]:
-        return [Limit("m4e", 0, "s", mass[0], sizes.inertia, "static", "r4e_square")]
-    ends = ((-1, mass[0]), (1, mass[1]))
     return [
-        Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square", relaxable=sign > 0 or value > 0.0)
-        for sign, value in ends
+        Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square", relaxable=sign >= 0 or value > 0.0)
+        for sign, value in ends(*mass)
     ]
 
 
-def _figure_limits(name: str, limit: Any, sizes: _Sizes) -> list[Limit]:
+def _figure_limits(name: str, limit: Limited, sizes: _Sizes) -> list[Limit]:
     """Return the limits on one figure, row by row."""
-    family: Literal["static", "cycle"] = "cycle" if name in CYCLE_FIGURES else "static"
-    scale = sizes.figure(name)
-    if limit.min is not None and limit.min == limit.max:
-        return [Limit(name, 0, name, limit.min, scale, "static")]
-    ends = [(sign, value) for sign, value in ((-1, limit.min), (1, limit.max)) if value is not None]
-    rows = ROWS.get(name, (name,))
-    return [Limit(name, sign, row, value, scale, family) for sign, value in ends for row in rows]
+    cycle, scale = sizes.sampler.model.has_quantity(name), sizes.figure(name)
+    sides = ends(limit.min, limit.max)
+    rows = ROWS.get(name, (name,)) if sides[0][0] else (name,)
+    return [
+        Limit(name, sign, row, value, scale, "cycle" if cycle else "static") for sign, value in sides for row in rows
+    ]
 
 
-def _target_limits(scene: Any, target: str, sizes: _Sizes) -> list[Limit]:
+def _target_limits(scene: Scene, target: str, sizes: _Sizes) -> list[Limit]:
     """Return what the target itself demands of the reed torque at front dead centre."""
     if target == "retrofit":
         return [Limit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque, "static")]
     if target != "torque":
         return []
-    tolerance = scene.targets["torque"].M3_tolerance
+    tolerance = scene.table(TorqueTarget).M3_tolerance
     tolerance = 0.01 * scene.operation["M0"] if tolerance is None else tolerance
-    if tolerance == 0.0:
-        return [Limit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque, "static")]
-    return [Limit("M3_fdc", sign, "M3_fdc", sign * tolerance, sizes.torque, "static") for sign in (-1, 1)]
+    sides = [(0, 0.0)] if tolerance == 0.0 else [(-1, -tolerance), (1, tolerance)]
+    return [Limit("M3_fdc", sign, "M3_fdc", value, sizes.torque, "static") for sign, value in sides]
 
 
-def _change_parameters(scene: Any, known: Mapping[str, float], limited: Mapping[str, Any]) -> dict[str, float]:
+def _change_parameters(
+    scene: Scene, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
     """Return today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing."""
-    weights = scene.targets["retrofit"].weights
+    weights = scene.table(RetrofitTarget).weights
     found: dict[str, float] = {}
     for name in VARIABLES:
         width = limited[name][1] - limited[name][0]

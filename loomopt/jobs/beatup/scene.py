@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-from loomopt.effects import BEATUP
+from loomopt.effects import found
 from loomopt.errors import BadInput
-from loomopt.jobs.beatup.model import ASSEMBLY
-from loomopt.jobs.template import BEATUP_TEMPLATE
+from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.mechanisms import crank_rocker_faults
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
-from loomopt.schema import Figure, Job, Table, Target
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+from loomopt.schema import Figure, Table, Target
 
 
 class Operation(Table):
@@ -50,8 +51,8 @@ class RetrofitTarget(TargetTable):
     weights: dict[str, PureNumber] = {}  # noqa: RUF012 (pydantic copies it)
 
 
-BALANCED = 1e-8
-"""|M3| at front dead centre below this share of the peak torque is called zero."""
+RESISTED = ("resistance", 1.0)
+"""The pieces of the cycle in which the cloth resists: what target `pulse` is about."""
 
 VARIABLES = {"l1": "length", "l2": "length", "l3": "length", "l4": "length", "m4e": "mass", "r4e": "length"}
 
@@ -68,8 +69,6 @@ FIGURES = {
         Figure("J4", "inertia", "inertia of reed and counterweight"),
         Figure("r4", "length", "reed system's eccentricity"),
         Figure("pulse_rms", "torque", "rms reed torque over the pulse", sides=("max",)),
-        Figure("bearing_force", "force", "peak centrifugal force on the rocking shaft", sides=("max",)),
-        Figure("shaking_force", "force", "peak inertia force of the reed on the frame", sides=("max",)),
         Figure("change", "number", "change from today, in bound widths squared", sides=()),
     )
 }
@@ -78,7 +77,7 @@ TARGETS = {
     target.name: target
     for target in (
         Target("balance", "reed torque zero at front dead centre, then least peak crank torque", TargetTable),
-        Target("pulse", "least reed torque over the whole pulse", TargetTable, needs_effects=("resistance",)),
+        Target("pulse", "least reed torque over the whole pulse", TargetTable, needs_effects=RESISTED[:1]),
         Target("torque", "least peak crank torque, reed torque within a tolerance", TorqueTarget),
         Target("retrofit", "reed torque zero with the least change from today's machine", RetrofitTarget),
     )
@@ -91,13 +90,12 @@ def fault(design: Mapping[str, float]) -> str:
     return crank_rocker_faults.fault(*(design[name] for name in named)) if len(named) == 4 else ""
 
 
-def check(scene: Any) -> None:
+def check(scene: Scene) -> None:
     """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
-    lengths = [scene.mechanism[name] for name in ("l1", "l2", "l3", "l4")]
-    fault = crank_rocker_faults.fault(*lengths)
-    if fault:
+    reason = fault(scene.mechanism)
+    if reason:
         raise BadInput(
-            f"today's machine is not a crank-rocker: {fault}",
+            f"today's machine is not a crank-rocker: {reason}",
             file=scene.origin,
             key="mechanism.l1, l2, l3, l4",
             value=", ".join(str(scene.given(f"mechanism.{name}")) for name in ("l1", "l2", "l3", "l4")),
@@ -106,38 +104,17 @@ def check(scene: Any) -> None:
         )
 
 
-def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
-    """Say in one sentence what an optimum of the target reached; figures in SI."""
-    front, peak, rms = figures["M3_fdc"] or 0.0, figures["peak_torque"] or 0.0, figures["pulse_rms"] or 0.0
-    where = "just before front dead centre" if "bearing_friction" in scene.effects else "at front dead centre"
-    peak_text = f"the least peak crank torque over the whole cycle is {peak:.6g} N*m"
-    if target == "balance" and abs(front) <= BALANCED * peak:
-        return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
-    if target == "balance":
-        return (
-            f"Balance is out of reach: the reed torque nearest to zero {where} is {front:.6g} N*m, "
-            f"and then {peak_text}."
-        )
-    return {
-        "pulse": f"The least reed torque over the pulse is {rms:.6g} N*m rms ({front:.6g} N*m {where}).",
-        "torque": f"With the reed torque at {front:.6g} N*m {where}, {peak_text}.",
-        "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
-    }[target]
-
-
-SCHEMA = Job(
+SCHEMA = SceneSchema(
     name="beatup",
     title="four-bar crank-rocker beat-up: balance the reed torque within the space",
     operation=Operation,
     mechanism=Mechanism,
-    effects=BEATUP,
+    effects=found.of("loomopt.effects.beatup"),
     variables=VARIABLES,
-    figures=FIGURES,
+    own_figures=FIGURES,
     targets=TARGETS,
     default_target="balance",
     check=check,
     fault=fault,
-    headline=headline,
-    template=BEATUP_TEMPLATE,
-    margins=dict.fromkeys(ASSEMBLY, "length"),
+    own_margins=dict.fromkeys(CrankRocker().groups[""].margins, "length"),
 )

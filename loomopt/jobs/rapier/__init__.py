@@ -1,0 +1,1 @@
+"""The rapier job, in the files every job has."""

@@ -1,0 +1,1 @@
+"""The shedding job, in the files every job has."""

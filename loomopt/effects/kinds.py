@@ -1,0 +1,203 @@
+"""What an effect may declare. Every job honours every kind, or refuses it by name; nothing else knows an effect's name.
+
+An effect that is absent from a scene is absent from its equations.
+"""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, Literal, Protocol, TypeVar
+
+from loomopt.maths import Maths, Number
+from loomopt.schema import Figure, Table, Values
+
+
+class Motion:
+    """What every pose knows: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
+
+    phi: Number
+    q: Number
+    q1: Number
+    q2: Number
+    omega: Number
+    omega_dot: Number
+
+    @property
+    def velocity(self) -> Number:
+        """q˙ = q' ω."""
+        return self.q1 * self.omega
+
+    @property
+    def acceleration(self) -> Number:
+        """q¨ = q'' ω² + q' ω̇; the second term only where the speed changes."""
+        steady = self.q2 * self.omega**2
+        return steady if self.omega_dot is None else steady + self.q1 * self.omega_dot
+
+
+Pose = TypeVar("Pose", contravariant=True)
+Own = TypeVar("Own", bound=Table)
+Corners = Callable[[Maths, Values, Values], tuple[Number, ...]]
+Place = tuple[str, float]
+"""A switch by name, and its value on the pieces that are meant."""
+
+
+class Force(Protocol[Pose]):
+    """force(maths, pose, given, own, switch): see `Load`."""
+
+    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, switch: Number, /) -> Number:
+        """Return the term, N or N·m."""
+
+
+class Reading(Protocol[Pose]):
+    """reading(maths, pose, given, own): a value read from the solved motion at one instant."""
+
+    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, /) -> Number:
+        """Return the value, SI."""
+
+
+def constant_switch(angle: float, corners: tuple[float, ...]) -> float:
+    """Return the switch of what has no corners: it is never read."""
+    return 0.0
+
+
+def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
+    """Return no places: what the effect adds is known all over the cycle."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What an effect's row must keep: a value, SI, or that of a key of its table; sign +1 at most, −1 at least, 0 ="""
+
+    row: str
+    sign: int
+    value: float | str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Effect:
+    """What all kinds declare.
+
+    name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
+    own: model of that table's values. rank: its place among the job's effects, the lowest first.
+    reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
+    needs: scene keys that must be given. examples: tables it may have, as a scene writes them, for tests and templates.
+    figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
+    many: whether the table holds one table for each of several instances; instance: which of them this is.
+    """
+
+    name: str
+    summary: str
+    own: type[Table]
+    rank: int = 100
+    reads: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    examples: tuple[Mapping[str, str], ...] = ({},)
+    figures: tuple[Figure, ...] = ()
+    margins: Mapping[str, str] = field(default_factory=dict)
+    many: bool = False
+    instance: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Load(Effect, Generic[Pose]):
+    """An algebraic effect: one term of the force the output needs, or of the crank torque inside the drive.
+
+    acts: "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
+    force(maths, pose, given, own, switch): the term, N or N·m. `given` holds the scene's numbers, `own` its table's.
+    corners(maths, given, own): crank angles in rad where the formula changes; switch(angle, corners): which formula
+    holds at a crank angle inside a piece, as a number the force is handed.
+    known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
+    moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
+    symbol: what its column of the curves is called, its name without one.
+    """
+
+    acts: Literal["output", "drive"]
+    force: Force[Pose]
+    corners: Corners | None = None
+    switch: Callable[[float, tuple[float, ...]], float] = constant_switch
+    known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
+    moved: Callable[[Values, Values], Number] | None = None
+    symbol: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
+
+    name: str
+    key: str
+
+
+def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
+    """Return nothing: no number of the effect comes in sizes."""
+    return {}
+
+
+def nothing_explained(
+    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Any, clash: Iterable[str]
+) -> str:
+    """Return nothing: physics has nothing general to say."""
+    return ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Check(Effect, Generic[Pose]):
+    """An effect that takes no part in the balance: figures and rows read from the solved motion, and their demands.
+
+    quantities: name → value(maths, pose, given, own) over the cycle; the figure is the largest |value|.
+    rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
+    on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
+    sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
+    explain(known, bounds, own, clash): what physics says of why the limits `clash` do.
+    """
+
+    quantities: Mapping[str, Reading[Pose]] = field(default_factory=dict)
+    rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
+    demands: tuple[Demand, ...] = ()
+    least: str = ""
+    axes: tuple[Axis, ...] = ()
+    sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
+    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str]], str] = (
+        nothing_explained
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State(Effect, Generic[Pose]):
+    """One linear coordinate between the output and the loads that move with it; eliminated before a formula reads it.
+
+    carries: names of the loads that move with the coordinate: they leave the output force, and `force` stands there.
+    derived(maths, given, own, carried): values that follow from the scene's numbers; carried(phi, switch by name)
+    returns the pose and the sum of the carried terms there. force: as a load's, of derived values.
+    """
+
+    carries: tuple[str, ...]
+    derived: Callable[[Maths, Values, Values, Callable[[Number, Values], tuple[Any, Number]]], Mapping[str, Number]]
+    force: Force[Pose]
+    acts: Literal["output"] = "output"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Speed(Effect):
+    """The crank's own motion: its speed changes over the turn."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Event(Effect):
+    """What parts and meets again: contact that is lost."""
+
+
+UNBUILT = (State, Speed, Event)
+"""Kinds that no scene can turn on yet."""
+
+
+@functools.cache
+def instance(effect: Effect, name: str) -> Effect:
+    """Return one instance of an effect that there may be many of: the same object for the same name."""
+    return replace(effect, name=f"{effect.name}.{name}", instance=name)
+
+
+def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:
+    """Return effects by name, in the order of their ranks."""
+    return {effect.name: effect for effect in sorted(effects, key=lambda effect: (effect.rank, effect.name))}

@@ -1,0 +1,51 @@
+"""How a job shows itself: what its own views return, and views/ renders."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from loomopt.picture.panels import Panel, each
+
+if TYPE_CHECKING:
+    from loomopt.picture.equations import Equation
+    from loomopt.picture.shapes import Drawing
+    from loomopt.scenes import Scene
+
+Numbers = Mapping[str, float]
+
+
+class JobViews:
+    """A job's own views; a design, SI, may name only some numbers, the others are today's.
+
+    angle: what phi is; lists: part of a design that is a list → what its numbers are, "{count}" for how many.
+    """
+
+    angle: str = "crank angle"
+    lists: Mapping[str, str] = {}  # noqa: RUF012 (never changed)
+
+    def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
+        """Return the mechanism drawn at full scale in the positions that matter. Raises BadInput."""
+        raise NotImplementedError
+
+    def joints_csv(self, scene: "Scene", design: Numbers) -> str:
+        """Return what `linkage` draws as CSV for the workshop, mm: joints, or a profile. Raises BadInput."""
+        raise NotImplementedError
+
+    def equations(self, scene: "Scene") -> "tuple[Equation, ...]":
+        """Return the equations the scene really uses."""
+        raise NotImplementedError
+
+    def marks(self, scene: "Scene", design: Numbers) -> dict[str, float]:
+        """Return the crank angles a reader looks for, rad; a stretch "begins" and "ends"."""
+        raise NotImplementedError
+
+    def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> tuple[Panel, ...]:
+        """Return what a figure of the curves shows: a panel for every column, unless a job knows better."""
+        return each(columns)
+
+    def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
+        """Return what to know beside the numbers, each a sentence without its full stop."""
+        return ()
+
+    def missing(self, scene: "Scene") -> tuple[str, ...]:
+        """Return the keys without which the scene cannot be drawn."""
+        return ()

@@ -1,0 +1,90 @@
+"""Curves over the cycle, written once: the motion as a job names it, each effect's term, force, torque, checks."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from loomopt import maths
+from loomopt.cycle import TURN, Floats, Pieces
+from loomopt.program.model import Formula, Instant
+from loomopt.program.sampling import Sampler
+
+STEPS = 720
+SAME_ROW = 1e-9
+"""rad; an even row this close to a corner stands for it."""
+ANGLE = "phi [rad]"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What curves show.
+
+    motion: column name with unit → formula. force: column of the output force, and the quantity (of which sign) that
+    it is; torque: likewise of the crank. unit: of loads' terms. checks: unit of each check's quantity. follower: what
+    stands after the torque. also: crank angles, rad, that are rows too. closed: whether the row at 2π is one.
+    """
+
+    motion: Mapping[str, Formula]
+    unit: str
+    force: tuple[str, Formula] | None = None
+    torque: tuple[str, Formula] | None = None
+    after: Mapping[str, Formula] = field(default_factory=dict)
+    checks: Mapping[str, str] = field(default_factory=dict)
+    also: tuple[float, ...] = ()
+    closed: bool = False
+
+
+def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequence[float] = ()) -> dict[str, Floats]:
+    """Return the curves of a design over one turn, SI; columns of what the scene does not call for are absent.
+
+    Rows are `steps` equal ones, the angles `also`, rad, and both sides of every corner where a formula changes (the
+    same angle twice). Where a load's term is not known, neither it nor the force is: NaN.
+    """
+    pieces, u, phi = _rows(sampler, columns, steps, also)
+    node = sampler.node(pieces, u)
+    at = sampler.model.instant(maths.numpy(), sampler.given, node)
+    unknown = np.zeros(u.shape, dtype=bool)
+    if sampler.model.known_in:
+        unknown = ~np.any([sampler.cycle.on(where)[pieces] for where in sampler.model.known_in], axis=0)
+    found = {ANGLE: phi} | {name: _column(formula, at, u) for name, formula in columns.motion.items()}
+    loads = sampler.model.loads
+    for load, term in zip(loads, at.terms().values(), strict=True):
+        whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
+        name = getattr(load, "symbol", "") or load.name
+        partial = bool(getattr(load, "known_in", dict)(sampler.model.words_of(load.name)))
+        found[f"{name} [{columns.unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
+    if columns.force and any(load.acts == "output" for load in loads):
+        found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
+    if columns.torque and loads:
+        found[columns.torque[0]] = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
+    for name, unit in columns.checks.items():
+        found[f"{name} [{unit}]"] = sampler.at(name, pieces, u)
+    return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
+
+
+def _column(formula: Formula, at: Instant, u: Floats) -> Floats:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.broadcast_to(np.asarray(formula(at), dtype=float), u.shape).astype(float)
+
+
+def _rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float]) -> tuple[Pieces, Floats, Floats]:
+    """Return nodes (pieces, u) and their crank angles, rad, in order; a corner at 0 ends the turn at 2π too."""
+    cycle = sampler.cycle
+    even = np.linspace(0.0, TURN, steps, endpoint=False)
+    phi = np.unique(np.concatenate([even, np.mod([*columns.also, *also], TURN)]))
+    names = [k for k, name in enumerate(cycle.names) if name in sampler.model.formula_switches]
+    switches = cycle.switches[:, names]
+    ends = np.flatnonzero(np.any(switches != np.roll(switches, -1, axis=0), axis=1))
+    corners = np.mod(cycle.starts[ends + 1], TURN)
+    if len(corners):
+        apart = np.abs(phi[:, None] - corners[None, :])
+        phi = phi[np.min(np.minimum(apart, TURN - apart), axis=1) > SAME_ROW]
+    if columns.closed and not np.any(corners == 0.0):
+        phi = np.append(phi, TURN)
+    pieces, u = cycle.located(phi)
+    pieces = np.concatenate([pieces, ends, (ends + 1) % cycle.pieces])
+    u = np.concatenate([u, np.ones(len(ends)), np.zeros(len(ends))])
+    phi = np.concatenate([phi, np.where(corners == 0.0, TURN, corners), corners])
+    order = np.lexsort((1 - u, np.round(phi, 12)))
+    return pieces[order], u[order], phi[order]

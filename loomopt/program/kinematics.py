@@ -1,0 +1,148 @@
+"""What a mechanism offers a job: poses, events by name, and groups of links that must close."""
+
+import math
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from loomopt import maths
+from loomopt.balance import Given
+from loomopt.cycle import Floats, Node
+from loomopt.effects.kinds import Motion
+from loomopt.maths import Maths, Number
+from loomopt.mechanisms import crank_rocker
+from loomopt.program import spikes
+from loomopt.schema import Values
+from loomopt.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR
+
+SAMPLES = 361
+"""Crank angles of one turn, evenly spread, between which a singular position is sought."""
+
+OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
+"""formula(maths, given, phi, pose): pose is called where it is read."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Links that close a triangle at every crank angle, and what follows from that.
+
+    quantities: over the cycle: the squares of the base over what the links span (1 where they are stretched or folded:
+    `closes` names them by phrase) and the obliquity of the transmission angle. rows: of the design alone, angles and
+    margins; margins: those of them that are never negative. closest: crank angles, rad, where the spans are largest,
+    in closed form; sought between samples without one.
+    """
+
+    quantities: Mapping[str, OfPhi]
+    closes: Mapping[str, str]
+    rows: Mapping[str, Callable[[Maths, Values], Number]] = field(default_factory=dict)
+    margins: tuple[str, ...] = ()
+    closest: tuple[float, ...] = ()
+
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return the crank angles, rad, where the links come within a hair of folding or stretching."""
+        found: list[float] = []
+        for name in self.closes.values():
+
+            def height(at: Floats, name: str = name) -> Floats:
+                return np.asarray(self.quantities[name](maths.numpy(), given, at, _no_pose))
+
+            tops = self.closest or _tops(height)
+            found += [top for top in tops if height(np.array([top]))[0] > (1 - NEARLY_SINGULAR) ** 2]
+        return tuple(dict.fromkeys(found))
+
+
+def _no_pose() -> None:
+    raise NotImplementedError("a span is a formula of the crank angle alone")
+
+
+def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
+    """Return the crank angle, rad, of the highest value where it is worth a closer look."""
+    angles = np.linspace(0.0, 2 * math.pi, SAMPLES)
+    top, step = float(angles[int(np.argmax(height(angles)))]), 2 * math.pi / (SAMPLES - 1)
+    if height(np.array([top]))[0] <= 1 - 10 * NEARLY_SINGULAR:
+        return ()
+    return (spikes.sectioned(height, top - step, top + step),)
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Stretches of the cycle that limits speak of; switch: as a load's, of its own corners' angles, rad."""
+
+    name: str
+    corners: Callable[[Maths, Given], tuple[Number, ...]]
+    switch: Callable[[float, tuple[float, ...]], float]
+
+
+class Kinematics(Protocol):
+    """A mechanism in every number system; angles rad, lengths m."""
+
+    @property
+    def structure(self) -> Hashable:
+        """What distinguishes its formulas from another's."""
+
+    @property
+    def groups(self) -> Mapping[str, Group]:
+        """Links that must close, by the prefix that their quantities and rows have."""
+
+    @property
+    def arcs(self) -> tuple[Arcs, ...]:
+        """Stretches of the cycle with formulas of their own."""
+
+    @property
+    def breaks(self) -> frozenset[str]:
+        """Events that lie on corners of its own arcs."""
+
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Mapping[str, Number]:
+        """Return what follows from the scene's numbers at once; called: events that effects call in."""
+
+    def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
+        """Return, by name of value, where events lie that no formula gives: Newton's method starts there."""
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
+        """Return the pose at a node."""
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
+        """Return the exact pose at an event."""
+
+    def events(self, maths: Maths, given: Given) -> Mapping[str, Number]:
+        """Return the crank angles of events by name."""
+
+
+def four_bar(
+    lengths: Callable[[Values], crank_rocker.Lengths],
+    names: tuple[str, str, str, str],
+    phase: Callable[[Values], Number],
+    phrases: tuple[str, str],
+    obliquity: OfPhi | None = None,
+) -> Group:
+    """Return the group of a crank-rocker.
+
+    lengths(values), names: its links and what the scene calls them; phase(values): the linkage's own crank angle at
+    φ = 0, rad; phrases: that rod and rocker are not stretched, and not folded.
+    """
+    l1, l2, l3, l4 = names
+
+    def far(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+        return crank_rocker.span_far(m, lengths(given.values), phi + phase(given.values))
+
+    def near(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+        return crank_rocker.span_near(m, lengths(given.values), phi + phase(given.values))
+
+    margins: dict[str, Callable[[Maths, Values], Number]] = {
+        f"assembly: {l1} + {l4} < {l2} + {l3}": lambda m, v: (v[l2] + v[l3]) - ASSEMBLY_MARGIN * (v[l1] + v[l4]),
+        f"assembly: {l1} + {l2} < {l3} + {l4}": lambda m, v: (v[l4] - v[l1]) - ASSEMBLY_MARGIN * (v[l2] - v[l3]),
+        f"assembly: {l1} + {l3} < {l2} + {l4}": lambda m, v: (v[l4] - v[l1]) - ASSEMBLY_MARGIN * (v[l3] - v[l2]),
+    }
+    rows: dict[str, Callable[[Maths, Values], Number]] = {
+        "mu_near": lambda m, values: crank_rocker.transmission_angle_near(m, lengths(values)),
+        "mu_far": lambda m, values: crank_rocker.transmission_angle_far(m, lengths(values)),
+    }
+    quantities: dict[str, OfPhi] = {"span_far": far, "span_near": near}
+    return Group(
+        quantities | ({"obliquity": obliquity} if obliquity else {}),
+        dict(zip(phrases, ("span_far", "span_near"), strict=True)),
+        rows | margins,
+        tuple(margins),
+    )

@@ -1,0 +1,389 @@
+"""One model for every job: kinematics + effects + arcs + named quantities and rows, in every number system.
+
+Only this file groups effects, reads their switches, by name, and runs loads, states and checks.
+"""
+
+import functools
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from loomopt import balance, cycle
+from loomopt.balance import Acting, Given
+from loomopt.cycle import Cycle, Node, Where
+from loomopt.effects.kinds import Check, Demand, Effect, Load, State
+from loomopt.maths import Maths, Number
+from loomopt.owned import label, owned
+from loomopt.program.kinematics import Arcs, Kinematics
+from loomopt.schema import Values
+
+Stills = Mapping[str, Values]
+"""Event → the switches just before it, by name."""
+
+
+class Instant:
+    """The mechanism with its effects at one node, in one number system; what no formula reads is not computed.
+
+    event: where it stands at an event of the motion, whose pose is exact.
+    """
+
+    def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
+        self.model, self.maths, self.given, self.node, self.event = model, maths, given, node, event
+
+    @property
+    def values(self) -> Values:
+        """The scene's numbers and what follows from them, by name."""
+        return self.given.values
+
+    @functools.cached_property
+    def pose(self) -> Any:
+        """The mechanism's pose."""
+        kinematics = self.model.kinematics
+        if self.event:
+            return kinematics.still(self.maths, self.given, self.event, self.node.switch)
+        return kinematics.pose(self.maths, self.given, self.node)
+
+    @functools.cached_property
+    def force(self) -> Number:
+        """Q, N or N·m: what the mechanism must supply at its output."""
+        return balance.output_force(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+
+    @functools.cached_property
+    def crank_torque(self) -> Number:
+        """The torque on the crank, N·m."""
+        return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+
+    def terms(self) -> dict[str, Number]:
+        """Return each load's term by its name, N or N·m."""
+        found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+        return {load.name: term for load, term in found}
+
+    def switched(self, **switch: Number) -> "Instant":
+        """Return the same node with other switches."""
+        node = Node(self.node.phi, {**self.node.switch, **switch})
+        return Instant(self.model, self.maths, self.given, node, self.event)
+
+
+Formula = Callable[[Instant], Number]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A whole-cycle quantity; figure: whether its largest |value| is one.
+
+    signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
+    bound between points is proven with every answer.
+    """
+
+    formula: Formula
+    figure: bool = True
+    signed: bool = False
+    bounded: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
+
+    formula: Formula
+    needs: tuple[str, ...] = ()
+    event: str = ""
+
+
+@dataclass(frozen=True)
+class Integral:
+    """A mean of `quantity` over the crank angle; root: its square root.
+
+    Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch
+    "datum".
+    """
+
+    name: str
+    root: str
+    quantity: str
+    where: Where | None = None
+    angles: tuple[float, ...] = ()
+    data: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class JobModel:
+    """A mechanism with the effects a scene calls for.
+
+    effects: loads, states and checks, in the order of the job. words: (effect, key, word) for values that choose a
+    formula. quantities, rows: the job's own; those of checks come with them. assembly: what says that the mechanism
+    assembles at an angle beside its kinematics' groups: phrase → (quantity, the largest |value| it may have).
+    known: names of scene numbers that are given. cases: for each further case, the names of the scene numbers that
+    it has values of its own for (under `cased`).
+    """
+
+    kinematics: Kinematics
+    effects: tuple[Effect, ...] = ()
+    words: tuple[tuple[str, str, str], ...] = ()
+    own_quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    own_rows: Mapping[str, Row] = field(default_factory=dict)
+    arcs: tuple[Arcs, ...] = ()
+    integrals: tuple[Integral, ...] = ()
+    assembled: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    known: frozenset[str] = frozenset()
+    cases: tuple[tuple[str, ...], ...] = ()
+
+    @functools.cached_property
+    def key(self) -> Hashable:
+        """What distinguishes this model's formulas from another's."""
+        means = tuple((mean.name, len(mean.angles)) for mean in self.integrals)
+        arcs = tuple(arc.name for arc in self.arcs)
+        own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
+        return own, self.effects, self.words, self.known, self.cases
+
+    @functools.cached_property
+    def loads(self) -> tuple[Acting, ...]:
+        """What acts in the balance, in order."""
+        return tuple(effect for effect in self.effects if isinstance(effect, Load | State))
+
+    @functools.cached_property
+    def checks(self) -> tuple[Check[Any], ...]:
+        """Effects that take no part in the balance."""
+        return tuple(effect for effect in self.effects if isinstance(effect, Check))
+
+    @functools.cached_property
+    def called(self) -> frozenset[str]:
+        """What the effects read beside the mechanism's lengths: numbers, and events of the motion."""
+        return frozenset(name for effect in self.effects for name in effect.reads)
+
+    @functools.cached_property
+    def labels(self) -> dict[str, str]:
+        """Full name of every number of the effects' tables → what a designer calls it."""
+        return {owned(effect, key): label(effect, key) for effect in self.effects for key in effect.own.model_fields}
+
+    def words_of(self, effect: str) -> dict[str, str]:
+        """Return the words of an effect's table by key."""
+        return {key: word for name, key, word in self.words if name == effect}
+
+    @functools.cached_property
+    def known_in(self) -> tuple[Where, ...]:
+        """The pieces where all loads are known; empty for all of the cycle."""
+        loads = [load for load in self.loads if isinstance(load, Load)]
+        return next((found for load in loads if (found := load.known_in(self.words_of(load.name)))), ())
+
+    # Quantities and rows.
+
+    @functools.cached_property
+    def _quantities(self) -> dict[str, Quantity]:
+        found = dict(self.own_quantities)
+        for prefix, group in self.kinematics.groups.items():
+            for name, formula in group.quantities.items():
+                found[prefix + name] = Quantity(functools.partial(_of_group, formula), figure=False)
+        for check in self.checks:
+            for name in check.quantities:
+                found[name] = Quantity(functools.partial(_of_check, check, name))
+        return found
+
+    @functools.cached_property
+    def _rows(self) -> dict[str, Row]:
+        found = dict(self.own_rows)
+        for prefix, group in self.kinematics.groups.items():
+            for name, formula in group.rows.items():
+                found[name if name in group.margins else prefix + name] = Row(functools.partial(_of_design, formula))
+        for check in self.checks:
+            found |= {name: Row(functools.partial(_row_of, check, name)) for name in check.rows}
+        return {name: row for name, row in found.items() if self._sufficed(row)}
+
+    def _sufficed(self, row: Row) -> bool:
+        known = not self.known or self.known.issuperset(row.needs)
+        return known and (not row.event or any(load.acts == "output" for load in self.loads))
+
+    @functools.cached_property
+    def events_read(self) -> tuple[str, ...]:
+        """Events at which rows stand."""
+        return tuple(dict.fromkeys(row.event for row in self._rows.values() if row.event))
+
+    @functools.cached_property
+    def _cased(self) -> dict[str, tuple[str, int]]:
+        """Name of a quantity, row or switch at a further case → (its own name, the case's place)."""
+        names = (*self._quantities, *self._rows, *self._single)
+        return {cased(name, k + 1): (name, k) for k in range(len(self.cases)) for name in names}
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Whole-cycle quantities whose largest |value| is a figure."""
+        return tuple(name for name, quantity in self._quantities.items() if quantity.figure)
+
+    @functools.cached_property
+    def signed(self) -> frozenset[str]:
+        """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
+        return self._of_kind("signed")
+
+    @functools.cached_property
+    def bounded(self) -> frozenset[str]:
+        """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
+        return self._of_kind("bounded")
+
+    def _of_kind(self, kind: str) -> frozenset[str]:
+        own = {name for name, quantity in self._quantities.items() if getattr(quantity, kind)}
+        return frozenset(own | {name for name, (plain, _) in self._cased.items() if plain in own})
+
+    def has_quantity(self, name: str) -> bool:
+        """Say whether a name is that of a whole-cycle quantity."""
+        return self._cased.get(name, (name, 0))[0] in self._quantities
+
+    def has_row(self, name: str) -> bool:
+        """Say whether a name is that of a row this model has the numbers for."""
+        means = {each for mean in self.integrals for each in (mean.name, mean.root)}
+        return self._cased.get(name, (name, 0))[0] in {*self._rows, *means}
+
+    @functools.cached_property
+    def assembly(self) -> dict[str, tuple[str, float]]:
+        """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
+        found = {
+            phrase: (prefix + name, 1.0)
+            for prefix, group in self.kinematics.groups.items()
+            for phrase, name in group.closes.items()
+        }
+        return found | dict(self.assembled)
+
+    @property
+    def demands(self) -> tuple[tuple[Check[Any], Demand], ...]:
+        """What checks demand while they are on."""
+        return tuple((check, demand) for check in self.checks for demand in check.demands)
+
+    # Numbers and corners.
+
+    def given(self, maths: Maths, values: Values) -> Given:
+        """Return the scene's numbers and what follows from them at once, SI."""
+        first = self._given(maths, values)
+        others = tuple(
+            self._given(maths, {**values, **{name: values[cased(name, k + 1)] for name in names}})
+            for k, names in enumerate(self.cases)
+        )
+        return Given(first.values, first.own, others)
+
+    def _given(self, maths: Maths, values: Values) -> Given:
+        own: dict[str, dict[str, Any]] = {}
+        for effect in self.effects:
+            full = {key: owned(effect, key) for key in effect.own.model_fields}
+            own[effect.name] = {key: values[name] for key, name in full.items() if name in values}
+            own[effect.name] |= self.words_of(effect.name)
+        found = Given({**values, **self.kinematics.derived(maths, values, self.called)}, own)
+        for state in (load for load in self.loads if isinstance(load, State)):
+            derived = state.derived(
+                maths, found.values, own[state.name], functools.partial(self._carried, maths, found)
+            )
+            found = Given({**found.values, **derived}, own)
+        return found
+
+    def _carried(self, maths: Maths, given: Given, phi: Number, switch: Values) -> tuple[Any, Number]:
+        """Return the pose at a crank angle, and the sum of the terms that a state carries."""
+        gone = balance.carried(self.loads)
+        pose = self.kinematics.pose(maths, given, Node(phi, switch))
+        loads = [load for load in self.loads if load.name in gone]
+        return pose, balance.total([term for _, term in balance.terms(maths, loads, pose, given, switch)])
+
+    @functools.cached_property
+    def _single(self) -> tuple[str, ...]:
+        """Names of the switches of one case."""
+        arcs = (*self.kinematics.arcs, *self.arcs)
+        cornered = [load.name for load in self.loads if isinstance(load, Load) and load.corners]
+        return (*(arc.name for arc in arcs), *cornered)
+
+    @functools.cached_property
+    def switches(self) -> tuple[str, ...]:
+        """Names of what has corners in the cycle: the motion's arcs, the job's, then loads'; then of further cases."""
+        return self._single + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._single)
+
+    @functools.cached_property
+    def formula_switches(self) -> frozenset[str]:
+        """Switches whose change changes a formula, not only what limits speak of."""
+        arcs = {arc.name for arc in self.arcs}
+        return frozenset(name for name in self.switches if self._cased.get(name, (name, 0))[0] not in arcs)
+
+    def _cornered(self, maths: Maths, given: Given) -> list[tuple[tuple[Number, ...], Callable[..., float], bool]]:
+        """Return of each switch its corner angles, rad, what reads it, and whether the corners are the cycle's own."""
+        found: list[tuple[tuple[Number, ...], Callable[..., float], bool]] = []
+        for case in (given, *given.cases):
+            arcs = (*self.kinematics.arcs, *self.arcs)
+            found += [(arc.corners(maths, case), arc.switch, True) for arc in arcs]
+            for load in self.loads:
+                if isinstance(load, Load) and load.corners:
+                    angles = load.corners(maths, case.values, case.own[load.name])
+                    found.append((angles, load.switch, not self.kinematics.breaks.intersection(load.reads)))
+        return found
+
+    def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        """Return the corner angles of the cycle, rad, as declared one after the other."""
+        return tuple(angle for angles, _, placed in self._cornered(maths, given) if placed for angle in angles)
+
+    def split(self, maths: Maths, given: Given) -> Cycle:
+        """Return the pieces of the cycle; maths: of floats."""
+        found = self._cornered(maths, given)
+        corners = [angle for angles, _, placed in found if placed for angle in angles]
+        readers = [(switch, angles) for angles, switch, _ in found]
+        return cycle.split(corners, self.switches, lambda angle: [switch(angle, angles) for switch, angles in readers])
+
+    def hints(self, given: Given) -> dict[str, float]:
+        """Return where corners that no formula gives lie, by name of value: what `given` starts from."""
+        found = dict(self.kinematics.hints(given, self.called))
+        for k, case in enumerate(given.cases):
+            found |= {cased(n, k + 1): v for n, v in self.kinematics.hints(case, self.called).items()}
+        return found
+
+    def singular(self, given: Given) -> tuple[float, ...]:
+        """Return the crank angles, rad, where the mechanism comes within a hair of a singular position."""
+        return tuple(angle for group in self.kinematics.groups.values() for angle in group.singular(given))
+
+    # Values.
+
+    def instant(self, maths: Maths, given: Given, node: Node) -> Instant:
+        """Return the mechanism with its effects at a node."""
+        return Instant(self, maths, given, node)
+
+    def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
+        """Return a whole-cycle quantity, SI, at a node."""
+        if name in self._cased:
+            name, k = self._cased[name]
+            given, node = given.cases[k], Node(node.phi, self._switch_of(node.switch, k))
+        return self._quantities[name].formula(Instant(self, maths, given, node))
+
+    def _switch_of(self, switch: Values, case: int) -> Values:
+        own = {name: switch[cased(name, case + 1)] for name in self._single if cased(name, case + 1) in switch}
+        return {**switch, **own}
+
+    def static(
+        self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
+    ) -> dict[str, Number]:
+        """Return figures and rows that need one position only; all it has of the first case without names."""
+        wanted = list(self._rows) if names is None else [n for n in (*self._rows, *self._cased) if n in names]
+        return {name: self._static(maths, given, stills, name) for name in wanted if self.has_row(name)}
+
+    def _static(self, maths: Maths, given: Given, stills: Stills, name: str) -> Number:
+        name, k = self._cased.get(name, (name, -1))
+        row, case = self._rows[name], given if k < 0 else given.cases[k]
+        switch = stills.get(row.event, {})
+        return row.formula(
+            Instant(self, maths, case, Node(None, self._switch_of(switch, k) if k >= 0 else switch), row.event)
+        )
+
+    def event(self, maths: Maths, given: Given, name: str) -> Number:
+        """Return the crank angle of an event, rad."""
+        return self.kinematics.events(maths, given)[name]
+
+
+def cased(name: str, case: int) -> str:
+    """Return the name of a number, quantity, row or switch at a further case, counted from 1."""
+    return f"{name} [case {case}]"
+
+
+def _of_group(formula: Callable[..., Number], at: Instant) -> Number:
+    return formula(at.maths, at.given, at.node.phi, lambda: at.pose)
+
+
+def _of_check(check: Check[Any], name: str, at: Instant) -> Number:
+    return check.quantities[name](at.maths, at.pose, at.values, at.given.own[check.name])
+
+
+def _of_design(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
+    return formula(at.maths, at.values)
+
+
+def _row_of(check: Check[Any], name: str, at: Instant) -> Number:
+    return check.rows[name](at.maths, at.values, at.given.own[check.name])

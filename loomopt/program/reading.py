@@ -1,0 +1,103 @@
+"""What a program's rows are worth at one design, in any number system: the one place that says how each is read."""
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from loomopt.balance import Given, total
+from loomopt.cycle import Cycle, Floats, Node, Pieces
+from loomopt.maths import Maths, Number
+from loomopt.program.model import Integral, JobModel, Stills
+from loomopt.program.program import Limit
+from loomopt.schema import Values
+
+GAUSS_NODES = 32
+"""Nodes of a mean on each piece: right to rounding for one smooth formula."""
+
+
+@functools.cache
+def gauss() -> tuple[Floats, Floats]:
+    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
+    return (nodes + 1) / 2, weights / 2
+
+
+def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats]:
+    """Return nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
+    active = np.flatnonzero(cycle.on(integral.where))
+    nodes, weights = gauss()
+    return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
+
+
+class Reading:
+    """One design in one number system.
+
+    given: the scene's numbers in that system; cycle: its pieces, found in floats; stills: the switches at events.
+    """
+
+    def __init__(self, model: JobModel, maths: Maths, given: Given, cycle: Cycle, stills: Stills) -> None:
+        self.model, self.maths, self.given, self.cycle, self.stills = model, maths, given, cycle, stills
+        self._single: dict[str, Number] = {}
+
+    @functools.cached_property
+    def starts(self) -> list[Number]:
+        """Crank angles, rad, where the pieces begin, the last one turn after the first."""
+        return self.cycle.begins(self.model.corners(self.maths, self.given), self.maths.pi)
+
+    def at(self, name: str, piece: int, u: Number) -> Number:
+        """Return a whole-cycle quantity at a node, SI."""
+        begin, end = self.starts[piece], self.starts[piece + 1]
+        return self.quantity(name, begin + u * (end - begin), self.cycle.switch(piece))
+
+    def quantity(self, name: str, phi: Number, switch: Values) -> Number:
+        """Return a whole-cycle quantity at a crank angle, rad, SI."""
+        return self.model.quantity(self.maths, self.given, name, Node(phi, switch))
+
+    def single(self, name: str) -> Number:
+        """Return a figure or row of the design, a mean over the cycle or its root, or a number of the scene, SI."""
+        if name not in self._single:
+            self._single[name] = self._value(name)
+        return self._single[name]
+
+    def _value(self, name: str) -> Number:
+        for integral in self.model.integrals:
+            if name == integral.name:
+                return self.mean(integral)
+            if name == integral.root:
+                return self.maths.sqrt(self.single(integral.name))
+        found = self.model.static(self.maths, self.given, self.stills, (name,))
+        return found[name] if name in found else self.given.values[name]
+
+    def mean(self, integral: Integral) -> Number:
+        """Return a mean by its rule, node by node, SI."""
+        if integral.angles:
+            number = self.maths.number
+            fixed = zip(integral.angles, integral.data, strict=True)
+            found = [self.quantity(integral.quantity, number(a), {"datum": number(d)}) for a, d in fixed]
+            return total(found) / len(found)
+        weighted, widths = [], []
+        for piece, u, weight in zip(*quadrature(self.cycle, integral), strict=True):
+            width = float(weight) * (self.starts[piece + 1] - self.starts[piece])
+            weighted.append(width * self.at(integral.quantity, int(piece), float(u)))
+            widths.append(width)
+        return total(weighted) / total(widths)
+
+    def excess(self, limit: Limit, value: Number = None) -> Number:
+        """Return by how much a variable's or a single value's limit is exceeded, SI; of an equality the difference.
+
+        value: of the limit in this number system, its own without one.
+        """
+        known: Mapping[str, Number] = self.given.values if limit.family == "variable" else _Singles(self)
+        return limit.residual(known, self.maths.number(limit.value) if value is None else value)
+
+
+class _Singles(dict[str, Any]):
+    """Single values by name, read when they are asked for."""
+
+    def __init__(self, reading: Reading) -> None:
+        self.reading = reading
+
+    def __missing__(self, name: str) -> Number:
+        return self.reading.single(name)

@@ -1,0 +1,55 @@
+"""All that a scene needs to know of its job, so that it can be read and checked without knowing any."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from loomopt.effects.kinds import Effect
+from loomopt.schema import Figure, Table, Target
+
+if TYPE_CHECKING:
+    from loomopt.scenes import Scene
+
+
+@dataclass(frozen=True)
+class SceneSchema:
+    """What a scene of a job may hold; it may follow from the raw scene.
+
+    operation, mechanism: models of those tables; keys that are required only by what reads them are optional there.
+    effects: by name, in the order of the job. variables: design variables → kind of quantity, in the order shown.
+    figures: the job's own; those of its effects come with them (`all_figures`).
+    check(scene): raises BadInput when today's machine is not one this job can work on.
+    fault(design): why a design, SI, cannot work as this mechanism; "" when it can.
+    margins: limits that every design keeps → kind of quantity; their names are whole phrases.
+    groups: name → bounds that --free frees together.
+    lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
+    """
+
+    name: str
+    title: str
+    operation: type[Table]
+    mechanism: type[Table]
+    effects: Mapping[str, Effect]
+    variables: Mapping[str, str]
+    own_figures: Mapping[str, Figure]
+    targets: Mapping[str, Target]
+    default_target: str
+    check: "Callable[[Scene], None]"
+    fault: Callable[[Mapping[str, float]], str]
+    needs: tuple[str, ...] = ()
+    own_margins: Mapping[str, str] = field(default_factory=dict)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    lists: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """Figures of the job, then those of its effects."""
+        return {**self.own_figures, **{f.name: f for effect in self.effects.values() for f in effect.figures}}
+
+    @property
+    def margins(self) -> dict[str, str]:
+        """Margins of the job, then those of its effects."""
+        found = dict(self.own_margins)
+        for effect in self.effects.values():
+            found |= effect.margins
+        return found
