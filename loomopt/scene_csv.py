@@ -4,11 +4,11 @@ import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from loomopt import packaged
 from loomopt.errors import BadInput
 from loomopt.scene_errors import refusal
+from loomopt.scenes import Scene
 from loomopt.units import DISPLAY_UNIT, QuantityError, factor
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
@@ -16,7 +16,7 @@ UNITS = {"angle": ("deg", "rad"), "length": ("mm", "cm", "m", "in")}
 """Units a column may have, by kind of quantity."""
 
 
-def read(scene: Any, given: str, key: str, kinds: Mapping[str, str]) -> tuple[list[tuple[float, ...]], str]:
+def read(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[list[tuple[float, ...]], str]:
     """Return the columns of a table, SI, and the file's path. Raises BadInput.
 
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity.
@@ -42,7 +42,7 @@ def header(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
 
 
-def located(scene: Any, given: str) -> Path:
+def located(scene: Scene, given: str) -> Path:
     """Return where a table lies: beside the scene's file, or among the packaged scenes."""
     origin = Path(scene.origin)
     among = packaged.problems_path()

@@ -40,21 +40,17 @@ class Group:
     margins: tuple[str, ...] = ()
     closest: tuple[float, ...] = ()
 
-    def singular(self, given: Given) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the links come within a hair of folding or stretching."""
+    def singular(self, given: Given, pose: Callable[[Floats], Any]) -> tuple[float, ...]:
+        """Return the crank angles, rad, where the links nearly fold or stretch; pose(phi): the mechanism's."""
         found: list[float] = []
         for name in self.closes.values():
 
             def height(at: Floats, name: str = name) -> Floats:
-                return np.asarray(self.quantities[name](maths.numpy(), given, at, _no_pose))
+                return np.asarray(self.quantities[name](maths.numpy(), given, at, lambda: pose(at)))
 
             tops = self.closest or _tops(height)
             found += [top for top in tops if height(np.array([top]))[0] > (1 - NEARLY_SINGULAR) ** 2]
         return tuple(dict.fromkeys(found))
-
-
-def _no_pose() -> None:
-    raise NotImplementedError("a span is a formula of the crank angle alone")
 
 
 def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
@@ -73,6 +69,8 @@ class Arcs:
     name: str
     corners: Callable[[Maths, Given], tuple[Number, ...]]
     switch: Callable[[float, tuple[float, ...]], float]
+    structure: Hashable = None
+    """What distinguishes stretches of one name."""
 
 
 class Kinematics(Protocol):

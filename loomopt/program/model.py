@@ -10,9 +10,9 @@ from typing import Any
 
 from loomopt import balance, cycle
 from loomopt.balance import Acting, Given
-from loomopt.cycle import Cycle, Node, Where
-from loomopt.effects.kinds import Check, Demand, Effect, Load, State
-from loomopt.maths import Maths, Number
+from loomopt.cycle import Cycle, Floats, Node, Where
+from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
+from loomopt.maths import Maths, Number, numpy
 from loomopt.owned import label, owned
 from loomopt.program.kinematics import Arcs, Kinematics
 from loomopt.schema import Values
@@ -132,7 +132,7 @@ class JobModel:
     def key(self) -> Hashable:
         """What distinguishes this model's formulas from another's."""
         means = tuple((mean.name, len(mean.angles)) for mean in self.integrals)
-        arcs = tuple(arc.name for arc in self.arcs)
+        arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
         own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
         return own, self.effects, self.words, self.known, self.cases
 
@@ -328,8 +328,12 @@ class JobModel:
         return found
 
     def singular(self, given: Given) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the mechanism comes within a hair of a singular position."""
-        return tuple(angle for group in self.kinematics.groups.values() for angle in group.singular(given))
+        """Return the crank angles, rad, where the mechanism nearly reaches a singular position."""
+
+        def pose(phi: Floats) -> Motion:
+            return self.kinematics.pose(numpy(), given, Node(phi, {}))
+
+        return tuple(angle for group in self.kinematics.groups.values() for angle in group.singular(given, pose))
 
     # Values.
 

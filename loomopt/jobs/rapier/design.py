@@ -1,34 +1,103 @@
-"""Between the NLP's variables and the drive a person reads; the moves that change one and not the other."""
+"""Between the NLP's variables and the drive a person reads; what is read off the head's travel, refined, never off a
+grid: stroke, dwells, turning points.
+"""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
-from loomopt.jobs.rapier.model import SLEY
-from loomopt.jobs.rapier.program import bounds, jerk_mean, match_mean, today
-from loomopt.jobs.rapier.program import model as model_of
-from loomopt.jobs.rapier.reading import read
-from loomopt.jobs.rapier.scene import FIGURES, STROKE, VARIABLES
-from loomopt.program.numbers import full_name, nearest_scale, numbers
-from loomopt.program.program import Move, Program, Wish
+import numpy as np
+
+from loomopt import maths
+from loomopt.cycle import TURN, Floats, Node
+from loomopt.effects.kinds import Motion
+from loomopt.jobs.base import Figures
+from loomopt.jobs.rapier.model import jerk_mean, match_mean
+from loomopt.jobs.rapier.scene import STROKE, VARIABLES, MatchTarget, match_table
+from loomopt.maths import Maths, Number
+from loomopt.mechanisms.turning_points import crossing
+from loomopt.program.model import JobModel
+from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
+from loomopt.scenes import Scene
 
-FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
-
-
-def moves(program: Program) -> tuple[Move, ...]:
-    """Return the directions that may leave every figure unchanged: the scales of five-bar and sley four-bar."""
-    names = {variable.name for variable in program.variables}
-    scales = (Move("five-bar scale", FIVE_BAR, "scale"), Move("sley scale", SLEY, "scale"))
-    return tuple(move for move in scales if names >= set(move.along))
+SAMPLES = 720
+TOUCHES = 1e-9
+"""Share of s_dwell by which a travel that only touches it may exceed it: less than any limit's tolerance."""
+NEWTON = 6
 
 
-def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
-    """Return what the silent levels want of a move at NLP variables x, SI: closest to today."""
-    return nearest_scale(x, numbers(scene), bounds(scene), move.along)
+@dataclass(frozen=True)
+class Reading:
+    """stroke, m, reached at crank angle phi_stroke; dwells after and before front dead centre, rad."""
+
+    stroke: float
+    phi_stroke: float
+    dwell_after: float
+    dwell_before: float
 
 
-def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def read(sampler: Sampler) -> Reading:
+    """Return stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
+    found = sampler.extremes("S")
+    if not found or not all(math.isfinite(extreme.value) for extreme in found):
+        raise ValueError("the drive does not assemble all round")
+    outward = max(found, key=lambda extreme: extreme.value)
+    stroke, phi = 0.0, 0.0
+    if outward.value > 0.0:
+        phi = _settled(lambda angle: _pose(sampler, maths.FLOAT, angle), sampler.angle(outward))
+        stroke = float(_pose(sampler, maths.FLOAT, phi).q)
+    room = sampler.given.values.get("s_dwell")
+    if room is None:
+        return Reading(stroke, phi % TURN, math.nan, math.nan)
+    extremes = [sampler.angle(extreme) for extreme in found]
+    after, before = (_dwell(sampler, extremes, float(room), side) for side in (1, -1))
+    return Reading(stroke, phi % TURN, after, before)
+
+
+def _settled(pose_at: Callable[[float], Motion], angle: float) -> float:
+    """Return the crank angle, rad, of a turning point after Newton's method from nearby."""
+    for _ in range(NEWTON):
+        pose = pose_at(angle)
+        step = pose.q1 / pose.q2 if pose.q2 else 0.0
+        if abs(step) > 1e-3:
+            return angle
+        angle -= step
+        if abs(step) < 1e-15:
+            break
+    return float(angle)
+
+
+def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:
+    """Return how far the crank turns from front dead centre, on one side, before |S| leaves `room` (m)."""
+    even = np.linspace(0.0, TURN, SAMPLES + 1)
+    angles = np.unique(np.concatenate([even, np.mod(side * np.array(extremes), TURN)]))
+
+    def travel(turned: Floats) -> Floats:
+        return np.asarray(np.abs(_pose(sampler, maths.numpy(), side * turned).q), dtype=np.float64)
+
+    sizes = travel(angles)
+    out = np.flatnonzero(sizes > room * (1 + TOUCHES))
+    if not out.size:
+        return TURN
+    inside = np.flatnonzero(sizes[: out[0]] <= room)
+    low, high = float(angles[inside[-1]]) if inside.size else 0.0, float(angles[out[0]])
+    return crossing(lambda turned: float(travel(np.array([turned]))[0]) - room, low, high)
+
+
+def _pose(sampler: Sampler, system: Maths, phi: Number) -> Motion:
+    """Return the head's pose at crank angles φ1, rad."""
+    return sampler.model.kinematics.pose(system, sampler.given, Node(phi, {}))
+
+
+def follow(model: JobModel, values: Numbers) -> Mapping[str, float]:
+    """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
+    reading = read(Sampler(model, values))
+    found = {"phi_stroke": reading.phi_stroke}
+    return found | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
+
+
+def design(program: Program, x: Numbers) -> dict[str, float]:
     """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""
     fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0} - set(STROKE)
     own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
@@ -36,45 +105,31 @@ def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
     return {name: values[name] for name in (*VARIABLES, *(name for name in x if name in own and name not in VARIABLES))}
 
 
-def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:
-    """Return the NLP's variables, SI, of a design."""
-    return program.completed(design)
-
-
-def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
-    """Return NLP variables as they are."""
-    return dict(x)
-
-
-def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
-    """Return a design (SI; a scene number it does not name stays the scene's) ready to be sampled."""
-    known = numbers(scene)
-    return Sampler(model_of(scene), known | {full_name(known, name): value for name, value in design.items()})
-
-
-def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
+def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-    sampled = sampler(scene, design)
     reading, static = read(sampled), sampled.static
-    found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
+    found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
     found |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
     if "s_dwell" in scene.operation:
         found |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
         found["dwell"] = min(reading.dwell_after, reading.dwell_before)
     found |= {name: sampled.peak(name) for name in sampled.model.quantities}
-    if scene.effects and "speed" not in scene.operation and "head_inertia" in scene.effects:
-        found |= {"tape_force": None, "peak_torque": None}
     found["mu_min"] = math.pi / 2 - sampled.peak("obliquity")
     found["sley_mu_min"] = min(static["sley_mu_near"], static["sley_mu_far"])
     found["rms_jerk"] = math.sqrt(sampled.mean(jerk_mean()))
-    if scene.targets["match"].table is not None:
-        found["match_rms"] = math.sqrt(sampled.mean(match_mean(scene)))
+    if scene.table(MatchTarget).table is not None:
+        found["match_rms"] = math.sqrt(sampled.mean(match_mean(*match_table(scene))))
     return found
 
 
-def peaks(model: Any) -> dict[str, str]:
-    """Return the figures that are extremes over the cycle, with their quantities."""
-    return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
-
-
-__all__ = ["design", "figures", "moves", "peaks", "sampler", "tidy", "today", "values", "wish"]
+def say(target: str, figures: Figures) -> str:
+    """Say in one sentence what an optimum of the target reached; figures in SI."""
+    size = {name: value or 0.0 for name, value in figures.items()}
+    dwell = math.degrees(size["dwell"])
+    kept = f"stroke {1e3 * size['stroke']:.9g} mm and {dwell:.4g} deg of dwell"
+    return {
+        "stroke-dwell": f"With {kept}, the least peak head acceleration is {size['peak_acceleration']:.9g} m/rad^2.",
+        "dwell": f"With stroke {1e3 * size['stroke']:.9g} mm, the largest dwell on both sides is {dwell:.9g} deg.",
+        "smooth": f"With {kept}, the least rms head jerk is {size['rms_jerk']:.9g} m/rad^3.",
+        "match": f"The head travel comes within {1e3 * size['match_rms']:.6g} mm rms of the table.",
+    }[target]

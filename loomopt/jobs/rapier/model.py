@@ -1,41 +1,40 @@
-"""The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17].
+"""The rapier model: a five-bar drive on the sley, with the dwells of its head [Hong17].
 
 q = S, the head's travel from front dead centre; Q = force in the tape; crank torque = Q S'. Crank angle φ1 from FDC.
 """
 
 import functools
+import itertools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
-
-from loomopt import balance, maths
+from loomopt import maths as systems
 from loomopt.balance import Given
-from loomopt.jobs.beatup.model import HAIR
-from loomopt.jobs.rapier import reading as rapier_reading
+from loomopt.cycle import Floats, Node
+from loomopt.effects.kinds import Effect, Motion
 from loomopt.maths import Maths, Number
-from loomopt.mechanisms import crank_rocker, rapier_drive
+from loomopt.mechanisms import rapier_drive, turning_points
 from loomopt.mechanisms.dyad import Vector, dot
-from loomopt.program import spikes
-from loomopt.program.program import Integral
-from loomopt.program.sampling import Sampler
-from loomopt.schema import Arcs, Load, Switched, Values
+from loomopt.program.kinematics import Arcs, Group, four_bar
+from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.schema import Values
+from loomopt.tolerances import ASSEMBLY_MARGIN
 
-ASSEMBLY_MARGIN = 1.001
-"""Every dyad's triangle must close with this factor to spare at both ends."""
 DIMENSIONS = tuple(entry.name for entry in fields(rapier_drive.Dimensions))
 SLEY = ("l1", "l2", "l3", "l71")
-SAMPLED = 2 * math.pi / 360
-"""rad; where a singular position is sought between samples."""
+DWELL = "dwell"
 BEFORE, AFTER = -1.0, 1.0
 """Switch of the dwell arcs on either side of front dead centre."""
-TURN = "turn."
+TURNS = "turns"
+"""The event of the head's turning, which effects may call in."""
+JERK_NODES = 64
+"""Equidistant crank angles of the rms jerk: the mean of a smooth periodic function, right to rounding."""
 
 
 @dataclass(frozen=True)
-class HeadPose(balance.Motion):
+class HeadPose(Motion):
     """The head at crank angles φ1, rad, any shape; what no load reads is not computed."""
 
     joints: rapier_drive.Pose
@@ -69,6 +68,101 @@ class HeadPose(balance.Motion):
         return self.joints.dimensions.travel * self.joints.phi63_3
 
 
+def _five_bar() -> Group:
+    """Return the dyad C D B2: what links l5 and l6 have to span, 1 at the margin, and the transmission angle at D."""
+
+    def base(given: Given, pose: Callable[[], Any]) -> Number:
+        vector = pose().joints.base
+        return dot(vector, vector)
+
+    def far(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+        return ASSEMBLY_MARGIN**2 * base(given, pose) / (given.values["l5"] + given.values["l6"]) ** 2
+
+    def near(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+        return (ASSEMBLY_MARGIN * (given.values["l5"] - given.values["l6"])) ** 2 / base(given, pose)
+
+    def obliquity(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+        return pose().joints.obliquity
+
+    closes = {"five-bar: C to B2 < l5 + l6": "span_far", "five-bar: C to B2 > |l5 - l6|": "span_near"}
+    return Group({"span_far": far, "span_near": near, "obliquity": obliquity}, closes)
+
+
+@dataclass(frozen=True)
+class RapierDrive:
+    """The drive's motion."""
+
+    structure: str = "rapier"
+    arcs: tuple[Arcs, ...] = ()
+    breaks: frozenset[str] = frozenset()
+
+    @functools.cached_property
+    def groups(self) -> Mapping[str, Group]:
+        """The five-bar's dyad, and that of the sley four-bar."""
+        sley = four_bar(
+            lambda values: rapier_drive.sley_lengths(values["dimensions"]),
+            SLEY,
+            lambda values: values["beta"],
+            ("sley: A to B0 < l2 + l3", "sley: A to B0 > |l2 - l3|"),
+        )
+        return {"": _five_bar(), "sley_": sley}
+
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
+        """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
+        dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})
+        centres = rapier_drive.Sley(maths, dimensions).centres
+        found = {
+            "dimensions": dimensions,
+            "centres": centres,
+            "beta": centres.beta,
+            "frame_angle": values["phi30"] - centres.psi_front,
+        }
+        stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
+        front = rapier_drive.Pose(maths, dimensions, stand, 0).relative
+        found |= {"front_x": front.x, "front_y": front.y}
+        if TURNS in called:
+            given = Given({**values, **found}, {})
+            hints = [values[name] for name in itertools.takewhile(values.__contains__, map(_turn, itertools.count()))]
+            found[TURNS] = tuple(
+                turning_points.newton(lambda phi: self._rates(maths, given, phi), hint) for hint in hints
+            )
+        return found
+
+    def _rates(self, maths: Maths, given: Given, phi: Number) -> tuple[Number, Number]:
+        pose = self.pose(maths, given, Node(phi, {}))
+        return pose.q1, pose.q2
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> HeadPose:
+        """Return the pose at crank angles φ1, rad."""
+        values = given.values
+        stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
+        joints = rapier_drive.Pose(maths, values["dimensions"], stand, node.phi)
+        return HeadPose(joints, Vector(values["front_x"], values["front_y"]), values.get("speed"))
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        """Return where the head turns, the first turn onto its way out; nothing where no load calls that in."""
+        if TURNS not in called:
+            return {}
+
+        def slope(phi: Floats) -> Number:
+            return self.pose(systems.numpy(), given, Node(phi, {})).q1
+
+        return {_turn(k): angle for k, angle in enumerate(turning_points.turns(slope))}
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> HeadPose:
+        """Return the pose at front dead centre, where φ1 counts from."""
+        return self.pose(maths, given, Node(0 * maths.pi, switch))
+
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return both dead centres of the sley, rad."""
+        values = given.values
+        return {"front dead centre": 0, "rear dead centre": maths.pi + values["beta_r"] - values["beta"]}
+
+
+def _turn(k: int) -> str:
+    return f"turn {k}"
+
+
 def _arc(sides: tuple[float, ...], angle: float, corners: tuple[float, ...]) -> float:
     """Return on which side's dwell arc a crank angle lies, 0 for neither; corners: the arcs' outer ends."""
     for side, end in zip(sides, corners, strict=False):
@@ -78,205 +172,73 @@ def _arc(sides: tuple[float, ...], angle: float, corners: tuple[float, ...]) -> 
     return 0.0
 
 
-@dataclass(frozen=True)
-class Rapier:
-    """The rapier drive with the loads a scene calls for.
+def dwells(arcs: tuple[tuple[float, str], ...]) -> Arcs:
+    """Return the dwells' stretches; arcs: side, and the name of the value that is the dwell there."""
 
-    arcs: (side, name of the value that is the dwell on that side); integrals: the means a target asks for.
-    """
+    def ends(maths: Maths, given: Given) -> tuple[Number, ...]:
+        found = tuple(given.values[name] if side == AFTER else -given.values[name] for side, name in arcs)
+        return (*found, 0) if found else ()
 
-    loads: tuple[Load, ...]
-    arcs: tuple[tuple[float, str], ...]
-    integrals: tuple[Integral, ...] = ()
-    known: frozenset[str] = field(default=frozenset(), compare=False)
-    """Names of scene numbers that are given: figures whose numbers are missing are left out."""
-
-    @functools.cached_property
-    def key(self) -> Hashable:
-        """What distinguishes this model's formulas from another's."""
-        means = tuple((integral.name, len(integral.angles)) for integral in self.integrals)
-        return "rapier", tuple(load.name for load in self.loads), self.arcs, means, self.known
-
-    @functools.cached_property
-    def switched(self) -> tuple[Switched, ...]:
-        """What has corners: the loads, then the dwell arcs."""
-        return (*self.loads, Arcs("dwell", functools.partial(_arc, tuple(side for side, _ in self.arcs))))
-
-    def where(self, side: float) -> tuple[int, float]:
-        """Return how a limit names the dwell arc on one side."""
-        return len(self.loads), side
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Whole-cycle quantities whose largest |value| is a figure."""
-        loads = ("peak_torque", "tape_force") if self.loads else ()
-        return ("peak_acceleration", "peak_jerk", *loads)
-
-    @property
-    def signed(self) -> frozenset[str]:
-        """No quantity: magnitudes count."""
-        return frozenset()
-
-    @property
-    def assembly(self) -> dict[str, tuple[str, float]]:
-        """Both dyads' triangles close: the square of their base over what the links span, inside 1."""
-        five_bar = {"five-bar: C to B2 < l5 + l6": "span_far", "five-bar: C to B2 > |l5 - l6|": "span_near"}
-        sley = {"sley: A to B0 < l2 + l3": "sley_span_far", "sley: A to B0 > |l2 - l3|": "sley_span_near"}
-        return {name: (quantity, 1.0) for name, quantity in (five_bar | sley).items()}
-
-    @property
-    def bounded(self) -> frozenset[str]:
-        """None yet."""
-        return frozenset()
-
-    def given(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers, the sley's stand, and the driving link's direction at front dead centre."""
-        dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})
-        centres = rapier_drive.Sley(maths, dimensions).centres
-        derived = {
-            "dimensions": dimensions,
-            "centres": centres,
-            "beta": centres.beta,
-            "frame_angle": values["phi30"] - centres.psi_front,
-        }
-        stand = rapier_drive.Stand(derived["beta"], derived["frame_angle"])
-        front = rapier_drive.Pose(maths, dimensions, stand, 0).relative
-        derived |= {"front_x": front.x, "front_y": front.y}
-        own: dict[str, dict[str, Any]] = {load.name: {} for load in self.loads}
-        for name, value in values.items():
-            effect, _, key = name.rpartition(".")
-            if effect in own:
-                own[effect][key] = value
-        found = Given({**values, **derived}, own)
-        derived["turns"] = tuple(self._turn(maths, found, value) for n, value in values.items() if n.startswith(TURN))
-        return Given({**values, **derived}, own)
-
-    def _turn(self, maths: Maths, given: Given, hint: Number) -> Number:
-        """Return the crank angle, rad, near a hint where the head turns: one Newton step, so that it moves along."""
-        pose = self.pose(maths, given, hint)
-        return hint - pose.q1 / pose.q2
-
-    def pose(self, maths: Maths, given: Given, phi: Number) -> HeadPose:
-        """Return the pose at crank angles φ1, rad."""
-        values = given.values
-        stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
-        joints = rapier_drive.Pose(maths, values["dimensions"], stand, phi)
-        return HeadPose(joints, Vector(values["front_x"], values["front_y"]), values.get("speed"))
-
-    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
-        """Return the corner angles, rad, of each load, and the ends of the dwell arcs with front dead centre."""
-        loads = [load.corners(maths, given.values, given.own[load.name]) if load.corners else () for load in self.loads]
-        ends = tuple(given.values[name] if side == AFTER else -given.values[name] for side, name in self.arcs)
-        return (*loads, (*ends, 0) if ends else ())
-
-    def hints(self, given: Given) -> dict[str, float]:
-        """Return where the head turns, the first turn onto its way out; nothing where no load changes there."""
-        if not any(load.name == "tape_friction" for load in self.loads):
-            return {}
-        turns = rapier_reading.turns(lambda phi: self.pose(maths.numpy(), given, phi))
-        return {f"{TURN}{k}": angle for k, angle in enumerate(turns)}
-
-    def singular(self, given: Given) -> tuple[float, ...]:
-        """Return the crank angles, rad, where a dyad comes within a hair of folding or stretching."""
-        angles = np.linspace(0.0, 2 * math.pi, 361)
-        found = []
-        for name in ("span_far", "span_near", "sley_span_far", "sley_span_near"):
-
-            def height(at: Any, name: str = name) -> Any:
-                return np.asarray(self.quantity(maths.numpy(), given, name, at, []))
-
-            top = float(angles[int(np.argmax(height(angles)))])
-            if height(np.array([top]))[0] > 1 - 10 * HAIR:
-                top = spikes.sectioned(height, top - SAMPLED, top + SAMPLED)
-                found += [top] if height(np.array([top]))[0] > (1 - HAIR) ** 2 else []
-        return tuple(found)
-
-    def implied(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
-        sampler = Sampler(self, values)
-        reading = rapier_reading.read(sampler)
-        found = {"phi_stroke": reading.phi_stroke}
-        if "s_dwell" in values:
-            found["dwell"] = min(reading.dwell_after, reading.dwell_before, math.pi)
-        return found
-
-    def front_angle(self, given: Given) -> Number:
-        """Return 0: φ1 counts from front dead centre."""
-        return 0.0
-
-    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity, SI, at crank angle φ1, rad."""
-        pose, values = self.pose(maths, given, phi), given.values
-        if name == "S":
-            return pose.q
-        if name == "S_1":
-            return pose.q1
-        if name == "peak_acceleration":
-            return pose.q2
-        if name == "peak_jerk":
-            return pose.q3
-        if name == "jerk_square":
-            return pose.q3**2
-        if name == "miss_square":
-            return (pose.q - switches[-1]) ** 2
-        if name == "dwell_travel":
-            return pose.q / values["s_dwell"]
-        if name == "obliquity":
-            return pose.joints.obliquity
-        if name in ("span_far", "span_near"):
-            return self._span(values, pose.joints, name)
-        if name in ("sley_span_far", "sley_span_near"):
-            span = crank_rocker.span_far if name == "sley_span_far" else crank_rocker.span_near
-            return span(maths, _sley(values), phi + values["beta"])
-        force = balance.output_force(maths, self.loads, pose, given, switches[: len(self.loads)])
-        return force if name == "tape_force" else force * pose.q1
-
-    def _span(self, values: Values, pose: rapier_drive.Pose, name: str) -> Number:
-        """Return the square of C to B2 over what links l5 and l6 can span, 1 at the margin."""
-        square, far = dot(pose.base, pose.base), values["l5"] + values["l6"]
-        if name == "span_far":
-            return ASSEMBLY_MARGIN**2 * square / far**2
-        return (ASSEMBLY_MARGIN * (values["l5"] - values["l6"])) ** 2 / square
-
-    def static(
-        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
-    ) -> dict[str, Number]:
-        """Return figures and rows of single positions and of the sley four-bar, SI; all it has without names."""
-        available = [*SLEY_ROWS]
-        available += ["phi_stroke", "rest"] if "phi_stroke" in given.values else []
-        available += ["stroke_short"] if {"phi_stroke", "stroke"} <= given.values.keys() else []
-        available += ["dwell", "dwell_rest"] if "dwell" in given.values else []
-        wanted = available if names is None else [name for name in available if name in names]
-        return {name: self._static(maths, given, name) for name in wanted}
-
-    def _static(self, maths: Maths, given: Given, name: str) -> Number:
-        values = given.values
-        if name in SLEY_ROWS:
-            return SLEY_ROWS[name](maths, values)
-        if name == "dwell_rest":
-            return maths.pi - values["dwell"]
-        if name in values:
-            return values[name]
-        pose = self.pose(maths, given, values["phi_stroke"])
-        return pose.q1 if name == "rest" else pose.q - values["stroke"]
+    return Arcs(DWELL, ends, functools.partial(_arc, tuple(side for side, _ in arcs)), arcs)
 
 
-def _sley(values: Values) -> crank_rocker.Lengths:
-    return rapier_drive.sley_lengths(values["dimensions"])
+def _at_stroke(at: Instant) -> HeadPose:
+    """Return the pose at the hand-over."""
+    return at.model.kinematics.pose(at.maths, at.given, Node(at.values["phi_stroke"], {}))  # type: ignore[return-value]
 
 
-SLEY_ASSEMBLY: dict[str, Callable[[Maths, Values], Number]] = {
-    "assembly: l1 + l71 < l2 + l3": lambda m, v: (v["l2"] + v["l3"]) - ASSEMBLY_MARGIN * (v["l1"] + v["l71"]),
-    "assembly: l1 + l2 < l3 + l71": lambda m, v: (v["l71"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l2"] - v["l3"]),
-    "assembly: l1 + l3 < l2 + l71": lambda m, v: (v["l71"] - v["l1"]) - ASSEMBLY_MARGIN * (v["l3"] - v["l2"]),
+QUANTITIES: dict[str, Quantity] = {
+    "peak_acceleration": Quantity(lambda at: at.pose.q2),
+    "peak_jerk": Quantity(lambda at: at.pose.q3),
+    "S": Quantity(lambda at: at.pose.q, figure=False),
+    "S_1": Quantity(lambda at: at.pose.q1, figure=False),
+    "jerk_square": Quantity(lambda at: at.pose.q3**2, figure=False),
+    "miss_square": Quantity(lambda at: (at.pose.q - at.node.switch["datum"]) ** 2, figure=False),
+    "dwell_travel": Quantity(lambda at: at.pose.q / at.values["s_dwell"], figure=False),
 }
-"""By how much the sley's dyad closes beyond the margin, m; never negative."""
-
-SLEY_ROWS: dict[str, Callable[[Maths, Values], Number]] = {
-    "swing": lambda maths, values: values["centres"].swing,
-    "theta": lambda maths, values: values["centres"].theta,
-    "sley_mu_near": lambda maths, values: crank_rocker.transmission_angle_near(maths, _sley(values)),
-    "sley_mu_far": lambda maths, values: crank_rocker.transmission_angle_far(maths, _sley(values)),
-    **SLEY_ASSEMBLY,
+LOADED: dict[str, Quantity] = {
+    "peak_torque": Quantity(lambda at: at.crank_torque),
+    "tape_force": Quantity(lambda at: at.force),
 }
-"""Angles of the sley four-bar, rad, and its margins."""
+"""Quantities of the motion, and those that loads give, SI."""
+
+ROWS: dict[str, Row] = {
+    "swing": Row(lambda at: at.values["centres"].swing),
+    "theta": Row(lambda at: at.values["centres"].theta),
+    "phi_stroke": Row(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
+    "rest": Row(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
+    "stroke_short": Row(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
+    "dwell": Row(lambda at: at.values["dwell"], ("dwell",)),
+    "dwell_rest": Row(lambda at: at.maths.pi - at.values["dwell"], ("dwell",)),
+}
+"""Figures and rows of single positions and of the sley four-bar, SI."""
+
+
+def jerk_mean() -> Integral:
+    """Return the mean square of the head's jerk over the turn."""
+    angles = tuple(2 * math.pi * k / JERK_NODES for k in range(JERK_NODES))
+    return Integral("jerk_mean_square", "rms_jerk", "jerk_square", angles=angles, data=(0.0,) * JERK_NODES)
+
+
+def match_mean(angles: tuple[float, ...], travels: tuple[float, ...]) -> Integral:
+    """Return the mean square of the head's distance from a table of crank angles, rad, and travels, m."""
+    return Integral("match_mean_square", "match_rms", "miss_square", angles=angles, data=travels)
+
+
+def model(
+    effects: tuple[Effect, ...],
+    words: tuple[tuple[str, str, str], ...],
+    known: frozenset[str],
+    arcs: tuple[tuple[float, str], ...] = (),
+    means: tuple[Integral, ...] = (),
+) -> JobModel:
+    """Return the drive with effects; arcs: the dwells that limits speak of; means: those that a target reads."""
+    drive = JobModel(RapierDrive(), effects)
+    quantities = QUANTITIES | (LOADED if drive.loads else {})
+    stretches = (dwells(arcs),) if arcs else ()
+    return JobModel(RapierDrive(), effects, words, quantities, ROWS, stretches, means, known=known)
+
+
+SLEY_MARGINS = RapierDrive().groups["sley_"].margins
+CLOSES = RapierDrive().groups[""].closes
+"""Margins of the sley's dyad, and those of the five-bar's by phrase, each with its whole-cycle row: at most 1."""

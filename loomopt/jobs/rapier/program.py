@@ -1,117 +1,103 @@
 """From a rapier scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
 import math
-from typing import Any
+from collections.abc import Mapping, Sequence
 
+from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
-from loomopt.jobs.rapier import match as rapier_match
-from loomopt.jobs.rapier.model import AFTER, BEFORE, SLEY, SLEY_ASSEMBLY, Rapier
-from loomopt.jobs.rapier.reading import read
-from loomopt.jobs.rapier.scene import CLOSES, VARIABLES
+from loomopt.jobs import base
+from loomopt.jobs.rapier import model as rapier
+from loomopt.jobs.rapier.design import follow, read
+from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
+from loomopt.jobs.rapier.scene import match_table
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_drive, rapier_faults
-from loomopt.program.numbers import bounds as bounds_of
-from loomopt.program.numbers import full_name, numbers
-from loomopt.program.program import Integral, Limit, Objective, Program, Variable
+from loomopt.program import numbers as scene_numbers
+from loomopt.program.model import JobModel
+from loomopt.program.numbers import bound_limits, demanded, distinct, ends, inside, numbers
+from loomopt.program.program import Limit, Move, Objective, Program, Variable
 from loomopt.program.sampling import Sampler
-from loomopt.schema import Load
+from loomopt.scene_tables import Limit as Limited
+from loomopt.scenes import Scene
 
-JERK_NODES = 64
-"""Equidistant crank angles of the rms jerk: the mean of a smooth periodic function, right to rounding."""
+FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
-CYCLE = {name: name for name in ("peak_acceleration", "peak_jerk", "tape_force", "peak_torque")}
-STATIC = {"swing": ("swing",), "theta": ("theta",), "phi_stroke": ("phi_stroke",)} | {
-    "sley_mu_min": ("sley_mu_near", "sley_mu_far")
-}
+ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far")}
+"""Figures that are the least of several smooth rows."""
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
-ROOM = 0.01
-"""Share of a bound's width that a start keeps from its ends."""
 
 
-def jerk_mean() -> Integral:
-    """Return the mean square of the head's jerk over the turn."""
-    angles = tuple(2 * math.pi * k / JERK_NODES for k in range(JERK_NODES))
-    return Integral("jerk_mean_square", "rms_jerk", "jerk_square", angles=angles, data=(0.0,) * JERK_NODES)
+def model(scene: Scene, target: str = "", read: bool = True) -> JobModel:
+    """Return the drive with the effects the scene calls for and what the target reads; read: whether effects are."""
+    means = (jerk_mean(),) if target == "smooth" else (match_mean(*match_table(scene)),) if target == "match" else ()
+    known = {*numbers(scene), *(("phi_stroke",) if target else ()), *((DWELL,) if target == DWELL else ())}
+    effects = scene.active if read else ()
+    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, target), means)
 
 
-def match_mean(scene: Any) -> Integral:
-    """Return the mean square of the head's distance from the target's table. Raises BadInput."""
-    angles, travels = rapier_match.read(scene)
-    return Integral("match_mean_square", "match_rms", "miss_square", angles=angles, data=travels)
-
-
-def model(scene: Any, target: str = "", loads: bool = True) -> Rapier:
-    """Return the drive with the loads the scene calls for and what the target reads."""
+def _arcs(scene: Scene, target: str) -> tuple[tuple[float, str], ...]:
+    """Return the sides on which there is a dwell, each with the value that it is."""
     named = {BEFORE: "dwell_before", AFTER: "dwell_after"}
-    if target == "dwell":
-        arcs = tuple((side, "dwell") for side in named)
-    else:
-        arcs = tuple((side, name) for side, name in named.items() if name in scene.operation)
-    means = {"smooth": (jerk_mean,), "match": (lambda: match_mean(scene),)}.get(target, ())
-    effects = [scene.job.effects[name] for name in scene.effects] if loads else []
-    chosen = tuple(effect for effect in effects if isinstance(effect, Load))
-    return Rapier(chosen, arcs, tuple(mean() for mean in means), frozenset(numbers(scene)))
+    if target == DWELL:
+        return tuple((side, DWELL) for side in named)
+    return tuple((side, name) for side, name in named.items() if name in scene.operation)
 
 
-def today(scene: Any) -> dict[str, float]:
-    """Return today's design, SI, with every other number that the scene frees."""
-    known = numbers(scene)
-    others = [full_name(known, name) for name, bound in scene.bounds.items() if name not in VARIABLES and bound.free]
-    return {name: known[name] for name in (*VARIABLES, *others)}
-
-
-def bounds(scene: Any) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
-    return bounds_of(scene, numbers(scene), VARIABLES)
-
-
-def demand(scene: Any, target: str) -> None:
+def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
-    for name in scene.job.targets[target].needs:
-        if name not in scene.operation:
-            raise BadInput(
-                f"target {target} needs {name}",
-                file=scene.origin,
-                key=f"operation.{name}",
-                remedy=f"Give operation.{name}, or choose another target.",
-            )
+    base.demand(scene, target)
     if target == "match":
-        rapier_match.read(scene)
+        match_table(scene)
 
 
-def program(scene: Any, target: str) -> Program:
+def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
-    known, limited = numbers(scene), bounds(scene)
-    loaded = bool({"tape_force", "peak_torque"} & set(scene.limits))
-    _demand_loads(scene, loaded)
-    physics = model(scene, target, loads=loaded)
-    kept = [name for name in scene.job.targets[target].needs if name in known]
-    sampler = Sampler(physics, {"dwell": 1.0, **known})
-    reading = read(sampler)
-    free = {full_name(known, name): bound.free for name, bound in scene.bounds.items()}
-    variables = [_variable(name, limited[name], known) for name in limited if free.get(name)]
+    known = numbers(scene)
+    limited = scene_numbers.bounds(scene, known)
+    _demand_figures(scene)
+    physics = model(scene, target, _reads_effects(scene))
+    kept = [name for name in scene.schema.targets[target].needs if name in known]
+    sampler = Sampler(physics, {DWELL: 1.0, "phi_stroke": 0.0, **known})
+    labels = scene_numbers.labels(scene)
+    free = {scene.full(name): bound.free for name, bound in scene.bounds.items()}
+    variables = [_variable(name, limited[name], known, labels.get(name, "")) for name in limited if free.get(name)]
     named = {variable.name for variable in variables}
-    limits = [limit for variable in variables for limit in _bound_limits(variable)]
+    limits = [limit for variable in variables for limit in bound_limits(variable)]
     for name in (name for name in kept if name not in named):
         variables.append(Variable(name, known[name], known[name], _size(name, known), (known[name],) * 2))
         limits.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
     turn = (0.0, 2 * math.pi)
     variables.append(Variable("phi_stroke", *turn, 1.0, turn))
-    if target == "dwell":
-        variables.append(Variable("dwell", 1e-3, math.pi, 1.0, (1e-3, math.pi)))
-    limits += _kept_limits(physics, kept, known)
+    if target == DWELL:
+        variables.append(Variable(DWELL, 1e-3, math.pi, 1.0, (1e-3, math.pi)))
+    limits += _kept_limits(_arcs(scene, target), kept, known)
     limits += _margins(bool(set(SLEY) & named), known)
     limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sampler)]
+    limits += demanded(scene, physics.checks, known, {})
     taken = {variable.name for variable in variables}
     parameters = {name: value for name, value in known.items() if name not in taken}
-    objectives = _objectives(target, sampler, reading.stroke)
-    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, _starts(variables, known))
+    scales = (("five-bar scale", FIVE_BAR), ("sley scale", SLEY))
+    moves: list[Move] = [
+        scene_numbers.scale_move(name, along, known, limited) for name, along in scales if taken >= set(along)
+    ]
+    moves += scene_numbers.axis_moves(scene, known, limited)
+    objectives = _objectives(target, sampler, read(sampler).stroke)
+    starts = _starts(variables, known)
+    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow)
 
 
-def _demand_loads(scene: Any, loaded: bool) -> None:
-    if loaded and not scene.effects:
+def _reads_effects(scene: Scene) -> bool:
+    """Say whether the program reads anything that effects give: then they are in it, else they are not."""
+    checks = [effect for effect in scene.active if isinstance(effect, Check)]
+    given = {name for check in checks for name in (*check.quantities, *check.rows)}
+    return bool((given | set(LOADED)) & set(scene.limits)) or any(check.demands for check in checks)
+
+
+def _demand_figures(scene: Scene) -> None:
+    """Raise BadInput for a limit on a figure that nothing in the scene gives."""
+    if set(LOADED) & set(scene.limits) and not model(scene).loads:
         raise BadInput(
             "no effect in the scene makes a tape force",
             file=scene.origin,
@@ -120,7 +106,7 @@ def _demand_loads(scene: Any, loaded: bool) -> None:
         )
 
 
-def _size(name: str, known: Any) -> float:
+def _size(name: str, known: Mapping[str, float]) -> float:
     """Return the natural size of a number that targets keep."""
     stroke = float(known.get("stroke", 0.0))
     if name == "stroke":
@@ -128,53 +114,45 @@ def _size(name: str, known: Any) -> float:
     return max(float(known[name]), S_DWELL * stroke) if name == "s_dwell" else 1.0
 
 
-def _variable(name: str, ends: tuple[float, float], known: Any) -> Variable:
+def _variable(name: str, ends: tuple[float, float], known: Mapping[str, float], label: str) -> Variable:
     """Return a variable of natural size: angles 1 rad, lengths the largest they may be."""
     angle = name in ("alpha", "phi40", "phi30", "dwell_after", "dwell_before")
     size = 1.0 if angle else max(abs(known[name]), *map(abs, ends)) or 1.0
-    return Variable(name, *ends, size, ends)
+    return Variable(name, *ends, size, ends, label)
 
 
-def _bound_limits(variable: Variable) -> list[Limit]:
-    """Return the bounds of a variable as limits."""
-    label = variable.name.rpartition(".")[2]
-    if variable.lower == variable.upper:
-        return [Limit(label, 0, variable.name, variable.lower, variable.scale, "variable")]
-    ends = ((-1, variable.lower), (1, variable.upper))
-    return [Limit(label, sign, variable.name, value, variable.scale, "variable") for sign, value in ends]
-
-
-def _kept_limits(physics: Rapier, kept: list[str], known: Any) -> list[Limit]:
+def _kept_limits(arcs: Sequence[tuple[float, str]], kept: Sequence[str], known: Mapping[str, float]) -> list[Limit]:
     """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
     size = known["stroke"] if "stroke" in kept else 1.0
     rows = {"head at rest at phi_stroke": "rest"} | ({"stroke is reached": "stroke_short"} if "stroke" in kept else {})
     found = [Limit(name, 0, row, 0.0, size, "static", relaxable=False, hidden=True) for name, row in rows.items()]
-    for side, name in physics.arcs:
-        if name in (*kept, "dwell"):
+    for side, name in arcs:
+        if name in (*kept, DWELL):
             text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
-            where = physics.where(side)
+            where = (DWELL, side)
             row = Limit(text, 1, "dwell_travel", 1.0, 1.0, "cycle", relaxable=False, where=where, hidden=True)
             found.append(row)
     return found
 
 
-def _margins(sley: bool, known: Any) -> list[Limit]:
+def _margins(sley: bool, known: Mapping[str, float]) -> list[Limit]:
     """Return the margins by which every dyad closes over the whole turn; the sley's where it may change."""
     found = [Limit(name, 1, row, 1.0, 1.0, "cycle", relaxable=False) for name, row in CLOSES.items()]
-    rows = SLEY_ASSEMBLY if sley else ()
+    rows = SLEY_MARGINS if sley else ()
     return found + [Limit(row, -1, row, 0.0, known["l71"], "static", relaxable=False) for row in rows]
 
 
-def _figure_limits(name: str, limit: Any, sampler: Sampler) -> list[Limit]:
+def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
     """Return the limits on one figure, row by row."""
-    if name == "mu_min":
+    if name == "mu_min" and limit.min is not None:
         return [Limit(name, -1, "obliquity", limit.min, 1.0, "cycle", complement=math.pi / 2)]
-    if name in CYCLE:
-        return [Limit(name, 1, name, limit.max, sampler.peak(name) or 1.0, "cycle")]
-    if limit.min is not None and limit.min == limit.max:
-        return [Limit(name, 0, STATIC[name][0], limit.min, 1.0, "static")]
-    ends = [(sign, value) for sign, value in ((-1, limit.min), (1, limit.max)) if value is not None]
-    return [Limit(name, sign, row, value, 1.0, "static") for sign, value in ends for row in STATIC[name]]
+    sides = ends(limit.min, limit.max)
+    if sampler.model.has_quantity(name):
+        size = sampler.peak(name) or 1.0
+        return [Limit(name, sign, name, value, size, "cycle") for sign, value in sides]
+    rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
+    size = 1.0
+    return [Limit(name, sign, row, value, size, "static") for sign, value in sides for row in rows]
 
 
 def _objectives(target: str, sampler: Sampler, stroke: float) -> tuple[Objective, ...]:
@@ -187,24 +165,13 @@ def _objectives(target: str, sampler: Sampler, stroke: float) -> tuple[Objective
     }[target]
 
 
-def _starts(variables: list[Variable], known: Any) -> tuple[dict[str, float], ...]:
+def _starts(variables: Sequence[Variable], known: Mapping[str, float]) -> tuple[dict[str, float], ...]:
     """Return today's drive moved just inside its bounds, and the paper's own construction where it closes."""
-
-    def inside(values: Any) -> dict[str, float]:
-        found = {}
-        for v in variables:
-            room = ROOM * (v.upper - v.lower)
-            found[v.name] = min(max(values.get(v.name, v.lower), v.lower + room), v.upper - room)
-        return found
-
-    starts = [inside(known)]
     built = constructed(known)
-    if built:
-        starts.append(inside({**known, **built}))
-    return tuple(start for place, start in enumerate(starts) if start not in starts[:place])
+    return distinct([inside(variables, known), *([inside(variables, {**known, **built})] if built else [])])
 
 
-def constructed(known: Any) -> dict[str, float] | None:
+def constructed(known: Mapping[str, float]) -> dict[str, float] | None:
     """Return C0, l5 and φ40 by the paper's construction [Hong17] for a scene's stroke; None where it does not close."""
     if "stroke" not in known:
         return None

@@ -1,19 +1,21 @@
 """What a rapier scene may hold: its tables, design variables, figures and targets."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
-from loomopt.effects import RAPIER
+from loomopt import scene_csv
+from loomopt.effects import found
 from loomopt.errors import BadInput
-from loomopt.jobs.rapier.model import SLEY, SLEY_ASSEMBLY
-from loomopt.jobs.template import RAPIER_TEMPLATE
+from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.mechanisms import rapier_faults
 from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
-from loomopt.schema import Figure, Job, Table, Target
+from loomopt.scene_errors import refusal
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+from loomopt.schema import Figure, Table, Target
 
-CLOSES = {"five-bar: C to B2 < l5 + l6": "span_far", "five-bar: C to B2 > |l5 - l6|": "span_near"}
-"""Margins of the five-bar's dyad by name, each with its whole-cycle row: at most 1."""
+MATCHED = {"phi1": "angle", "S": "length"}
+"""Columns of the table that a head's travel should match, with their kinds."""
 
 
 class Operation(Table):
@@ -107,7 +109,7 @@ TARGETS = {
 }
 
 
-def check(scene: Any) -> None:
+def check(scene: Scene) -> None:
     """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
     fault = rapier_faults.named(scene.mechanism)
     if fault:
@@ -128,33 +130,28 @@ def check(scene: Any) -> None:
         )
 
 
-def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
-    """Say in one sentence what an optimum of the target reached; figures in SI."""
-    size = {name: value or 0.0 for name, value in figures.items()}
-    dwell = math.degrees(size["dwell"])
-    kept = f"stroke {1e3 * size['stroke']:.9g} mm and {dwell:.4g} deg of dwell"
-    return {
-        "stroke-dwell": f"With {kept}, the least peak head acceleration is {size['peak_acceleration']:.9g} m/rad^2.",
-        "dwell": f"With stroke {1e3 * size['stroke']:.9g} mm, the largest dwell on both sides is {dwell:.9g} deg.",
-        "smooth": f"With {kept}, the least rms head jerk is {size['rms_jerk']:.9g} m/rad^3.",
-        "match": f"The head travel comes within {1e3 * size['match_rms']:.6g} mm rms of the table.",
-    }[target]
+def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
+    given, key = scene.table(MatchTarget).table, "targets.match.table"
+    if given is None:
+        remedy = f'Write table = "s.csv" in [targets.match]; the file has the columns {scene_csv.header(MATCHED)}'
+        raise refusal("target match needs a table of head travel", scene.origin, key, remedy=remedy)
+    (angles, travels), _ = scene_csv.read(scene, given, key, MATCHED)
+    return angles, travels
 
 
-SCHEMA = Job(
+SCHEMA = SceneSchema(
     name="rapier",
     title="rapier drive on the sley: stroke and dwells with the least head acceleration",
     operation=Operation,
     mechanism=Mechanism,
-    effects=RAPIER,
+    effects=found.of("loomopt.effects.rapier"),
     variables=VARIABLES,
-    figures=FIGURES,
+    own_figures=FIGURES,
     targets=TARGETS,
     default_target="stroke-dwell",
     check=check,
     fault=rapier_faults.named,
-    headline=headline,
-    template=RAPIER_TEMPLATE,
-    margins=dict.fromkeys(SLEY_ASSEMBLY, "length") | dict.fromkeys(CLOSES, "number"),
+    own_margins=dict.fromkeys(SLEY_MARGINS, "length") | dict.fromkeys(CLOSES, "number"),
     groups={"sley": SLEY},
 )

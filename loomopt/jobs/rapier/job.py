@@ -1,0 +1,100 @@
+"""The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17]."""
+
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from loomopt.jobs.base import Figures, Job
+from loomopt.jobs.rapier import design as designs
+from loomopt.jobs.rapier import program as programs
+from loomopt.jobs.rapier.scene import SCHEMA
+from loomopt.maths import FLOAT
+from loomopt.picture.job_views import JobViews
+from loomopt.program.curves import Columns
+from loomopt.program.model import JobModel
+from loomopt.program.program import Numbers, Program
+from loomopt.program.sampling import Sampler
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+
+
+class Rapier(Job):
+    """A five-bar rapier drive on the sley of a four-bar, with one 2:1 gear."""
+
+    name = "rapier"
+
+    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
+        """Return what a rapier scene may hold."""
+        return SCHEMA
+
+    def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
+        """Return the drive with the effects the scene calls for."""
+        return programs.model(scene)
+
+    def program(self, scene: Scene, target: str) -> Program:
+        """Return a target as a task. Raises BadInput."""
+        return programs.program(scene, target)
+
+    def demand(self, scene: Scene, target: str) -> None:
+        """Raise BadInput where a target speaks of what the scene does not have."""
+        programs.demand(scene, target)
+
+    def design(self, program: Program, x: Numbers) -> dict[str, float]:
+        """Return the design of NLP variables."""
+        return designs.design(program, x)
+
+    def values(self, program: Program, design: Numbers) -> dict[str, float]:
+        """Return the NLP variables of a design."""
+        return program.completed(design)
+
+    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
+        """Return every figure of a design."""
+        return designs.figures(scene, self.sampler(scene, design))
+
+    def peaks(self, model: JobModel) -> dict[str, str]:
+        """Return the figures that are extremes over the cycle."""
+        return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
+
+    def say(self, scene: Scene, target: str, figures: Figures) -> str:
+        """Return one sentence on what an optimum is worth."""
+        return designs.say(target, figures)
+
+    def columns(self, scene: Scene, sampler: Sampler) -> Columns:
+        """Return S with three derivatives, φ3, φ6, φ63, the transmission angle, the terms, tape force and torque."""
+        front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
+        gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
+        centres = sampler.given.values["centres"]
+        rear = math.pi + centres.beta_r - centres.beta
+        return Columns(
+            {
+                "S [m]": lambda at: at.pose.q,
+                "S_1 [m/rad]": lambda at: at.pose.q1,
+                "S_2 [m/rad^2]": lambda at: at.pose.q2,
+                "S_3 [m/rad^3]": lambda at: at.pose.q3,
+                "phi3 [rad]": lambda at: at.pose.joints.phi3,
+                "phi6 [rad]": lambda at: at.pose.joints.phi3 + gap + at.pose.joints.phi63(at.pose.front),
+                "phi63 [rad]": lambda at: at.pose.joints.phi63(at.pose.front),
+                "mu [rad]": lambda at: math.pi / 2 - at.pose.joints.obliquity,
+            },
+            "N",
+            ("Q [N]", lambda at: at.force),
+            ("Md [N*m]", lambda at: at.crank_torque),
+            also=(designs.read(sampler).phi_stroke, rear),
+        )
+
+    @property
+    def views(self) -> JobViews:
+        """Pictures and equations."""
+        from loomopt.jobs.rapier.views import VIEWS
+
+        return VIEWS
+
+    @property
+    def resources(self) -> Traversable:
+        """The folder of the template."""
+        return files("loomopt.jobs.rapier")
+
+
+JOB = Rapier()

@@ -1,0 +1,65 @@
+"""Where a motion turns: sought between samples, then followed in any number system by Newton's method."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from loomopt.maths import Number
+
+Floats = NDArray[np.float64]
+SAMPLES = 720
+STEPS = 2
+"""Newton steps from a hint that is right in float64: one makes the value right to first order in the design, and both
+make it right to second order, as curvatures need (the first derivative of the value's error is of the first order)."""
+
+
+def newton(rates: Callable[[Number], tuple[Number, Number]], hint: Number) -> Number:
+    """Return the root near a hint, so that it moves with the design; rates(x): a function's value and slope."""
+    found = hint
+    for _ in range(STEPS):
+        value, slope = rates(found)
+        found = found - value / slope
+    return found
+
+
+def turns(slope: Callable[[Floats], Any]) -> list[float]:
+    """Return the crank angles, rad, where slope(angles) changes its sign, the first of them from − to +.
+
+    None where it never does, or where the motion has no real position somewhere.
+    """
+    angles = np.linspace(0.0, 2 * np.pi, SAMPLES + 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = np.asarray(slope(angles), dtype=np.float64)
+    if not np.all(np.isfinite(slopes)):
+        return []
+    found = []
+    for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
+        sign = 1.0 if slopes[k + 1] > slopes[k] else -1.0
+
+        def signed(angle: float, sign: float = sign) -> float:
+            return sign * float(np.asarray(slope(np.array([angle])))[0])
+
+        found.append((crossing(signed, float(angles[k]), float(angles[k + 1])), sign > 0))
+    first = next((place for place, (_, outward) in enumerate(found) if outward), 0)
+    return [angle for angle, _ in found[first:] + found[:first]]
+
+
+def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function that is not positive at `low` and positive at `high` crosses zero, to rounding."""
+    at_low, at_high = excess(low), excess(high)
+    for turn in range(200):
+        width = high - low
+        if width <= 4e-16 * max(1.0, abs(high)) or at_low == 0.0 == at_high:
+            break
+        secant = low - at_low * width / (at_high - at_low) if at_high != at_low else (low + high) / 2
+        middle = (low + high) / 2 if turn % 3 == 2 or not low < secant < high else secant
+        value = excess(middle)
+        if value <= 0.0:
+            low, at_low = middle, value
+            if value == 0.0:
+                break
+        else:
+            high, at_high = middle, value
+    return low
