@@ -60,6 +60,14 @@ class Cycle:
             return np.ones(self.pieces, dtype=bool)
         return np.asarray(self.switches[:, self.names.index(where[0])] == where[1])
 
+    def stretch(self, where: Where | None) -> tuple[float, float]:
+        """Return the crank angles, rad, where a stretch of the cycle that is meant begins and ends."""
+        on = self.on(where)
+        begins, ends = on & ~np.roll(on, 1), on & ~np.roll(on, -1)
+        if not begins.any():
+            return float(self.starts[0]), float(self.starts[-1 if on.all() else 0])
+        return float(self.starts[:-1][begins][0]), float(self.starts[1:][ends][0])
+
     def angles(self, pieces: Pieces, u: Floats) -> Floats:
         """Return crank angles, rad, of nodes (pieces, u)."""
         return self.starts[pieces] * (1 - u) + self.starts[pieces + 1] * u

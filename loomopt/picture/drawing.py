@@ -1,5 +1,6 @@
 """What drawings of mechanisms share: labels that keep clear of strokes, arrows, fixed pivots, title and legend."""
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.picture import placing, shapes
-from loomopt.picture.shapes import CHARACTER, Circle, Drawing, Line, Point, Primitive, Text, plain
+from loomopt.picture.shapes import CHARACTER, Arc, Circle, Drawing, Line, Point, Primitive, Text, plain
+
+POINTER = 6.0
+"""How far a pointer reaches, in text heights."""
 
 
 class Label(NamedTuple):
@@ -36,6 +40,22 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
 def arrow(layer: str, tip: Point, angle: float, length: float) -> Line:
     """Return an open arrow head of a length, mm, that points in the direction of an angle, rad."""
     return Line(layer, (tip.towards(angle + 2.8, length), tip, tip.towards(angle - 2.8, length)))
+
+
+def pointer(near: Point, angle: float, h: float) -> list[Primitive]:
+    """Return an arrow that points away from a point in the direction of an angle, rad; h: text height, mm."""
+    tip = near.towards(angle, POINTER * h)
+    return [Line("notes", (near.towards(angle, 1.5 * h), tip)), arrow("notes", tip, angle, 1.2 * h)]
+
+
+def angle_between(
+    centre: Point, radius: float, begin: float, end: float, h: float, both: bool = False
+) -> list[Primitive]:
+    """Return an angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
+    turn = math.copysign(math.pi / 2, end - begin)
+    found: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]
+    heads = [(end, turn), *([(begin, -turn)] if both else [])]
+    return found + [arrow("dimensions", centre.towards(at, radius), at + side, 0.8 * h) for at, side in heads]
 
 
 def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:

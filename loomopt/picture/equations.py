@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from loomopt import balance, maths
-from loomopt.schema import Effect, Load, Values
+from loomopt.balance import Acting
+from loomopt.effects.kinds import Effect, Motion
+from loomopt.schema import Values
 
 Expression = Any
 """A SymPy expression."""
@@ -81,8 +83,8 @@ def loop(
 
 
 def sums(
-    loads: Sequence[Load],
-    pose: Any,
+    loads: Sequence[Acting],
+    pose: Motion,
     total: Expression,
     letter: str,
     torque: tuple[str, str] = ("crank torque", "Md"),
@@ -96,12 +98,12 @@ def sums(
     output = [load for load in shown if load.acts == "output"]
     given = balance.Given({}, {load.name: {} for load in loads})
     if output:
-        found.append(equation("balance", total, balance.output_force(system, shown, pose, given, [0] * len(shown))))
+        found.append(equation("balance", total, balance.output_force(system, shown, pose, given, {})))
     summed = [dataclasses.replace(load, force=_constant(total)) for load in output[:1]]
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
         name, sign = torque
-        found.append(equation(name, symbol(sign), balance.crank_torque(system, summed, pose, given, [0] * len(summed))))
+        found.append(equation(name, symbol(sign), balance.crank_torque(system, summed, pose, given, {})))
     return found
 
 

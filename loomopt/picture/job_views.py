@@ -20,7 +20,7 @@ class JobViews:
     """
 
     angle: str = "crank angle"
-    lists: Mapping[str, str] = {}  # noqa: RUF012 (never changed)
+    lists: Mapping[str, str] = {}
 
     def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
         """Return the mechanism drawn at full scale in the positions that matter. Raises BadInput."""

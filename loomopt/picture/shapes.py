@@ -21,6 +21,10 @@ class Point(NamedTuple):
         """Return the point at a distance, mm, in the direction of an angle, rad."""
         return Point(self.x + distance * math.cos(angle), self.y + distance * math.sin(angle))
 
+    def part(self, other: "Point", share: float = 0.5) -> "Point":
+        """Return the point that lies a share of the way to another."""
+        return Point(self.x + share * (other.x - self.x), self.y + share * (other.y - self.y))
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -99,7 +103,8 @@ class Text:
     anchor: Literal["centre", "left"] = "centre"
 
 
-Primitive = Line | Circle | Arc | Text
+Trace = Line | Circle | Arc
+Primitive = Trace | Text
 
 
 @dataclass(frozen=True)

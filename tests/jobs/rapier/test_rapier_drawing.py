@@ -11,7 +11,7 @@ import pytest
 from loomopt import maths
 from loomopt.errors import BadInput
 from loomopt.jobs.rapier import drawing as rapier_drawing
-from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, PRIMES, REAR
+from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
 from loomopt.mechanisms import rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture import shapes
@@ -31,6 +31,7 @@ def paper():
 
 
 PAPER = paper()
+PRIMES = {FRONT: "", REAR: "'", OVER: "''"}
 SIZES = ("l1", "l2", "l3", "l3p", "l4", "l5", "l6")
 WIDER = PAPER | {"l4": 0.03, "l6": 0.2, "alpha": math.radians(40), "phi40": PAPER["phi40"] + 0.2}
 """Another drive that assembles all round."""
@@ -75,7 +76,7 @@ def test_crank_and_rod_are_in_line_in_both_dead_centres():
 
 @pytest.mark.parametrize("design", [PAPER, WIDER])
 def test_the_hand_over_is_where_the_travel_is_greatest(design):
-    found = rapier_drawing.positions(design)
+    found = rapier_drawing.of(design)
     S, _ = travel(design, np.linspace(0, 2 * np.pi, 100_001))
     at, rate = travel(design, np.array(found.phi1[OVER]))
     assert abs(rate) < 1e-12

@@ -1,0 +1,50 @@
+"""The beat-up's own views; what draws and prints is imported when it is first asked for."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from loomopt.cycle import TURN
+from loomopt.jobs import registry
+from loomopt.jobs.beatup.model import FRONT, REAR
+from loomopt.maths import FLOAT
+from loomopt.picture.job_views import JobViews
+from loomopt.scenes import Scene
+
+if TYPE_CHECKING:
+    from loomopt.picture.equations import Equation
+    from loomopt.picture.shapes import Drawing
+
+
+class BeatupViews(JobViews):
+    """The crank-rocker in both dead centres, its equations, and where the cloth resists."""
+
+    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
+        """Return the crank-rocker in both dead centres at full scale. Raises BadInput."""
+        from loomopt.jobs.beatup import drawing
+
+        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name)
+
+    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
+        """Return its joints as CSV, mm. Raises BadInput."""
+        from loomopt.jobs.beatup import drawing
+
+        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design))
+
+    def equations(self, scene: Scene) -> "tuple[Equation, ...]":
+        """Return the equations the scene really uses."""
+        from loomopt.jobs.beatup import equations
+
+        return equations.equations(scene)
+
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+        """Return both dead centres, rad, and where the cloth begins and ceases to resist."""
+        sampler = registry.of(scene).sampler(scene, design)
+        model, given = sampler.model, sampler.given
+        found = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
+        for pulse in model.integrals:
+            begins, ends = sampler.cycle.stretch(pulse.where)
+            found |= {"pulse begins": begins, "pulse ends": ends}
+        return found
+
+
+VIEWS = BeatupViews()

@@ -1,0 +1,49 @@
+"""The rapier's own views; what draws and prints is imported when it is first asked for."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from loomopt.cycle import TURN
+from loomopt.jobs import registry
+from loomopt.jobs.rapier.design import read
+from loomopt.maths import FLOAT
+from loomopt.picture.job_views import JobViews
+from loomopt.scenes import Scene
+
+if TYPE_CHECKING:
+    from loomopt.picture.equations import Equation
+    from loomopt.picture.shapes import Drawing
+
+
+class RapierViews(JobViews):
+    """The drive in both dead centres of the sley and at the hand-over, its equations, and where the head dwells."""
+
+    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
+        """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
+        from loomopt.jobs.rapier import drawing
+
+        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name)
+
+    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
+        """Return its joints as CSV, mm. Raises BadInput."""
+        from loomopt.jobs.rapier import drawing
+
+        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design))
+
+    def equations(self, scene: Scene) -> "tuple[Equation, ...]":
+        """Return the equations the scene really uses."""
+        from loomopt.jobs.rapier import equations
+
+        return equations.equations(scene)
+
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+        """Return the sley's dead centres, rad, the hand-over and the dwell."""
+        sampler = registry.of(scene).sampler(scene, design)
+        events, reading = sampler.model.kinematics.events(FLOAT, sampler.given), read(sampler)
+        found = {name: float(angle) % TURN for name, angle in events.items()} | {"hand-over": reading.phi_stroke}
+        if "s_dwell" in scene.operation:
+            found |= {"dwell begins": TURN - reading.dwell_before, "dwell ends": reading.dwell_after}
+        return found
+
+
+VIEWS = RapierViews()
