@@ -1,7 +1,8 @@
 """The cam law of a shedding scene: a named one, a free spline, or a table; each as one thing with pieces."""
 
 import functools
-from collections.abc import Hashable, Mapping
+import itertools
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
@@ -104,7 +105,11 @@ class Spline:
         """Return s, s' and s'' at the knots."""
         made = cam_spline.spline(maths, self.accelerations(values))
         columns = {"s": made.s, "v": made.v, "a": made.a}
-        return {f"{PREFIX}{of}_{k}": value for of, column in columns.items() for k, value in enumerate(column)}
+        return {self.knot(of, k): value for of, column in columns.items() for k, value in enumerate(column)}
+
+    def knot(self, of: str, k: int) -> str:
+        """Return the name of s, v or a (= s, s', s'') at a knot."""
+        return f"{PREFIX}{of}_{k}"
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
         """Return s and its derivatives at u."""
@@ -113,7 +118,7 @@ class Spline:
     def made(self, values: Values) -> cam_spline.Spline:
         """Return the spline of prepared values."""
         knots = range(self.intervals + 1)
-        return cam_spline.Spline(*(tuple(values[f"{PREFIX}{of}_{k}"] for k in knots) for of in "sva"))
+        return cam_spline.Spline(*(tuple(values[self.knot(of, k)] for k in knots) for of in "sva"))
 
 
 @dataclass(frozen=True)
@@ -144,3 +149,14 @@ class Tabulated:
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
         """Return s and its derivatives at u."""
         return self.table.at(maths, u, piece)
+
+
+def knots(values: Mapping[str, Number]) -> tuple[Number, ...]:
+    """Return s'' at the knots of a spline law among values, law_0, law_1 ...; none without one."""
+    names = itertools.takewhile(values.__contains__, (f"{PREFIX}{k}" for k in itertools.count()))
+    return tuple(values[name] for name in names)
+
+
+def named_knots(accelerations: Iterable[Number]) -> dict[str, Number]:
+    """Return s'' at the knots of a spline law by name."""
+    return {f"{PREFIX}{k}": value for k, value in enumerate(accelerations)}

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+CLOSED = 1e-9
+"""How far a spline law may end from s = 1, s' = 0."""
+FALLS = 1e-9
+"""How far its slope may fall below 0: rounding."""
+FEWEST, MOST = 4, 256
+"""Intervals of a spline law."""
 DIP = 5e-3
 """How far below 0 a table's slope (1 on average) may fall: what few digits, or wide steps, leave beside a dwell."""
 
@@ -199,3 +205,28 @@ def _refuse_a_fall(u: "Floats", v: "Floats", a: "Floats") -> None:
             f"the curve through the table falls between u = {u[k]:.9g} and {u[k + 1]:.9g} (slope down to "
             f"{least[k]:.3g}); a rise must never fall: correct the points there, or give more digits or other points"
         )
+
+
+def fault(accelerations: tuple[float, ...]) -> str:
+    """Say why second derivatives at evenly spaced knots make no cam law; "" when they do."""
+    intervals = len(accelerations) - 1
+    if not FEWEST <= intervals <= MOST:
+        return f"it has {intervals} intervals; {FEWEST} to {MOST} are allowed"
+    if not all(map(math.isfinite, accelerations)):
+        return "a coefficient is not a finite number"
+    made = spline(FLOAT, accelerations)
+    end, slope = made.end
+    if abs(end - 1.0) > CLOSED or abs(slope) > CLOSED:
+        return f"it ends at s = {end:.9g} with slope {slope:.3g}, not at 1 with slope 0"
+    for k in range(intervals):
+        low = _least_slope(made, k)
+        if low < -FALLS:
+            return f"it falls between u = {k / intervals:.4g} and {(k + 1) / intervals:.4g} (slope {low:.3g})"
+    return ""
+
+
+def _least_slope(made: Spline, k: int) -> float:
+    """Return the least s' on an interval, where s'' is linear."""
+    before, after = made.a[k : k + 2]
+    turn = before / (before - after) if before < 0 < after else 1.0
+    return float(min(made.v[k + 1], made.at(FLOAT, (k + turn) / made.intervals, k).s1))

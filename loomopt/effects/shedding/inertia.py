@@ -13,6 +13,11 @@ class Own(Table):
     M: Mass
 
 
+def moved(given: Values, own: Values) -> Number:
+    """Return M, kg."""
+    return own["M"]
+
+
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return M X¨, N."""
     return own["M"] * pose.acceleration
@@ -25,6 +30,7 @@ EFFECT = Load(
     rank=30,
     acts="output",
     force=force,
+    moved=moved,
     needs=("operation.speed",),
     examples=({"M": "37.68361265059934 kg"},),
 )

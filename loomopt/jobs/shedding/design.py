@@ -1,54 +1,54 @@
-"""Between the NLP's variables and the spring, cam and law a person reads."""
+"""Between the NLP's variables and the spring, cam and law a person reads; figures and words of a design."""
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
-from loomopt.jobs.shedding.limits import CYCLE
-from loomopt.jobs.shedding.model import Shedding
-from loomopt.jobs.shedding.pose import DWELLS
-from loomopt.jobs.shedding.program import bounds, named, numbers
-from loomopt.jobs.shedding.program import model as model_of
-from loomopt.jobs.shedding.program import today as today
-from loomopt.jobs.shedding.reading import contact_speed
-from loomopt.jobs.shedding.scene import FIGURES, SEGMENTS, VARIABLES
-from loomopt.mechanisms.cam_motion import PREFIX, Spline
-from loomopt.program.numbers import full_name
-from loomopt.program.program import Move, Program, Variable, Wish
+import numpy as np
+
+from loomopt.cycle import Floats
+from loomopt.effects.kinds import Load
+from loomopt.jobs.base import Figures
+from loomopt.jobs.shedding.model import frame
+from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES
+from loomopt.mechanisms.cam_motion import Spline, named_knots
+from loomopt.program.model import JobModel
+from loomopt.program.program import Numbers, Program, Variable
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.scenes import Scene
+from loomopt.units import show
 
+CYCLE = {
+    "contact_min": "lift",
+    "contact_max": "cam_force",
+    "law_acceleration": "law_acceleration",
+    "pressure_angle_max": "pressure_angle",
+    "curvature_min": "concavity",
+    "curvature_max": "curvature",
+}
+"""Figures that are extremes over the cycle, with their quantities."""
+CLOSE = 1e-9
+"""Share of the largest cam force below which contact just holds."""
 GAVE_WAY = 1e-7
 """A number that a target keeps has given way when it is off by this, in its natural size."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
+AT_REST = 1e-12
+"""Share of the largest cam force by which contact at rest may miss its limit: rounding."""
+NEWTON, CONVERGED = 30, 1e-15
 
 
-def moves(program: Program) -> tuple[Move, ...]:
-    """Return what may leave everything unchanged: a preload that is not needed, and the coils' initial tension."""
-    room = {v.name for v in program.variables if v.lower < v.upper}
-    axes = {"preload": "X0", "initial tension": "coil.initial_tension"}
-    return tuple(Move(name, (along,), "axis") for name, along in axes.items() if along in room)
-
-
-def wish(scene: Any, move: Move, x: Mapping[str, float]) -> Wish | None:
-    """Return what the silent levels want of a move: the value nearest today's, SI."""
-    (name,) = move.along
-    low, high = bounds(scene)[name]
-    return Wish({name: min(max(numbers(scene)[name], low), high)}, "least change from today")
-
-
-def design(program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def design(program: Program, x: Numbers) -> dict[str, float]:
     """Return the design, SI, of NLP variables: the spring, every other number that is freed, and a free law's knots."""
-    values = {**program.parameters, **x}
+    values, law = {**program.parameters, **x}, frame(program.model).law
+    knots = set(law.names) if isinstance(law, Spline) else set()
     fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0}
     chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
-    free = [name for name in chosen if not name.startswith(PREFIX)]
-    found = {name: values[name] for name in (*VARIABLES, *(name for name in free if name not in VARIABLES))}
+    free = [name for name in chosen if name not in {*VARIABLES, *knots}]
+    found = {name: values[name] for name in (*VARIABLES, *free)}
     if set(SEGMENTS) & set(found):
         found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
-    law = getattr(program.model, "law", None)
-    if isinstance(law, Spline) and set(law.names) & {v.name for v in program.variables}:
-        found |= {f"{PREFIX}{k}": float(value) for k, value in enumerate(law.accelerations(values))}
+    if isinstance(law, Spline) and knots & {v.name for v in program.variables}:
+        found |= named_knots(map(float, law.accelerations(values)))
     return found
 
 
@@ -57,70 +57,26 @@ def _chosen(variable: Variable, value: float) -> bool:
     return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
 
 
-def values(program: Program, design: Mapping[str, float]) -> dict[str, float]:
-    """Return the NLP's variables, SI, of a design."""
-    return program.completed({**program.parameters, **design})
-
-
-def tidy(program: Program, x: Mapping[str, float]) -> dict[str, float]:
-    """Return NLP variables as they are."""
-    return dict(x)
-
-
-def model(scene: Any, design: Mapping[str, float]) -> Shedding:
-    """Return the frame of a design: with its own law where it has one."""
-    intervals = named(design)
-    return model_of(scene, Spline(intervals) if intervals else None)
-
-
-def values_of(scene: Any, design: Mapping[str, float]) -> dict[str, float]:
-    """Return all numbers of a design, SI; a scene number it does not name stays the scene's."""
-    known = numbers(scene)
-    return known | {(name if name.startswith(PREFIX) else full_name(known, name)): v for name, v in design.items()}
-
-
-def adopted(scene: Any, design: Mapping[str, Any], target: str) -> tuple[Any, str]:
-    """Return the scene with a design's own cam law, and the target whose limits it keeps.
-
-    Of target law the law is then given: what remains is contact, and the bound on its acceleration.
-    """
-    intervals, changes = named(design), {}
-    if intervals:
-        law = [float(design[f"{PREFIX}{k}"]) for k in range(intervals + 1)]
-        changes = {"mechanism.law": "spline", "mechanism.law_coefficients": law}
-    if target == "law" and "law_acceleration" not in scene.limits:
-        changes["limits.law_acceleration.max"] = scene.targets["law"].acceleration
-    changed = scene.update(changes) if changes else scene
-    return changed, "stiffness" if target == "law" else target
-
-
-def peaks(model: Any) -> dict[str, str]:
+def peaks(model: JobModel) -> dict[str, str]:
     """Return the figures that are extremes over the cycle, with their quantities."""
-    found = {name: quantity for name, quantity in CYCLE.items() if quantity in ("lift", *model.quantities)}
-    return {name: quantity for name, quantity in found.items() if not (model.is_level and name == "contact_min")}
+    found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
+    found |= {name: name for check in model.checks for name in check.quantities}
+    return {name: quantity for name, quantity in found.items() if not (model.known_in and name == "contact_min")}
 
 
-def sampler(scene: Any, design: Mapping[str, float]) -> Sampler:
-    """Return a design ready to be sampled."""
-    return Sampler(model(scene, design), values_of(scene, design))
-
-
-def figures(scene: Any, design: Mapping[str, float]) -> dict[str, float | None]:
+def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-    sampled = sampler(scene, design)
-    physics: Any = sampled.model
-    static = sampled.static
-    found: dict[str, float | None] = {name: static.get(name) for name in FIGURES}
-    arcs = [(0, float(dwell)) for dwell in DWELLS] if physics.is_level else [None]
-    found["contact_min"], found["contact_angle"] = _least(
-        [e for w in arcs for e in sampled.extremes("lift", w)], sampled
-    )
+    physics, static = sampled.model, sampled.static
+    found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
+    lifts = [extreme for where in physics.known_in or (None,) for extreme in sampled.extremes("lift", where)]
+    found["contact_min"], found["contact_angle"] = _least(lifts, sampled)
     for name, quantity in CYCLE.items():
         if quantity in physics.quantities:
             found[name] = sampled.peak(quantity) * (-1 if quantity == "concavity" else 1)
+    found |= {name: sampled.peak(name) for check in physics.checks for name in check.quantities}
     found["contact_speed"] = None
-    if "inertia" in scene.effects and not physics.is_level:
-        speed = contact_speed(physics, values_of(scene, design), scene.operation["N_min"])
+    if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
+        speed = contact_speed(physics, sampled.values, scene.operation["N_min"])
         found["contact_speed"] = speed if math.isfinite(speed) else None
     return found
 
@@ -131,3 +87,87 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     size = max(abs(extreme.value) for extreme in found)
     alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
+
+
+def contact_speed(model: JobModel, values: Mapping[str, float], least: float) -> float:
+    """Return the cam speed, rad/s, up to which the cam force stays above `least`, N; infinite where it always does.
+
+    The force is quadratic in the speed at every cam angle: the first root is sampled, then followed by Newton's method
+    with the refined least force. 0 where contact is lost at rest.
+    """
+    unit = float(values["speed"])
+    still = Sampler(model, {**values, "speed": 0.0})
+    pieces, u = still.grid()
+
+    def force(speed: float) -> Floats:
+        return -Sampler(model, {**values, "speed": speed}).at("lift", pieces, u)
+
+    rest, ahead, back = force(0.0), force(unit), force(-unit)
+    room = AT_REST * float(np.abs(np.concatenate([rest, ahead])).max())
+    spare = rest - least
+    if spare.min() < -room:
+        return 0.0
+    square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
+    shares = _first_roots(square, linear, np.maximum(spare, 0.0), room)
+    share = float(shares.min())
+    return math.inf if math.isinf(share) else _settled(model, values, least, unit * share)
+
+
+def _first_roots(square: Floats, linear: Floats, spare: Floats, room: float) -> Floats:
+    """Return the least positive x with square x² + linear x + spare = 0 at each angle, infinite without one."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = linear**2 - 4 * square * spare
+        root = 2 * spare / (-linear + np.sqrt(np.maximum(inside, 0.0)))
+    falls = (inside >= 0.0) & (root > 0.0) & ((np.abs(square) > room) | (np.abs(linear) > room))
+    return np.where(falls, root, np.inf)
+
+
+def _settled(model: JobModel, values: Mapping[str, float], least: float, speed: float) -> float:
+    """Return the speed, rad/s, where the refined least force is `least`, from one nearby."""
+    for _ in range(NEWTON):
+        sampler = Sampler(model, {**values, "speed": speed})
+        lowest = sampler.extremes("lift")[0]
+        node = np.array([lowest.piece]), np.array([lowest.u])
+        ends = [float(Sampler(model, {**values, "speed": w}).at("lift", *node)[0]) for w in (0.0, 2 * speed)]
+        slope = (ends[1] - ends[0]) / (2 * speed)
+        if not slope > 0.0:
+            break
+        step = (-least - lowest.value) / slope
+        speed += step
+        if abs(step) <= CONVERGED * speed:
+            break
+    return speed
+
+
+def say(scene: Scene, now: Figures, dwells_only: bool, target: str, figures: Figures) -> str:
+    """Say what an optimum of the target reached, and what today's spring would do; figures, now (today's): SI.
+
+    dwells_only: whether contact is judged in the dwells only.
+    """
+    size = {name: value or 0.0 for name, value in figures.items()}
+    stiffness = show(size["K1"], scene.unit("K1", "stiffness"), 9)
+    speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
+    kept = "keeps the roller on the cam all round"
+    if dwells_only:
+        kept = "keeps the roller on the cam in both dwells"
+    said = {
+        "stiffness": f"The least return spring that {kept} has {stiffness}.",
+        "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
+        "force": f"The least peak cam force is {size['contact_max']:.6g} N, with a return spring of {stiffness}.",
+        "speed": f"Today's spring {kept} up to {speed}.",
+    }[target]
+    return said if target == "speed" else f"{said} {_today(scene, now)}".strip()
+
+
+def _today(scene: Scene, found: Figures) -> str:
+    """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
+    least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
+    wanted, angle = scene.operation["N_min"], math.degrees(found["contact_angle"] or 0.0)
+    spring = f"Today's spring ({show(scene.mechanism['K1'], scene.unit('K1', 'stiffness'), 9)})"
+    if least >= wanted - CLOSE * max(most, 1.0):
+        return f"{spring} holds: the cam force is never less than {least:.6g} N."
+    lost = f"the cam force would be {least:.6g} N at {angle:.4f} deg"
+    speed = found["contact_speed"]
+    if speed:
+        lost += f"; it holds up to {show(speed, scene.unit('speed', 'angular speed'), 7)}"
+    return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."

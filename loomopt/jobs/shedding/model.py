@@ -1,4 +1,4 @@
-"""The shedding job: a heald frame between its cam and its return spring [Qiu21].
+"""The shedding model: a heald frame between its cam and its return spring [Qiu21].
 
 q = X, the frame's displacement, down positive, 0 with the shed open upward; Q = N, the cam force on the frame, which
 must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning of the rise.
@@ -6,22 +6,116 @@ must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning 
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from loomopt import balance
 from loomopt.balance import Given
-from loomopt.jobs.shedding.pose import LEAST, MOST, FramePose
+from loomopt.cycle import Node
+from loomopt.effects.kinds import Effect, Load, Motion
+from loomopt.effects.shedding import FramePose as Frame
 from loomopt.maths import FLOAT, Maths, Number
-from loomopt.mechanisms.cam_follower import Follower
-from loomopt.mechanisms.cam_motion import PREFIX, CamLaw, Spline
-from loomopt.program.program import Integral
-from loomopt.schema import Arcs, Check, Effect, Load, Switched, Values
+from loomopt.mechanisms.cam_follower import Contact, Follower
+from loomopt.mechanisms.cam_laws import Derivatives
+from loomopt.mechanisms.cam_motion import CamLaw, Spline
+from loomopt.mechanisms.turning_points import newton
+from loomopt.program.kinematics import Arcs, Group
+from loomopt.program.model import Instant, JobModel, Quantity, Row
+from loomopt.schema import Table, Values
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
-MIDDLE, MIDDLE_PIECE = "middle.u", "middle.piece"
+RISE, FAR_DWELL, RETURN, NEAR_DWELL = range(4)
+"""The cam's segments in order, as the numbers that stand for them."""
+DWELLS = FAR_DWELL, NEAR_DWELL
+LEAST, MOST = -1, 1
+"""Which end of what is not determined in a dwell is meant: the least cam force, or the largest."""
+SEGMENT, LAW = "segment", "law"
+HALF_OPEN = "half_open"
+"""The event of a half open shed, which effects may call in: X = h/2 on the rise and on the return."""
+MIDDLE, MIDDLE_PIECE = "half open u", "half open piece"
+BISECTIONS = 60
+
+
+class NoTable(Table):
+    """No values of its own: K1 and X0 are the mechanism's."""
+
+
+def spring_force(maths: Maths, pose: Frame, given: Values, own: Values, switch: Number) -> Number:
+    """Return K1 (X + X0), N [Qiu21, eq 4]; K1 is of both springs together."""
+    return given["K1"] * (pose.q + given["X0"])
+
+
+RETURN_SPRING = Load(
+    name="return_spring",
+    summary="the return spring",
+    own=NoTable,
+    acts="output",
+    force=spring_force,
+    reads=("K1", "X0"),
+)
+"""The spring is always on: no table of a scene turns it on."""
+
+
+@dataclass(frozen=True)
+class FramePose(Motion):
+    """The heald frame at cam angles θ, rad, any shape.
+
+    segment: data of the node; u: the law's argument, 1 with the shed open
+    downward; law: s(u) and derivatives; rate: du/dθ; worst: LEAST or MOST, for what a dwell leaves open.
+    """
+
+    maths: Maths
+    theta: Number
+    travel: Number
+    segment: Number
+    u: Number
+    rate: Number
+    law: Derivatives
+    worst: Number
+    omega: Number
+    omega_dot: Number = None
+
+    @property
+    def phi(self) -> Number:
+        """Cam angle θ, rad."""
+        return self.theta
+
+    @functools.cached_property
+    def lowered(self) -> Number:
+        """X/h, exactly 1 and 0 in the dwells."""
+        return self.maths.choose(self.segment, (self.law.s, 1, self.law.s, 0))
+
+    @functools.cached_property
+    def q(self) -> Number:
+        """X, m."""
+        return self.travel * self.lowered
+
+    @functools.cached_property
+    def q1(self) -> Number:
+        """X', m/rad."""
+        return self.travel * self.law.s1 * self.rate
+
+    @functools.cached_property
+    def q2(self) -> Number:
+        """X'', m/rad²."""
+        return self.travel * self.law.s2 * self.rate**2
+
+    @functools.cached_property
+    def q3(self) -> Number:
+        """Third derivative of X, m/rad³."""
+        return self.travel * self.law.s3 * self.rate**3
+
+    def contact(self, follower: Follower) -> Contact:
+        """Return roller and cam at this position."""
+        swing = follower.arm_swing
+        return Contact(
+            self.maths,
+            follower,
+            swing * self.lowered,
+            swing * self.law.s1 * self.rate,
+            swing * self.law.s2 * self.rate**2,
+        )
 
 
 def _segment(present: tuple[int, ...], angle: float, corners: tuple[float, ...]) -> float:
@@ -36,31 +130,21 @@ def _piece(angle: float, corners: tuple[float, ...]) -> float:
 
 
 @dataclass(frozen=True)
-class Shedding:
-    """The heald frame with the effects a scene calls for.
+class CamFrame:
+    """The frame's motion. law: the cam law; dwells: whether far and near dwell are there at all."""
 
-    loads: the return spring first; law: the cam law; dwells: whether far and near dwell are there at all.
-    freed: names of the law's own variables.
-    """
-
-    loads: tuple[Load, ...]
-    checks: tuple[Check, ...]
-    words: tuple[tuple[str, str, str], ...]
     law: CamLaw
     dwells: tuple[bool, bool] = (True, True)
-    known: frozenset[str] = field(default=frozenset(), compare=False)
-    """Names of scene numbers that are given: figures whose numbers are missing are left out."""
-
-    @functools.cached_property
-    def key(self) -> Hashable:
-        """What distinguishes this model's formulas from another's."""
-        effects = tuple(effect.name for effect in self.effects)
-        return "shedding", effects, self.words, self.law.key, self.dwells, self.known
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
-        """Loads and checks."""
-        return *self.loads, *self.checks
+    def structure(self) -> Hashable:
+        """The law's own, and which segments there are."""
+        return "shedding", self.law.key, self.dwells
+
+    @property
+    def groups(self) -> Mapping[str, Group]:
+        """None: a cam has no singular position that its follower's check lets pass."""
+        return {}
 
     @functools.cached_property
     def segments(self) -> tuple[int, ...]:
@@ -68,183 +152,82 @@ class Shedding:
         return tuple(k for k, there in enumerate((True, self.dwells[0], True, self.dwells[1])) if there)
 
     @functools.cached_property
-    def switched(self) -> tuple[Switched, ...]:
-        """What has corners: the segments, the law's pieces, the middle of the shed, then the loads."""
-        segment = Arcs("segment", functools.partial(_segment, self.segments))
-        return segment, Arcs("law", _piece), Arcs("middle", _piece), *self.loads
+    def arcs(self) -> tuple[Arcs, ...]:
+        """The segments, and the law's pieces."""
+        return (
+            Arcs(SEGMENT, self._begins, functools.partial(_segment, self.segments)),
+            Arcs(LAW, lambda maths, given: mirrored(given.values, self.law.breaks), _piece),
+        )
 
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Whole-cycle quantities whose largest value is a figure."""
-        follower = ("pressure_angle", "curvature", "concavity") if self.has_follower else ()
-        return ("cam_force", "law_acceleration", *follower)
-
-    @property
-    def signed(self) -> frozenset[str]:
-        """Forces and curvatures count with their sign."""
-        return frozenset(("lift", "cam_force", "curvature", "concavity", "law_fall"))
-
-    @property
-    def assembly(self) -> dict[str, tuple[str, float]]:
-        """The arm stays short of the centre line's far side; the law never falls."""
-        arm = {"the arm stays below 180 deg": ("arm_angle", math.pi)} if self.has_follower else {}
-        return {**arm, "the cam law never falls": ("law_fall", 0.0)}
-
-    @property
-    def bounded(self) -> frozenset[str]:
-        """The cam force from below and from above, and the law's acceleration."""
-        return frozenset(("lift", "cam_force", "law_acceleration"))
-
-    @property
-    def integrals(self) -> tuple[Integral, ...]:
-        """No means."""
-        return ()
+    def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        begins = (0, *(given.values[f"begin.{name}"] for name in ("far", "return", "near")))
+        return tuple(begins[k] for k in self.segments)
 
     @functools.cached_property
-    def has_follower(self) -> bool:
-        """Whether the scene gives the cam's dimensions."""
-        return self.known.issuperset(FOLLOWER)
+    def breaks(self) -> frozenset[str]:
+        """The half open shed, where it is one of the law's own breaks."""
+        return frozenset((HALF_OPEN,) if self.law.symmetric and Fraction(1, 2) in self.law.breaks else ())
 
-    @functools.cached_property
-    def is_level(self) -> bool:
-        """Whether the warp's pull is known in the dwells only."""
-        return ("warp_tension", "shape", "levels") in self.words
-
-    @functools.cached_property
-    def has_middle(self) -> bool:
-        """Whether the warp's pull has a corner in the middle of the shed."""
-        return ("warp_tension", "shape", "linear") in self.words
-
-    @functools.cached_property
-    def _middle_break(self) -> bool:
-        """Whether the middle of the shed is one of the law's own breaks."""
-        return self.law.symmetric and Fraction(1, 2) in self.law.breaks
-
-    def given(self, maths: Maths, values: Values) -> Given:
-        """Return the scene's numbers, the angles where segments begin, the law's knots and the middle of the shed."""
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
+        """Return the angles where segments begin, the law's knots, and where the shed is half open if called in."""
         far = values["rise"]
         turning = far + values["far_dwell"]
         near = turning + values["return"]
-        derived = {"begin.far": far, "begin.return": turning, "begin.near": near}
-        derived["near_dwell"] = 2 * maths.pi - near
-        derived |= self.law.prepared(maths, values)
-        found = {**values, **derived}
-        if self.has_middle and MIDDLE in values:
-            derived["middle"] = self._middle(maths, found)
-        own: dict[str, dict[str, Any]] = {effect.name: {} for effect in self.effects}
-        for name, value in values.items():
-            effect, _, key = name.rpartition(".")
-            if effect in own:
-                own[effect][key] = value
-        for effect, key, word in self.words:
-            if effect in own:
-                own[effect][key] = word
-        return Given({**values, **derived}, own)
+        found = {"begin.far": far, "begin.return": turning, "begin.near": near, "near_dwell": 2 * maths.pi - near}
+        found |= self.law.prepared(maths, values)
+        if HALF_OPEN in called:
+            found[HALF_OPEN] = mirrored({**values, **found}, [self._middle(maths, {**values, **found})])
+        return found
 
-    def _middle(self, maths: Maths, values: Values) -> Number:
-        """Return the u where s = 1/2: one Newton step from a hint, so that it moves with the law."""
-        u = values[MIDDLE]
-        there = self.law.at(maths, values, u, values[MIDDLE_PIECE])
-        return u - (2 * there.s - 1) / (2 * there.s1)
+    def _middle(self, maths: Maths, values: Values) -> Any:
+        """Return the u where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
+        if self.law.symmetric or MIDDLE not in values:
+            return Fraction(1, 2)
 
-    def hints(self, given: Given) -> dict[str, float]:
+        def rates(u: Number) -> tuple[Number, Number]:
+            there = self.law.at(maths, values, u, values[MIDDLE_PIECE])
+            return 2 * there.s - 1, 2 * there.s1
+
+        return newton(rates, values[MIDDLE])
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Return where a law that is not symmetric passes the middle of the shed, and on which piece."""
-        if not self.has_middle or self.law.symmetric:
+        if HALF_OPEN not in called or self.law.symmetric:
             return {}
         breaks = [0.0, *map(float, self.law.breaks), 1.0]
         piece = max(k for k, u in enumerate(breaks[:-1]) if self.law.at(FLOAT, given.values, u, k).s < 0.5)
         low, high = breaks[piece : piece + 2]
-        for _ in range(60):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
             below = self.law.at(FLOAT, given.values, middle, piece).s < 0.5
             low, high = (middle, high) if below else (low, middle)
         return {MIDDLE: (low + high) / 2, MIDDLE_PIECE: float(piece)}
 
-    def corners(self, maths: Maths, given: Given) -> tuple[tuple[Number, ...], ...]:
-        """Return the cam angles, rad, where segments begin, where the law changes, and where the shed is half open."""
-        values = given.values
-        begins = (0, values["begin.far"], values["begin.return"], values["begin.near"])
-        middles: tuple[Number, ...] = ()
-        if self.has_middle and not self._middle_break:
-            share = values.get("middle")
-            middles = self._mirrored(values, [Fraction(1, 2) if share is None else share])
-        pieces = self._mirrored(values, self.law.breaks)
-        return tuple(begins[k] for k in self.segments), pieces, middles, *[() for _ in self.loads]
-
-    def _mirrored(self, values: Values, shares: Sequence[Any]) -> tuple[Number, ...]:
-        """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
-        rise = [_part(values["rise"], share) for share in shares]
-        back = [values["begin.near"] - _part(values["return"], share) for share in shares]
-        return (*rise, *back)
-
-    def singular(self, given: Given) -> tuple[float, ...]:
-        """Return nothing: a cam has no singular position that its follower's check lets pass."""
-        return ()
-
-    def implied(self, values: Values) -> dict[str, float]:
-        """Return nothing: every variable stands for itself."""
-        return {}
-
-    def front_angle(self, given: Given) -> Number:
-        """Return 0: the beginning of the rise."""
-        return 0.0
-
-    def pose(
-        self, maths: Maths, given: Given, theta: Number, switches: Sequence[Number], worst: int = LEAST
-    ) -> FramePose:
-        """Return the pose at cam angles θ, rad; switches: segment, the law's piece, below the middle, then loads'."""
-        values = given.values
-        segment, piece, below, *_ = switches
-        if self._middle_break:
-            pieces = len(self.law.breaks) + 1
-            below = maths.choose(piece, [2 * k // pieces for k in range(pieces)])
+    def pose(self, maths: Maths, given: Given, node: Node) -> FramePose:
+        """Return the pose at cam angles θ, rad; switches: segment, the law's piece, worst."""
+        values, theta = given.values, node.phi
+        segment, piece = node.switch[SEGMENT], node.switch[LAW]
         u = maths.choose(segment, (theta / values["rise"], 1, (values["begin.near"] - theta) / values["return"], 0))
         rate = maths.choose(segment, (1 / values["rise"], 0, -1 / values["return"], 0))
         law = self.law.at(maths, values, u, piece)
-        return FramePose(maths, values["travel"], segment, below, u, rate, law, worst, values.get("speed"))
+        worst = node.switch.get("worst", LEAST)
+        return FramePose(maths, theta, values["travel"], segment, u, rate, law, worst, values.get("speed"))
 
-    def quantity(self, maths: Maths, given: Given, name: str, phi: Number, switches: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity, SI, at cam angle θ = phi, rad."""
-        pose = self.pose(maths, given, phi, switches, MOST if name == "cam_force" else LEAST)
-        if name in ("lift", "cam_force"):
-            force = balance.output_force(maths, self.loads, pose, given, switches[3:])
-            return -force if name == "lift" else force
-        if name == "law_acceleration":
-            return maths.choose(pose.segment, (pose.law.s2, 0, pose.law.s2, 0))
-        if name == "law_fall":
-            return maths.choose(pose.segment, (-pose.law.s1, 0, -pose.law.s1, 0))
-        contact = pose.contact(self.follower(given.values))
-        if name == "arm_angle":
-            return contact.angle
-        if name == "pressure_angle":
-            return contact.pressure_angle
-        return contact.curvature if name == "curvature" else -contact.curvature
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FramePose:
+        """Return the pose at the beginning of the rise, from ahead of it."""
+        return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0, LAW: 0.0}))
 
-    def follower(self, values: Values) -> Follower:
-        """Return the roller follower."""
-        return Follower(**{name: values[name] for name in FOLLOWER})
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return where the segments begin, rad."""
+        names = ("begin.far", "begin.return", "begin.near")
+        return {"begin.rise": 0, **{name: given.values[name] for name in names}}
 
-    def static(
-        self, maths: Maths, given: Given, front: Sequence[Number], names: Collection[str] | None = None
-    ) -> dict[str, Number]:
-        """Return figures and rows of the design alone, SI; all it has without names."""
-        values = given.values
-        rows: dict[str, Callable[[], Number]] = {
-            "K1": lambda: values["K1"],
-            "X0": lambda: values["X0"],
-            "travel": lambda: values["travel"],
-            "spring_stretch": lambda: values["X0"] + values["travel"],
-            "spring_force_max": lambda: values["K1"] * (values["X0"] + values["travel"]),
-            "near_dwell": lambda: values["near_dwell"],
-        }
-        if "speed" in values:
-            rows |= {"speed": lambda: values["speed"], "cam_period": lambda: 1 / values["speed"]}
-        if isinstance(self.law, Spline):
-            rows |= {name: functools.partial(_spline_row, self.law, values, name) for name in spline_rows(self.law)}
-        for check in self.checks:
-            own = given.own[check.name]
-            rows |= {name: functools.partial(row, maths, values, own) for name, row in check.rows.items()}
-        return {name: row() for name, row in rows.items() if names is None or name in names}
+
+def mirrored(values: Values, shares: Sequence[Any]) -> tuple[Number, ...]:
+    """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
+    rise = [_part(values["rise"], share) for share in shares]
+    back = [values["begin.near"] - _part(values["return"], share) for share in shares]
+    return (*rise, *back)
 
 
 def _part(angle: Number, share: Any) -> Number:
@@ -252,24 +235,85 @@ def _part(angle: Number, share: Any) -> Number:
     return angle * share.numerator / share.denominator if isinstance(share, Fraction) else angle * share
 
 
-def spline_rows(law: Spline) -> tuple[str, ...]:
-    """Return the rows a spline law must keep: its end, its slope there and at the knots, ±s'' at the knots."""
-    knots = range(1, law.intervals)
-    return (
-        "law_end",
-        "law_end_slope",
-        *(f"law_slope_{k}" for k in knots),
-        *(f"law_{side}_{k}" for side in ("push", "pull") for k in knots),
+def follower(values: Values) -> Follower:
+    """Return the roller follower."""
+    return Follower(**{name: values[name] for name in FOLLOWER})
+
+
+def _contact(at: Instant) -> Contact:
+    found: Contact = at.pose.contact(follower(at.values))
+    return found
+
+
+def moving(at: Instant, value: Number) -> Number:
+    """Return a value in the moves, 0 in the dwells."""
+    return at.maths.choose(at.pose.segment, (value, 0, value, 0))
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "cam_force": Quantity(lambda at: at.switched(worst=MOST).force, signed=True, bounded=True),
+    "lift": Quantity(lambda at: -at.force, figure=False, signed=True, bounded=True),
+    "law_acceleration": Quantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
+    "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
+}
+FOLLOWED: dict[str, Quantity] = {
+    "pressure_angle": Quantity(lambda at: _contact(at).pressure_angle),
+    "curvature": Quantity(lambda at: _contact(at).curvature, signed=True),
+    "concavity": Quantity(lambda at: -_contact(at).curvature, signed=True),
+    "arm_angle": Quantity(lambda at: _contact(at).angle, figure=False),
+}
+"""Quantities of the frame, and of the cam where the scene gives its dimensions, SI; forces count with their sign."""
+
+ROWS: dict[str, Row] = {
+    "K1": Row(lambda at: at.values["K1"]),
+    "X0": Row(lambda at: at.values["X0"]),
+    "travel": Row(lambda at: at.values["travel"]),
+    "spring_stretch": Row(lambda at: at.values["X0"] + at.values["travel"]),
+    "spring_force_max": Row(lambda at: at.values["K1"] * (at.values["X0"] + at.values["travel"])),
+    "near_dwell": Row(lambda at: at.values["near_dwell"]),
+    "speed": Row(lambda at: at.values["speed"], ("speed",)),
+    "cam_period": Row(lambda at: 1 / at.values["speed"], ("speed",)),
+}
+"""Figures and rows of the design alone, SI."""
+
+
+def law_rows(law: CamLaw) -> dict[str, Row]:
+    """Return the rows a spline law must keep: its end, its slope there and at the inner knots, ±s'' at these."""
+    if not isinstance(law, Spline):
+        return {}
+    n, found = law.intervals, {}
+
+    def reads(name: str, sign: int = 1) -> Row:
+        return Row(lambda at: at.values[name] if sign > 0 else -at.values[name])
+
+    found = {"law_end": reads(law.knot("s", n)), "law_end_slope": reads(law.knot("v", n))}
+    found |= {f"law_slope_{k}": reads(law.knot("v", k)) for k in range(1, n)}
+    found |= {f"law_push_{k}": reads(law.knot("a", k)) for k in range(1, n)}
+    return found | {f"law_pull_{k}": reads(law.knot("a", k), -1) for k in range(1, n)}
+
+
+def model(
+    law: CamLaw,
+    dwells: tuple[bool, bool],
+    effects: tuple[Effect, ...],
+    words: tuple[tuple[str, str, str], ...],
+    known: frozenset[str],
+) -> JobModel:
+    """Return the frame with its return spring and effects."""
+    followed = known.issuperset(FOLLOWER)
+    arm = {"the arm stays below 180 deg": ("arm_angle", math.pi)} if followed else {}
+    return JobModel(
+        CamFrame(law, dwells),
+        (RETURN_SPRING, *effects),
+        words,
+        QUANTITIES | (FOLLOWED if followed else {}),
+        ROWS | law_rows(law),
+        assembled={**arm, "the cam law never falls": ("law_fall", 0.0)},
+        known=known,
     )
 
 
-def _spline_row(law: Spline, values: Values, name: str) -> Number:
-    """Return one row of a spline law."""
-    n = law.intervals
-    if name == "law_end":
-        return values[f"{PREFIX}s_{n}"]
-    if name == "law_end_slope":
-        return values[f"{PREFIX}v_{n}"]
-    _, side, knot = name.split("_")
-    value = values[f"{PREFIX}{'v' if side == 'slope' else 'a'}_{knot}"]
-    return -value if side == "pull" else value
+def frame(found: JobModel) -> CamFrame:
+    """Return the motion of a shedding model."""
+    assert isinstance(found.kinematics, CamFrame)
+    return found.kinematics

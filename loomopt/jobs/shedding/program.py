@@ -1,90 +1,52 @@
-"""From a shedding scene and a target to the program: variables, limits, objectives and their natural sizes."""
+"""From a shedding scene and a target to the program: variables, limits, objectives and starts."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
+from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
-from loomopt.jobs.shedding import fault as shedding_fault
-from loomopt.jobs.shedding.limits import Limits
-from loomopt.jobs.shedding.model import Shedding
-from loomopt.jobs.shedding.pose import RETURN_SPRING
-from loomopt.jobs.shedding.reading import contact_speed
-from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES
+from loomopt.jobs import base
+from loomopt.jobs.shedding import model as shedding
+from loomopt.jobs.shedding.design import CYCLE, contact_speed
+from loomopt.jobs.shedding.model import FOLLOWER, law_rows
+from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen
 from loomopt.jobs.shedding.sizes import Sizes
 from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_motion import PREFIX, CamLaw, Spline
-from loomopt.mechanisms.tension_spring import WIRES
+from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
+from loomopt.owned import owned
 from loomopt.program import numbers as scene_numbers
-from loomopt.program.numbers import full_name, words
-from loomopt.program.program import Objective, Program, Variable
+from loomopt.program.model import JobModel
+from loomopt.program.numbers import axis_moves, bound_limits, demanded, ends, inside
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
-from loomopt.schema import Check, Load
+from loomopt.scenes import Scene
 
-DYNAMIC = ("inertia", "damping", "coil")
-"""Effects that read the speed."""
-ROOM = 0.01
-"""Share of a bound's width that a start keeps from its ends."""
+SPEED = "operation.speed"
 SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
 """A start's stiffness over the least that keeps contact at today's law and preload."""
 
 
-def numbers(scene: Any) -> dict[str, float]:
+def numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by name, SI, the knots of a spline law included."""
-    found = scene_numbers.numbers(scene)
-    knots = scene.mechanism.get("law_coefficients") or ()
-    return found | {f"{PREFIX}{k}": float(value) for k, value in enumerate(knots)}
+    knots = scene.table(Frame).law_coefficients or ()
+    return scene_numbers.numbers(scene) | named_knots(map(float, knots))
 
 
-def model(scene: Any, law: CamLaw | None = None) -> Shedding:
+def model(scene: Scene, law: CamLaw | None = None) -> JobModel:
     """Return the frame with the effects the scene calls for; law: another than the scene's."""
-    effects = [scene.job.effects[name] for name in scene.effects]
-    loads = tuple(effect for effect in effects if isinstance(effect, Load))
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
-    there = tuple(free or scene.mechanism[name] > 0.0 for name in ("far_dwell", "near_dwell"))
-    return Shedding(
-        (RETURN_SPRING, *loads),
-        tuple(effect for effect in effects if isinstance(effect, Check)),
-        words(scene),
-        law or shedding_fault.chosen(scene),
-        (there[0], there[1]),
-        frozenset(numbers(scene)),
-    )
+    dwells = (free or scene.mechanism["far_dwell"] > 0.0, free or scene.mechanism["near_dwell"] > 0.0)
+    words = scene_numbers.words(scene)
+    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)))
 
 
-def today(scene: Any) -> dict[str, float]:
-    """Return today's spring, SI, with every other number that the scene frees."""
-    known = numbers(scene)
-    others = [full_name(known, name) for name, bound in scene.bounds.items() if name not in VARIABLES and bound.free]
-    return {name: known[name] for name in (*VARIABLES, *others)}
-
-
-def bounds(scene: Any) -> dict[str, tuple[float, float]]:
-    """Return lower and upper bound of every bounded number, by its full name, SI; held ones at today's value."""
-    return scene_numbers.bounds(scene, numbers(scene), VARIABLES)
-
-
-def sizes(scene: Any) -> dict[str, tuple[float, ...]]:
-    """Return the wire diameters that are sold, m, where the coils' wire is free and must be one of them."""
-    own = scene.effects.get("coil")
-    bound = scene.bounds.get("wire")
-    free = own is not None and bound is not None and bound.free and bound.min < bound.max
-    return {"wire": WIRES} if free and own.sizes == "preferred" else {}
-
-
-def demand(scene: Any, target: str) -> None:
+def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
-    for name in scene.job.targets[target].needs_effects:
-        if name not in scene.effects:
-            raise BadInput(
-                f"target {target} needs the effect {name}",
-                file=scene.origin,
-                key=f"effects.{name}",
-                remedy=f"Add the table [effects.{name}], or choose another target.",
-            )
-    if target == "speed" and (model(scene).is_level or math.isinf(_survived(scene))):
+    base.demand(scene, target)
+    if target == "speed" and (model(scene).known_in or math.isinf(_survived(scene))):
         raise BadInput(
             "nothing limits the speed: as the scene stands, the roller stays on the cam at any",
             file=scene.origin,
@@ -92,8 +54,8 @@ def demand(scene: Any, target: str) -> None:
             allowed="a moving mass, a travel, and a warp tension that is known in the moves (linear, step)",
             remedy="Correct them, or choose another target.",
         )
-    own = scene.targets["law"]
-    fewest, most = shedding_fault.FEWEST, shedding_fault.MOST
+    own = scene.table(LawTarget)
+    fewest, most = cam_spline.FEWEST, cam_spline.MOST
     if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
         raise BadInput(
             "a law cannot have so many intervals",
@@ -105,12 +67,12 @@ def demand(scene: Any, target: str) -> None:
         )
 
 
-def _survived(scene: Any) -> float:
+def _survived(scene: Scene) -> float:
     """Return the speed, rad/s, up to which today's spring keeps contact."""
     return contact_speed(model(scene), numbers(scene), scene.operation["N_min"])
 
 
-def program(scene: Any, target: str) -> Program:
+def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
     return _Task(scene, target).program()
 
@@ -118,22 +80,24 @@ def program(scene: Any, target: str) -> Program:
 class _Task:
     """One scene and target on the way to a program."""
 
-    def __init__(self, scene: Any, target: str) -> None:
-        self.scene, self.target = scene, target
-        self.limited = bounds(scene)
-        own = scene.targets["law"]
-        self.law = Spline(own.intervals, own.symmetric) if target == "law" else None
-        self.known = numbers(scene)
-        if self.law:
-            started = cam_spline.cycloid_like(self.law.intervals)
-            self.known |= {f"{PREFIX}{k}": value for k, value in enumerate(started)}
+    def __init__(self, scene: Scene, target: str) -> None:
+        self.scene, self.target, self.known = scene, target, numbers(scene)
+        self.law: Spline | None = None
+        if target == "law":
+            own = scene.table(LawTarget)
+            self.law = Spline(own.intervals, own.symmetric)
+            start = cam_spline.cycloid_like(own.intervals)
+            self.known |= named_knots(start)
         self.physics = model(scene, self.law)
+        self.limited = scene_numbers.bounds(scene, self.known)
         self.sampler = Sampler(self.physics, self.known)
         most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
         self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
-        self.kept = ["travel", *(["speed"] if set(DYNAMIC) & set(scene.effects) else [])]
-        self.limits = Limits(scene, target, self.physics, self.known, self.limited, self.sizes, self.kept, self.law)
-        self.coiled = "coil" in scene.effects
+        needed = {key for effect in scene.active for key in effect.needs}
+        self.kept = ["travel", *(["speed"] if SPEED in needed else [])]
+        self.checks = [effect for effect in scene.active if isinstance(effect, Check)]
+        self.tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)
+        """Whether a check's own numbers give K1."""
         self.fastest = 0.0
         if target == "speed":
             survived = _survived(scene)
@@ -141,28 +105,33 @@ class _Task:
 
     def program(self) -> Program:
         variables = self._variables()
-        limits = self.limits.all(variables)
         taken = {variable.name for variable in variables}
         parameters = {name: value for name, value in self.known.items() if name not in taken}
-        starts = self._starts(variables)
-        return Program(self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts)
+        limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
+        limits += self._checks() + (self._law(self.law) if self.law else [])
+        starts, moves = self._starts(variables), self._moves(variables)
+        return Program(self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves)
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
         scene, known = self.scene, self.known
-        free = {full_name(known, name) for name, bound in scene.bounds.items() if bound.free} - {"near_dwell"}
+        free = {scene.full(name) for name, bound in scene.bounds.items() if bound.free} - {"near_dwell"}
         ends = {name: self.limited[name] for name in self.limited if name in free}
         ends["X0"] = self.limited["X0"]
         ends["K1"] = self.limited["K1"] if "K1" in scene.bounds else (0.0, math.inf)
         if self.target == "speed":
-            ends |= {name: (known[name],) * 2 for name in ends if name.startswith("coil.")}
-            ends |= {"X0": (known["X0"],) * 2} | ({} if self.coiled else {"K1": (known["K1"],) * 2})
+            given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
+            ends |= {name: (known[name],) * 2 for name in ends if name in given}
+            ends |= {"X0": (known["X0"],) * 2} | ({} if self.tied else {"K1": (known["K1"],) * 2})
             ends["speed"] = self.limited.get("speed", (1e-3 * self.fastest, math.inf))
         for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))
-        found = [Variable(name, *end, self._size(name, end), self._range(name, end)) for name, end in ends.items()]
+        labels = scene_numbers.labels(scene)
+        found = [
+            Variable(n, *end, self._size(n, end), self._range(n, end), labels.get(n, "")) for n, end in ends.items()
+        ]
         if self.law:
-            most = self.limits.most_acceleration
+            most = self.most_acceleration
             found += [Variable(name, -math.inf, math.inf, most, (-most, most)) for name in self.law.names]
         return found
 
@@ -185,37 +154,125 @@ class _Task:
         return ends[0], min(ends[1], 3.0 * self.known[name]) if math.isinf(ends[1]) else ends[1]
 
     def _objectives(self) -> tuple[Objective, ...]:
-        """Return the target's levels in order."""
+        """Return the target's levels in order; what checks would have least comes after the spring."""
         if self.target == "force":
             return (Objective("contact_max", "cam_force", "peak", self.sizes.force),)
         if self.target == "speed":
             return (Objective("speed", "cam_period", "value", 1 / self.fastest, power=-1),)
         least = Objective("K1", "K1", "value", self.sizes.stiffness)
-        if not self.coiled:
-            return (least,)
-        return least, Objective("spring_mass", "spring_mass", "value", self.sampler.static["spring_mass"])
+        rows = [check.least for check in self.checks if check.least]
+        return least, *(Objective(row, row, "value", self.sampler.static[row]) for row in rows)
 
-    def _starts(self, variables: list[Variable]) -> tuple[dict[str, float], ...]:
+    def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
         found = []
-        for preload in (1.0 - ROOM, ROOM) if self.target == "force" else (1.0 - ROOM,):
-            start = {}
+        room = scene_numbers.ROOM
+        for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
+            start = inside(variables, self.known)
             for v in variables:
-                width = v.upper - v.lower
-                room = ROOM * width if math.isfinite(width) else 0.0
-                start[v.name] = min(max(self.known[v.name], v.lower + room), v.upper - room)
                 if v.name == "speed" and self.fastest:
                     start["speed"] = min(max(SLOWER * self.fastest, v.lower), v.upper)
                 if v.name == "X0":
-                    start[v.name] = v.lower + preload * width
+                    start[v.name] = v.lower + preload * (v.upper - v.lower)
             stiff = SPARE * self.sizes.stiffness_for(self.known["N_min"], start["X0"])
-            ends = next((v.lower, v.upper) for v in variables if v.name == "K1")
-            start["K1"] = min(max(stiff, ends[0]), ends[1])
+            low, high = next((v.lower, v.upper) for v in variables if v.name == "K1")
+            start["K1"] = min(max(stiff, low), high)
             found.append(start)
         return tuple(found)
 
+    def _moves(self, variables: Sequence[Variable]) -> tuple[Move, ...]:
+        """Return what may leave everything unchanged: a preload that is not needed, and what checks name."""
+        preload = next(v for v in variables if v.name == "X0")
+        found = axis_moves(self.scene, self.known, self.limited)
+        rooms = {v.name for v in variables if v.lower < v.upper}
+        found = [move for move in found if set(move.along) <= rooms]
+        if preload.lower == preload.upper:
+            return tuple(found)
+        wish = (Wish("today", scene_numbers.LEAST_CHANGE),)
+        today, bounds = {"X0": self.known["X0"]}, {"X0": self.limited["X0"]}
+        return (Move("preload", ("X0",), "axis", wish, today, bounds), *found)
 
-def named(values: Mapping[str, float]) -> int:
-    """Return how many intervals a spline law among values has; 0 without one."""
-    knots = [name for name in values if name.startswith(PREFIX) and name.removeprefix(PREFIX).isdigit()]
-    return max(0, len(knots) - 1)
+    def _bounds(self, variables: Sequence[Variable]) -> list[Limit]:
+        """Return the bounds of variables as limits; a requirement gives way on one side only."""
+        found, knots = [], set(self.law.names) if self.law else set()
+        for v in (v for v in variables if v.name not in knots):
+            if v.lower == v.upper:
+                sign = -1 if v.name in self.kept else 1 if self.target == "speed" and v.name in VARIABLES else 0
+                bounded = v.called in self.scene.bounds or sign
+                found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
+                continue
+            own = v.name != "speed" or "speed" in self.limited
+            found += [replace(each, relaxable=own and each.value > 0.0) for each in bound_limits(v)]
+        return found
+
+    def _contact(self) -> list[Limit]:
+        """Return the limit that is the job: contact all round, or where the warp's pull is known."""
+        least, size = self.known["N_min"], self.sizes.force
+        arcs = self.physics.known_in or (None,)
+        found = [Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0, where=w) for w in arcs]
+        if least > 0.0:
+            # What is asked beyond contact may give way; contact itself may not.
+            found += [replace(each, name="contact", value=0.0, relaxable=False, hidden=True) for each in found]
+        return found
+
+    def _angles(self) -> list[Limit]:
+        """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""
+        if not any(self.scene.bounds[name].free for name in SEGMENTS if name in self.scene.bounds):
+            return []
+        low, high = self.limited.get("near_dwell", (0.0, math.inf))
+        return [
+            Limit("near_dwell", sign, "near_dwell", value, 1.0, "static", relaxable=value > 0.0)
+            for sign, value in ends(low, high)
+            if math.isfinite(value)
+        ]
+
+    def _figures(self) -> list[Limit]:
+        """Return the scene's limits on figures."""
+        found = []
+        for name, limit in self.scene.limits.items():
+            if name == "law_acceleration" and self.law:
+                continue
+            row = CYCLE.get(name, name)
+            cycle = name in CYCLE or self.physics.has_quantity(row)
+            self._demand_quantity(name, row)
+            for sign, value in ((-1, limit.min), (1, limit.max)):
+                if value is not None and cycle:
+                    # The least of a quantity is the largest of its opposite, which the row then is.
+                    found.append(Limit(name, sign, row, value, self.sizes.figure(name, row, value), "cycle"))
+                elif value is not None:
+                    found.append(Limit(name, sign, name, value, abs(value) or 1.0, "static"))
+        return found
+
+    def _demand_quantity(self, name: str, row: str) -> None:
+        if not (self.physics.has_quantity(row) or self.physics.has_row(row)):
+            raise BadInput(
+                f"nothing in the scene gives the figure {name}",
+                file=self.scene.origin,
+                key=f"limits.{name}",
+                remedy=f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out.",
+            )
+
+    def _checks(self) -> list[Limit]:
+        """Return what the effects that are checks demand."""
+        margins = self.scene.schema.margins
+        sizes = {d.row: self.sizes.margin(margins[d.row]) for c in self.checks for d in c.demands if d.row in margins}
+        return demanded(self.scene, self.checks, self.known, sizes)
+
+    @property
+    def most_acceleration(self) -> float:
+        """Return the largest |s''| a free law may have."""
+        limit = self.scene.limits.get("law_acceleration")
+        own = limit.max if limit else None
+        return float(self.scene.table(LawTarget).acceleration if own is None else own)
+
+    def _law(self, law: Spline) -> list[Limit]:
+        """Return what makes a free law a cam law: it reaches 1 at rest, never falls, and keeps its peak s''."""
+        most, firm = self.most_acceleration, {"relaxable": False, "hidden": True}
+        rows = law_rows(law)
+        last = [("law_end", 1.0), *([] if law.mirrored else [("law_end_slope", 0.0)])]
+        found = [Limit(row, 0, row, value, 1.0, "static", **firm) for row, value in last]  # type: ignore[arg-type]
+        knots = range(1, law.intervals // 2 + 1 if law.mirrored else law.intervals)
+        slopes = [f"law_slope_{k}" for k in knots]
+        found += [Limit(row, -1, row, 0.0, 1.0, "static", **firm) for row in slopes if row in rows]  # type: ignore[arg-type]
+        peaks = [f"law_{side}_{k}" for side in ("push", "pull") for k in knots]
+        return found + [Limit("law_acceleration", 1, row, most, most, "static") for row in peaks if row in rows]

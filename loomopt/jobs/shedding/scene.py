@@ -6,11 +6,12 @@ from typing import Any, Literal
 
 from pydantic import create_model
 
-from loomopt.effects import SHEDDING
-from loomopt.effects.shedding.coil import MARGINS
+from loomopt import scene_csv
+from loomopt.effects import found
 from loomopt.errors import BadInput
-from loomopt.jobs.shedding import fault as shedding_fault
-from loomopt.jobs.template import SHEDDING_TEMPLATE
+from loomopt.jobs.shedding.model import FOLLOWER
+from loomopt.mechanisms import cam_follower, cam_spline
+from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
 from loomopt.quantities import (
     Angle,
     Force,
@@ -22,7 +23,10 @@ from loomopt.quantities import (
     Speed,
     Stiffness,
 )
-from loomopt.schema import Figure, Job, Table, Target
+from loomopt.scene_errors import refusal
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+from loomopt.schema import Figure, Table, Target
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -113,13 +117,6 @@ FIGURES = {
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),
         Figure("curvature_max", "curvature", "largest one; undercut where it exceeds 1/roller_radius", sides=("max",)),
-        Figure("coil_index", "number", "spring index D/d of the coils", sides=()),
-        Figure("shear_stress", "pressure", "largest shear stress of the coils", sides=("max",)),
-        Figure("shear_share", "number", "shear stress over tensile strength", sides=()),
-        Figure("bending_share", "number", "hook bending stress over tensile strength", sides=()),
-        Figure("surge_ratio", "number", "surge frequency over that of the cam", sides=()),
-        Figure("spring_length", "length", "length inside the hooks, fully stretched", sides=()),
-        Figure("spring_mass", "mass", "mass of the coils of all springs", sides=("max",)),
     )
 }
 
@@ -134,7 +131,7 @@ TARGETS = {
 }
 
 
-def check(scene: Any) -> None:
+def check(scene: Scene) -> None:
     """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
@@ -149,38 +146,95 @@ def check(scene: Any) -> None:
             allowed="360 deg together",
             remedy="Correct one of them.",
         )
-    shedding_fault.check_law(scene)
-    fault = shedding_fault.follower(scene.mechanism)
-    if fault:
-        raise _refused(scene, "mechanism", f"the cam's follower cannot work: {fault}", "")
+    check_law(scene)
+    reason = _follower(scene.mechanism)
+    if reason:
+        raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
 
-def _refused(scene: Any, key: str, problem: str, allowed: str) -> BadInput:
+def _refused(scene: Scene, key: str, problem: str, allowed: str) -> BadInput:
     return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy="Correct it.")
 
 
-def headline(scene: Any, target: str, figures: Mapping[str, float | None]) -> str:
-    """Say in one sentence what an optimum of the target reached, and what today's spring would do; SI."""
-    from loomopt.jobs.shedding import headline as shedding_headline
+def chosen(scene: Scene) -> CamLaw:
+    """Return the scene's own cam law. Raises BadInput."""
+    name = scene.table(Frame).law
+    if name == "spline":
+        return Spline(len(_coefficients(scene)) - 1)
+    return Tabulated(_table(scene)) if name == "table" else Named(name)
 
-    return shedding_headline.headline(scene, target, figures)
+
+def check_law(scene: Scene) -> None:
+    """Raise BadInput where the scene's cam law is none."""
+    name = scene.table(Frame).law
+    for key, of in (("law_coefficients", "spline"), ("law_table", "table")):
+        if getattr(scene.table(Frame), key) is not None and name != of:
+            remedy = f'Write law = "{of}", or take {key} out'
+            raise refusal(f"{key} is not of law {name}", scene.origin, f"mechanism.{key}", remedy=remedy)
+    if name == "spline":
+        fault = cam_spline.fault(_coefficients(scene))
+        if fault:
+            raise refusal(f"the spline is no cam law: {fault}", scene.origin, "mechanism.law_coefficients")
+    elif name == "table":
+        _table(scene)
 
 
-SCHEMA = Job(
+def _coefficients(scene: Scene) -> tuple[float, ...]:
+    found = scene.table(Frame).law_coefficients
+    if found is None:
+        remedy = "Give s'' at evenly spaced knots, as `loomopt solve --target law --json` finds them"
+        raise refusal("law spline needs its coefficients", scene.origin, "mechanism.law_coefficients", remedy=remedy)
+    return tuple(found)
+
+
+def _table(scene: Scene) -> cam_spline.Table:
+    """Return the law of `mechanism.law_table`: cam angles and displacements of the rise, from 0 on. Raises BadInput."""
+    key = "mechanism.law_table"
+    given = scene.table(Frame).law_table
+    columns = {"angle": "angle", "s": "length"}
+    if given is None:
+        remedy = 'Write law_table = "law.csv"; the file has the columns angle [deg], s [mm] of the rise'
+        raise refusal("law table needs its file", scene.origin, key, remedy=remedy)
+    (angles, heights), origin = scene_csv.read(scene, given, key, columns)
+    if not (angles[-1] > 0.0 and heights[-1] > 0.0):
+        raise refusal("the law does not rise", origin, remedy="Give angle and s of the rise, both from 0 on")
+    try:
+        return cam_spline.tabulated([a / angles[-1] for a in angles], [s / heights[-1] for s in heights])
+    except ValueError as error:
+        raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
+
+
+def _follower(numbers: Mapping[str, Any]) -> str:
+    """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
+    if any(numbers.get(name) is None for name in FOLLOWER):
+        return ""
+    return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}))
+
+
+def fault(numbers: Mapping[str, Any]) -> str:
+    """Say why a design, SI, cannot work as this cam; "" when it can."""
+    coefficients = tuple(map(float, knots(numbers)))
+    reason = cam_spline.fault(coefficients) if coefficients else ""
+    if reason:
+        return f"its law is none: {reason}"
+    dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))
+    if dwell < -1e-9:
+        return "rise, far dwell and return take more than a whole turn"
+    return _follower(numbers)
+
+
+SCHEMA = SceneSchema(
     name="shedding",
     title="cam shedding with spring return: the least spring that keeps the roller on the cam",
     operation=Operation,
     mechanism=Mechanism,
-    effects=SHEDDING,
+    effects=found.of("loomopt.effects.shedding"),
     variables=VARIABLES,
-    figures=FIGURES,
+    own_figures=FIGURES,
     targets=TARGETS,
     default_target="stiffness",
     check=check,
-    fault=shedding_fault.design,
-    headline=headline,
-    template=SHEDDING_TEMPLATE,
-    margins=MARGINS,
+    fault=fault,
     groups={"rise": SEGMENTS},
     lists={"law": "number"},
 )

@@ -3,8 +3,8 @@
 import numpy as np
 
 from loomopt import maths
-from loomopt.balance import terms
 from loomopt.cycle import Floats
+from loomopt.jobs.shedding.model import RETURN_SPRING
 from loomopt.program.sampling import Sampler
 
 LEAST_STRETCH = 1e-3
@@ -20,13 +20,12 @@ class Sizes:
 
     def __init__(self, sampler: Sampler, stretch: float, most: float) -> None:
         self.sampler = sampler
-        model, given = sampler.model, sampler.given
+        given = sampler.given
         pieces, u = sampler.grid()
-        switches = list(sampler.cycle.switches[pieces].T)
-        pose = model.pose(maths.numpy(), given, sampler.cycle.angles(pieces, u), switches)  # type: ignore[attr-defined]
-        acting = list(terms(maths.numpy(), model.loads[1:], pose, given, switches[4:]))
-        parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for _, term in acting]
-        self.travelled: Floats = np.asarray(pose.q, dtype=float)
+        at = sampler.model.instant(maths.numpy(), given, sampler.node(pieces, u))
+        acting = {name: term for name, term in at.terms().items() if name != RETURN_SPRING.name}
+        parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for term in acting.values()]
+        self.travelled: Floats = np.asarray(at.pose.q, dtype=float)
         self.others: Floats = np.sum(parts, axis=0) if parts else np.zeros(u.shape)
         least = float(given.values.get("N_min", 0.0))
         self.force = float(np.sum(np.abs(parts), axis=0).max() if parts else 0.0) + least or 1.0
@@ -46,7 +45,6 @@ class Sizes:
             return self.force
         return abs(value) or abs(self.sampler.peak(quantity)) or 1.0
 
-    def margin(self, kind: str, value: float) -> float:
-        """Return the size of a row of the coils: its own limit, or what its kind of margin is measured by."""
-        sizes = {"stiffness": self.stiffness, "pressure": 100 * MEGA, "force": self.force}
-        return sizes.get(kind) or abs(value) or 1.0
+    def margin(self, kind: str) -> float:
+        """Return what a check's margins of a kind are measured by; 0 where nothing of the frame says."""
+        return {"stiffness": self.stiffness, "pressure": 100 * MEGA, "force": self.force}.get(kind, 0.0)

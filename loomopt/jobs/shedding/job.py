@@ -1,0 +1,120 @@
+"""The shedding job: the least return spring that keeps the roller on the cam [Qiu21]."""
+
+from collections.abc import Mapping
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any
+
+from loomopt.jobs.base import Figures, Job
+from loomopt.jobs.shedding import design as designs
+from loomopt.jobs.shedding import program as programs
+from loomopt.jobs.shedding.model import follower, moving
+from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
+from loomopt.mechanisms.cam_motion import Spline, knots
+from loomopt.picture.job_views import JobViews
+from loomopt.program.curves import Columns
+from loomopt.program.model import Formula, Instant, JobModel
+from loomopt.program.program import Numbers, Program
+from loomopt.program.sampling import Sampler
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+
+
+class Shedding(Job):
+    """A heald frame between its cam and its return spring."""
+
+    name = "shedding"
+
+    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
+        """Return what a shedding scene may hold."""
+        return SCHEMA
+
+    def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
+        """Return the frame with the effects the scene calls for, and a design's own law where it has one."""
+        own = knots(design or {})
+        return programs.model(scene, Spline(len(own) - 1) if own else None)
+
+    def program(self, scene: Scene, target: str) -> Program:
+        """Return a target as a task. Raises BadInput."""
+        return programs.program(scene, target)
+
+    def demand(self, scene: Scene, target: str) -> None:
+        """Raise BadInput where a target speaks of what the scene does not have."""
+        programs.demand(scene, target)
+
+    def numbers(self, scene: Scene) -> dict[str, float]:
+        """Return every number of the scene, the knots of a spline law included."""
+        return programs.numbers(scene)
+
+    def design(self, program: Program, x: Numbers) -> dict[str, float]:
+        """Return the design of NLP variables."""
+        return designs.design(program, x)
+
+    def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
+        """Return the scene with a design's own cam law, and the target whose limits it keeps.
+
+        Of target law the law is then given: what remains is contact, and the bound on its acceleration.
+        """
+        own, changes = knots(design), {}
+        if own:
+            changes = {"mechanism.law": "spline", "mechanism.law_coefficients": list(map(float, own))}
+        if target == "law" and "law_acceleration" not in scene.limits:
+            changes["limits.law_acceleration.max"] = scene.table(LawTarget).acceleration
+        changed = scene.update(changes) if changes else scene
+        return changed, "stiffness" if target == "law" else target
+
+    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
+        """Return every figure of a design."""
+        return designs.figures(scene, self.sampler(scene, design))
+
+    def peaks(self, model: JobModel) -> dict[str, str]:
+        """Return the figures that are extremes over the cycle."""
+        return designs.peaks(model)
+
+    def say(self, scene: Scene, target: str, figures: Figures) -> str:
+        """Return one sentence on what an optimum is worth, and one on today's spring."""
+        now = self.figures(scene, self.today(scene))
+        return designs.say(scene, now, bool(self.model(scene).known_in), target, figures)
+
+    def columns(self, scene: Scene, sampler: Sampler) -> Columns:
+        """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
+        after: dict[str, Formula] = {}
+        if sampler.model.has_quantity("curvature"):
+
+            def contact(at: Instant) -> Any:
+                return at.pose.contact(follower(at.values))
+
+            after = {
+                "pressure_angle [rad]": lambda at: contact(at).pressure_angle,
+                "curvature [1/m]": lambda at: contact(at).curvature,
+                "profile_curvature [1/m]": lambda at: contact(at).profile_curvature,
+            }
+        return Columns(
+            {
+                "X [m]": lambda at: at.pose.q,
+                "X_1 [m/rad]": lambda at: at.pose.q1,
+                "X_2 [m/rad^2]": lambda at: at.pose.q2,
+                "X_3 [m/rad^3]": lambda at: at.pose.q3,
+                "s_2 [1]": lambda at: moving(at, at.pose.law.s2),
+            },
+            "N",
+            ("N [N]", lambda at: at.force),
+            ("cam_torque [N*m]", lambda at: at.crank_torque),
+            after,
+            also=tuple(sampler.angle(extreme) for extreme in sampler.extremes("lift")),
+        )
+
+    @property
+    def views(self) -> JobViews:
+        """Pictures and equations."""
+        from loomopt.jobs.shedding.views import VIEWS
+
+        return VIEWS
+
+    @property
+    def resources(self) -> Traversable:
+        """The folder of the template."""
+        return files("loomopt.jobs.shedding")
+
+
+JOB = Shedding()
