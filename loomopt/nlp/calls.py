@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from loomopt.cycle import Floats
+from loomopt.nlp.families import Family, epigraphs, families
 from loomopt.nlp.point import Settings, sampler_at
-from loomopt.nlp.transcribe import Family, Transcription, families, transcribe
+from loomopt.nlp.transcribe import Transcription, transcribe
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
 
@@ -20,7 +21,7 @@ class Calls:
 
     def __init__(self, program: Program, settings: Settings, elastic: bool) -> None:
         self.program, self.settings, self.elastic = program, settings, elastic
-        self.families = families(program, elastic)
+        self.families, self.epigraphs = families(program, elastic), epigraphs(program, elastic)
         count = len(program.objectives)
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
         self.built = 0.0
@@ -61,11 +62,12 @@ class Calls:
             down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
             lower = np.where([v.name in down for v in variables], np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
             upper = np.where([v.name in up for v in variables], np.inf, upper)
-        equal = [limit.sign == 0 for limit in nlp.static] + [False] * (nlp.nlp["g"].numel() - len(nlp.static))
+        static = [self.program.limits[k].sign == 0 for k in nlp.structure.static]
+        equal = static + [False] * (nlp.rows - len(static))
         scaled = np.array([x[v.name] / v.scale for v in variables])
         return {
             "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
-            "p": nlp.vector(self.program, sampler, self.weights, nodes),
+            "p": nlp.structure.vector(self.program, sampler, self.weights, nodes),
             "lbx": np.concatenate([lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)]),
             "ubx": np.concatenate([upper, np.full(len(extra), np.inf)]),
             "lbg": np.where(equal, 0.0, -np.inf),
@@ -86,32 +88,35 @@ class Calls:
     def first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> Floats:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.elastic:
-            return np.ones(nlp.extras)
-        first = []
-        for k in nlp.epigraphs:
-            objective = self.program.objectives[k]
-            if objective.form == "magnitude":
-                first.append(abs(sampler.static[objective.row]) / objective.scale)
-            else:
-                family = next(place for place, f in enumerate(self.families) if f.objective == k)
-                first.append(peaks[family][0].height / objective.scale)
-        return 1.01 * np.array(first) + 0.01
+            return np.ones(nlp.structure.extras)
+        first = np.array([self._worst(k, sampler, peaks) for k in range(len(self.epigraphs))])
+        return np.asarray(np.where(first < 0.0, 0.99, 1.01) * first + 0.01)
+
+    def _worst(self, place: int, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> float:
+        """Return what an epigraph variable stands above, in the objective's natural size."""
+        epigraph = self.epigraphs[place]
+        objective = self.program.objectives[epigraph.objective]
+        if objective.form == "peak":
+            own = zip(self.families, peaks, strict=True)
+            values = [of[0].height for family, of in own if family.epigraph == place]
+        else:
+            values = [sampler.single(row) for row in epigraph.rows]
+            values = [abs(value) for value in values] if objective.form == "magnitude" else values
+        return max(values) / objective.scale
 
     def idle_rows(self, nlp: Transcription, nodes: Sequence[Sequence[Extreme]]) -> list[bool]:
         """Say which rows belong to unused slots."""
-        rows = [False] * (nlp.nlp["g"].numel() - len(self.families) * nlp.slots)
+        rows = [False] * (nlp.rows - len(self.families) * nlp.slots)
         for chosen in nodes:
             rows += [k >= len(chosen) for k in range(nlp.slots)]
         return rows
 
     def excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
         """Return by how much an extreme exceeds its bound, relative to the row's size."""
-        if family.objective >= 0:
-            epigraphs = [k for k, o in enumerate(self.program.objectives) if o.form != "value"]
-            scale, bound = self.program.objectives[family.objective].scale, extra[epigraphs.index(family.objective)]
-        else:
-            limit = self.program.limits[family.limit]
-            soft = self.program.soft
-            scale, bound = limit.scale, limit.bound / limit.scale
-            bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
-        return float(extreme.height / scale - bound)
+        if family.epigraph >= 0:
+            scale = self.program.objectives[self.epigraphs[family.epigraph].objective].scale
+            return float(extreme.height / scale - extra[family.epigraph])
+        limit, soft = self.program.limits[family.limit], self.program.soft
+        bound = limit.bound / limit.scale
+        bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
+        return float(extreme.height / limit.scale - bound)

@@ -10,12 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from loomopt.cycle import Cycle, Floats
+from loomopt.cycle import TURN, Cycle, Floats
 from loomopt.nlp.calls import Calls
+from loomopt.nlp.families import Family
 from loomopt.nlp.follow import follow, polish
 from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
 from loomopt.nlp.polish import BINDING
-from loomopt.nlp.transcribe import Family, Transcription
+from loomopt.nlp.transcribe import Transcription
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler, Tally
 
@@ -120,8 +121,8 @@ class _Run:
         nodes: Sequence[list[Extreme]],
     ) -> bool:
         """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
-        grown = max(map(len, nodes), default=0) > nlp.slots or sampler.corner_count != nlp.corners
-        if self.elastic or len(extra) != nlp.extras or grown:
+        grown = max(map(len, nodes), default=0) > nlp.slots or sampler.corner_count != nlp.structure.corners
+        if self.elastic or len(extra) != nlp.structure.extras or grown:
             return False
         arguments = self.calls.arguments(nlp, sampler, x, extra, nodes)
         rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
@@ -183,10 +184,9 @@ class _Run:
 
 def _uniform(sampler: Sampler, family: Family, count: int) -> list[Extreme]:
     """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
-    places = [sampler.cycle.located(2 * math.pi * k / count) for k in range(count)]
-    if family.where:
-        switch, value = family.where
-        places = [(piece, u) for piece, u in places if sampler.cycle.switches[piece, switch] == value]
+    pieces, u = sampler.cycle.located(TURN * np.arange(count) / count)
+    on = sampler.cycle.on(family.where)[pieces]
+    places = list(zip(pieces[on].tolist(), u[on].tolist(), strict=True))
     if family.row in sampler.model.signed:
         return [Extreme(*place, 0.0, signed=True) for place in places]
     return [Extreme(*place, sign) for place in places for sign in (1.0, -1.0)]
@@ -195,7 +195,7 @@ def _uniform(sampler: Sampler, family: Family, count: int) -> list[Extreme]:
 def _moved(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:
     """Return a node of a cycle whose corners stood in another order, at the same crank angle."""
     angle = float(before.angles(np.array([node.piece]), np.array([node.u]))[0])
-    return Extreme(*sampler.cycle.located(angle), node.value, node.signed)
+    return Extreme(*sampler.cycle.place(angle), node.value, node.signed)
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

@@ -356,7 +356,8 @@ class JobModel:
         self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
     ) -> dict[str, Number]:
         """Return figures and rows that need one position only; all it has of the first case without names."""
-        wanted = list(self._rows) if names is None else [n for n in (*self._rows, *self._cased) if n in names]
+        known = [name for name, row in self._rows.items() if all(need in given.values for need in row.needs)]
+        wanted = known if names is None else [n for n in (*self._rows, *self._cased) if n in names]
         return {name: self._static(maths, given, stills, name) for name in wanted if self.has_row(name)}
 
     def _static(self, maths: Maths, given: Given, stills: Stills, name: str) -> Number:

@@ -1,8 +1,7 @@
 """What a program's rows are worth at one design, in any number system: the one place that says how each is read."""
 
+import abc
 import functools
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,8 @@ from loomopt.schema import Values
 
 GAUSS_NODES = 32
 """Nodes of a mean on each piece: right to rounding for one smooth formula."""
+DATUM = "datum"
+"""The switch that hands a quantity the number that an integral has at each of its own angles."""
 
 
 @functools.cache
@@ -31,25 +32,19 @@ def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats
     return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
 
 
-class Reading:
-    """One design in one number system.
+class Rows(abc.ABC):
+    """Rows of one design in one number system; a subclass says how a mean over the cycle is taken.
 
-    given: the scene's numbers in that system; cycle: its pieces, found in floats; stills: the switches at events.
+    given: the scene's numbers in that system; stills: the switches just before each event that a row stands at.
     """
 
-    def __init__(self, model: JobModel, maths: Maths, given: Given, cycle: Cycle, stills: Stills) -> None:
-        self.model, self.maths, self.given, self.cycle, self.stills = model, maths, given, cycle, stills
+    def __init__(self, model: JobModel, maths: Maths, given: Given, stills: Stills) -> None:
+        self.model, self.maths, self.given, self.stills = model, maths, given, stills
         self._single: dict[str, Number] = {}
 
-    @functools.cached_property
-    def starts(self) -> list[Number]:
-        """Crank angles, rad, where the pieces begin, the last one turn after the first."""
-        return self.cycle.begins(self.model.corners(self.maths, self.given), self.maths.pi)
-
-    def at(self, name: str, piece: int, u: Number) -> Number:
-        """Return a whole-cycle quantity at a node, SI."""
-        begin, end = self.starts[piece], self.starts[piece + 1]
-        return self.quantity(name, begin + u * (end - begin), self.cycle.switch(piece))
+    @abc.abstractmethod
+    def mean(self, integral: Integral) -> Number:
+        """Return a mean over the cycle, SI."""
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
@@ -67,37 +62,47 @@ class Reading:
                 return self.mean(integral)
             if name == integral.root:
                 return self.maths.sqrt(self.single(integral.name))
-        found = self.model.static(self.maths, self.given, self.stills, (name,))
-        return found[name] if name in found else self.given.values[name]
-
-    def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, node by node, SI."""
-        if integral.angles:
-            number = self.maths.number
-            fixed = zip(integral.angles, integral.data, strict=True)
-            found = [self.quantity(integral.quantity, number(a), {"datum": number(d)}) for a, d in fixed]
-            return total(found) / len(found)
-        weighted, widths = [], []
-        for piece, u, weight in zip(*quadrature(self.cycle, integral), strict=True):
-            width = float(weight) * (self.starts[piece + 1] - self.starts[piece])
-            weighted.append(width * self.at(integral.quantity, int(piece), float(u)))
-            widths.append(width)
-        return total(weighted) / total(widths)
+        known = self.model.static(self.maths, self.given, self.stills, (name,))
+        return known[name] if name in known else self.given.values[name]
 
     def excess(self, limit: Limit, value: Number = None) -> Number:
         """Return by how much a variable's or a single value's limit is exceeded, SI; of an equality the difference.
 
         value: of the limit in this number system, its own without one.
         """
-        known: Mapping[str, Number] = self.given.values if limit.family == "variable" else _Singles(self)
+        names = [name for name in (limit.row, limit.weight) if name]
+        of_variables = limit.family == "variable"
+        known = {name: self.given.values[name] if of_variables else self.single(name) for name in names}
         return limit.residual(known, self.maths.number(limit.value) if value is None else value)
 
 
-class _Singles(dict[str, Any]):
-    """Single values by name, read when they are asked for."""
+class Reading(Rows):
+    """Rows and whole-cycle quantities of one design in one number system; cycle: its pieces, found in floats."""
 
-    def __init__(self, reading: Reading) -> None:
-        self.reading = reading
+    def __init__(self, model: JobModel, maths: Maths, given: Given, cycle: Cycle, stills: Stills) -> None:
+        super().__init__(model, maths, given, stills)
+        self.cycle = cycle
 
-    def __missing__(self, name: str) -> Number:
-        return self.reading.single(name)
+    @functools.cached_property
+    def starts(self) -> list[Number]:
+        """Crank angles, rad, where the pieces begin, the last one turn after the first."""
+        return self.cycle.begins(self.model.corners(self.maths, self.given), self.maths.pi)
+
+    def at(self, name: str, piece: int, u: Number) -> Number:
+        """Return a whole-cycle quantity at a node, SI."""
+        begin, end = self.starts[piece], self.starts[piece + 1]
+        return self.quantity(name, begin + u * (end - begin), self.cycle.switch(piece))
+
+    def mean(self, integral: Integral) -> Number:
+        """Return a mean by its rule, node by node, SI."""
+        if integral.angles:
+            number = self.maths.number
+            fixed = zip(integral.angles, integral.data, strict=True)
+            values = [self.quantity(integral.quantity, number(a), {DATUM: number(d)}) for a, d in fixed]
+            return total(values) / len(values)
+        weighted, widths = [], []
+        for piece, u, weight in zip(*quadrature(self.cycle, integral), strict=True):
+            width = float(weight) * (self.starts[piece + 1] - self.starts[piece])
+            weighted.append(width * self.at(integral.quantity, int(piece), float(u)))
+            widths.append(width)
+        return total(weighted) / total(widths)

@@ -13,7 +13,7 @@ from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
-from loomopt.program.reading import Reading, quadrature
+from loomopt.program.reading import DATUM, Reading, Rows, quadrature
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -108,11 +108,8 @@ class Sampler:
     @functools.cached_property
     def figures(self) -> dict[str, float]:
         """Static figures, the model's means over parts of the cycle, and their roots."""
-        found = dict(self.static)
-        for integral in self.model.integrals:
-            found[integral.name] = self.mean(integral)
-            found[integral.root] = math.sqrt(found[integral.name])
-        return found
+        means = [name for integral in self.model.integrals for name in (integral.name, integral.root)]
+        return self.static | {name: self.single(name) for name in means}
 
     def read(self, system: maths.Maths) -> Reading:
         """Return the design in another number system."""
@@ -120,22 +117,18 @@ class Sampler:
         return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
 
     @functools.cached_property
-    def _reading(self) -> Reading:
-        return Reading(self.model, maths.FLOAT, self.given, self.cycle, self.stills)
+    def _rows(self) -> "_SampledRows":
+        return _SampledRows(self)
 
     def single(self, name: str) -> float:
         """Return a figure, row or number of the design, SI."""
-        if name in self.static:
-            return self.static[name]
-        means = {each for integral in self.model.integrals for each in (integral.name, integral.root)}
-        return self.figures[name] if name in means else float(self._reading.single(name))
+        return float(self._rows.single(name))
 
     def excess(self, limit: Limit) -> float:
         """Return how far a limit is exceeded, in its natural size; of an equality with its sign."""
         if limit.family == "cycle":
             return (self.peak(limit.row, limit.where) - limit.bound) / limit.scale
-        known = self.given.values if limit.family == "variable" else _Singles(self)
-        return float(limit.residual(known, limit.value)) / limit.scale
+        return float(self._rows.excess(limit)) / limit.scale
 
     def merit(self, objective: Objective) -> float:
         """Return what an objective is worth, SI: of a magnitude its size, of a peak the whole cycle's."""
@@ -266,18 +259,21 @@ class Sampler:
     def mean(self, integral: Integral) -> float:
         """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
-            node = Node(np.asarray(integral.angles), {"datum": np.asarray(integral.data)})
+            node = Node(np.asarray(integral.angles), {DATUM: np.asarray(integral.data)})
             return float(np.mean(self.model.quantity(maths.numpy(), self.given, integral.quantity, node)))
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
         return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))
 
 
-class _Singles(dict[str, float]):
-    """A design's single values by name, read when they are asked for."""
+class _SampledRows(Rows):
+    """Rows of a sampled design, in floats."""
 
     def __init__(self, sampler: Sampler) -> None:
+        super().__init__(sampler.model, maths.FLOAT, sampler.given, sampler.stills)
         self.sampler = sampler
+        self._single |= sampler.static
 
-    def __missing__(self, name: str) -> float:
-        return self.sampler.single(name)
+    def mean(self, integral: Integral) -> float:
+        """Return a mean over the cycle, SI."""
+        return self.sampler.mean(integral)

@@ -30,7 +30,7 @@ def curves(sampler: Sampler, columns: Columns, accuracy: float) -> tuple[dict[st
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
     also += [spikes.graded(centre) for centre in sampler.singular]
     for _ in range(ROUNDS):
-        found = even.curves(sampler, columns, steps, np.concatenate(also))
+        found = even.curves(sampler, columns, steps, np.concatenate(also).tolist())
         added, left = _around_tops(found, accuracy / 10)
         if not added or len(found[ANGLE]) > MOST_ROWS:
             break

@@ -1,0 +1,46 @@
+"""What a program's semi-infinite rows and its non-smooth objectives become in an NLP: families and epigraphs.
+
+min max |g| over the cycle is min t subject to |g| ≤ t at every angle: one epigraph variable t for each group of rows
+whose worst counts, and one family of rows for each whole-cycle quantity [Boyd and Vandenberghe, Convex Optimization,
+section 4.1.3; Hettich and Kortanek, Semi-infinite programming, SIAM Review 35 (1993)].
+"""
+
+from dataclasses import dataclass
+
+from loomopt.cycle import Where
+from loomopt.program.program import Program
+
+
+@dataclass(frozen=True)
+class Epigraph:
+    """A variable above all rows of one group of an objective; objective: its place in the program."""
+
+    objective: int
+    rows: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Family:
+    """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place."""
+
+    row: str
+    epigraph: int = -1
+    limit: int = -1
+    where: Where | None = None
+
+
+def epigraphs(program: Program, elastic: bool = False) -> tuple[Epigraph, ...]:
+    """Return the epigraph variables of a program's objectives, in order; an elastic one has no objectives."""
+    levels = [] if elastic else list(enumerate(program.objectives))
+    return tuple(Epigraph(k, group) for k, level in levels if not level.is_smooth for group in level.groups)
+
+
+def families(program: Program, elastic: bool = False) -> list[Family]:
+    """Return the whole-cycle rows a program needs: first those of objectives, then those of limits."""
+    above = enumerate(epigraphs(program, elastic))
+    peaks = [(k, epigraph) for k, epigraph in above if program.objectives[epigraph.objective].form == "peak"]
+    limits = [(k, limit) for k, limit in enumerate(program.limits) if limit.family == "cycle"]
+    return [
+        *(Family(row, epigraph=k) for k, epigraph in peaks for row in epigraph.rows),
+        *(Family(limit.row, limit=k, where=limit.where) for k, limit in limits),
+    ]

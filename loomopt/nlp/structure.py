@@ -1,0 +1,187 @@
+"""What an NLP is made of beside its numbers, and those numbers as one parameter vector.
+
+Variables are scaled; every scene number, limit, natural size, weight and cycle node is a parameter. The cycle enters
+through a few slots, each a node that the exchange fills; an unused slot weighs nothing.
+"""
+
+import functools
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt.cycle import Cycle, Floats, node_angle
+from loomopt.maths import Number
+from loomopt.nlp.families import Epigraph, Family, epigraphs, families
+from loomopt.nlp.layout import Layout
+from loomopt.program.model import Integral
+from loomopt.program.program import Program
+from loomopt.program.reading import DATUM, quadrature
+from loomopt.program.sampling import Extreme, Sampler
+from loomopt.schema import Values
+
+
+class NodeValues(NamedTuple):
+    """A node read from its parameters: width of its share of a mean, crank angle, rad, and switches by name."""
+
+    width: Number
+    phi: Number
+    switch: Values
+
+
+@dataclass(frozen=True)
+class NodeParameters:
+    """A node as parameters: offsets of width and angle, a coefficient of each corner in either, then the switches."""
+
+    corners: int
+    switches: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """How many parameters a node has."""
+        return 2 + 2 * self.corners + len(self.switches)
+
+    def write(self, cycle: Cycle, piece: int, u: float, weight: float = 0.0) -> list[float]:
+        """Return the parameters of a node (piece, u); weight: its share of the piece's width."""
+        offset, coefficients = cycle.coefficients(piece, u, self.corners)
+        width = [0.0] * (1 + self.corners)
+        if weight:
+            start, at_start = cycle.coefficients(piece, 0.0, self.corners)
+            end, at_end = cycle.coefficients(piece, 1.0, self.corners)
+            width = [weight * (end - start), *(weight * (at_end - at_start))]
+        switches = [*cycle.switches[piece], *[0.0] * (len(self.switches) - len(cycle.names))]
+        return [width[0], offset, *coefficients, *width[1:], *switches]
+
+    def write_fixed(self, angle: float, datum: float) -> list[float]:
+        """Return the parameters of a node of width 1 at a crank angle, rad, that no corner moves."""
+        return [1.0, angle, *[0.0] * (2 * self.corners), *(datum if name == DATUM else 0.0 for name in self.switches)]
+
+    def read(self, row: Sequence[Number], corners: Sequence[Number]) -> NodeValues:
+        """Return the node that parameters say; corners: their crank angles, rad."""
+        of_angle, of_width = row[2 : 2 + self.corners], row[2 + self.corners : 2 + 2 * self.corners]
+        switch = dict(zip(self.switches, row[2 + 2 * self.corners :], strict=True))
+        return NodeValues(node_angle(row[0], of_width, corners), node_angle(row[1], of_angle, corners), switch)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What one built NLP is made of; it serves every program of the same structure.
+
+    elastic: instead of the objectives, the least weighted excess of the relaxable limits is sought. slots: nodes of
+    each family. hints: names of values that corners without a formula start from. corners: how many the cycle has.
+    points: nodes of each mean over the cycle, by its name.
+    """
+
+    program: Program
+    slots: int
+    elastic: bool
+    hints: tuple[str, ...]
+    corners: int
+    points: tuple[tuple[str, int], ...]
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for structures that one built NLP serves."""
+        return self.program.structure, self.slots, self.elastic, self.hints, self.corners, self.points
+
+    @functools.cached_property
+    def families(self) -> list[Family]:
+        """Whole-cycle rows, in order."""
+        return families(self.program, self.elastic)
+
+    @functools.cached_property
+    def epigraphs(self) -> tuple[Epigraph, ...]:
+        """Epigraph variables, in order."""
+        return epigraphs(self.program, self.elastic)
+
+    @functools.cached_property
+    def static(self) -> list[int]:
+        """Places of limits that are a row each; bounds of variables are the solver's own, unless they may give way."""
+        own = ("static", "variable") if self.elastic else ("static",)
+        return [k for k, limit in enumerate(self.program.limits) if limit.family in own]
+
+    @functools.cached_property
+    def soft(self) -> dict[int, int]:
+        """Limits that may give way by place → the group that does together."""
+        return self.program.soft if self.elastic else {}
+
+    @functools.cached_property
+    def extras(self) -> int:
+        """How many variables there are beside the design's: epigraphs, or two excesses of each group."""
+        return 2 * len(set(self.soft.values())) if self.elastic else len(self.epigraphs)
+
+    @functools.cached_property
+    def means(self) -> list[Integral]:
+        """Means over the cycle that its rows read."""
+        return means(self.program, self.elastic)
+
+    @functools.cached_property
+    def node(self) -> NodeParameters:
+        """How a node is written as parameters."""
+        model = self.program.model
+        datum = (DATUM,) if any(mean.angles for mean in model.integrals) else ()
+        return NodeParameters(self.corners, (*model.switches, *datum))
+
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """Where each parameter stands."""
+        program, layout = self.program, Layout()
+        layout.add("values", len(program.parameters))
+        layout.add("hints", len(self.hints))
+        layout.add("variable scale", len(program.variables))
+        layout.add("limit", len(program.limits))
+        layout.add("limit scale", len(program.limits))
+        layout.add("objective weight", len(program.objectives))
+        layout.add("objective scale", len(program.objectives))
+        for event in program.model.events_read:
+            layout.add(f"still {event}", len(program.model.switches))
+        for name, count in self.points:
+            layout.add(f"mean {name}", count, self.node.size)
+        for k in range(len(self.families)):
+            layout.add(f"family {k}", self.slots, 2 + self.node.size)
+        return layout
+
+    def vector(
+        self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[Sequence[Extreme]]
+    ) -> Floats:
+        """Return the parameter vector for a program's numbers and the nodes of each family."""
+        p, write, node, cycle = np.zeros(self.layout.size), self.layout.write, self.node, sampler.cycle
+        write(p, "values", list(program.parameters.values()))
+        write(p, "hints", list(sampler.hints.values()))
+        write(p, "variable scale", [variable.scale for variable in program.variables])
+        write(p, "limit", [x.bound if x.family == "cycle" else x.value for x in program.limits])
+        write(p, "limit scale", [limit.scale for limit in program.limits])
+        write(p, "objective weight", weights)
+        write(p, "objective scale", [objective.scale for objective in program.objectives])
+        for event, switch in sampler.stills.items():
+            write(p, f"still {event}", [switch[name] for name in program.model.switches])
+        for mean in means(program, self.elastic):
+            write(p, f"mean {mean.name}", self._rule(cycle, mean))
+        for k, chosen in enumerate(nodes):
+            used = [[1.0, e.sign, *node.write(cycle, e.piece, e.u)] for e in chosen]
+            idle = [[0.0, 1.0, *node.write(cycle, 0, 0.5)]] * (self.slots - len(used))
+            write(p, f"family {k}", used + idle)
+        return p
+
+    def _rule(self, cycle: Cycle, mean: Integral) -> list[list[float]]:
+        """Return the parameters of a mean's nodes."""
+        if mean.angles:
+            return [self.node.write_fixed(angle, datum) for angle, datum in zip(mean.angles, mean.data, strict=True)]
+        rule = zip(*quadrature(cycle, mean), strict=True)
+        return [self.node.write(cycle, int(piece), float(u), float(weight)) for piece, u, weight in rule]
+
+
+def means(program: Program, elastic: bool) -> list[Integral]:
+    """Return the means that a limit reads, or an objective; an elastic program has no objectives."""
+    read = {limit.row for limit in program.limits}
+    read |= set() if elastic else {row for objective in program.objectives for row in objective.rows}
+    return [mean for mean in program.model.integrals if {mean.name, mean.root} & read]
+
+
+def structure(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> Structure:
+    """Return the structure of the NLP that a program needs at a design."""
+    points = tuple(
+        (mean.name, len(mean.angles) or len(quadrature(sampler.cycle, mean)[0])) for mean in means(program, elastic)
+    )
+    return Structure(program, slots, elastic, tuple(sampler.hints), sampler.corner_count, points)
