@@ -17,6 +17,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import bounds
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
+from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
@@ -92,6 +93,10 @@ class Beatup(Job):
             also=(values["beta"], np.pi + values["beta_r"]),
             closed=True,
         )
+
+    def studied(self, scene: Scene) -> Studied:
+        """Return what studies read: the balance, the peak torque, the reed torque at front dead centre."""
+        return Studied(("balance",), {"peak_torque": ("peak_torque", False)}, ("M3_fdc",), "psi_2")
 
     @property
     def views(self) -> JobViews:

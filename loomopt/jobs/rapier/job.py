@@ -16,6 +16,7 @@ from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
+from loomopt.program.studied import Crossing, Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
@@ -83,6 +84,12 @@ class Rapier(Job):
             ("Md [N*m]", lambda at: at.crank_torque),
             also=(designs.read(sampler).phi_stroke, rear),
         )
+
+    def studied(self, scene: Scene) -> Studied:
+        """Return what studies read: peak acceleration, stroke, and where the head leaves its dwell."""
+        peaks = {"peak_acceleration": ("peak_acceleration", False), "stroke": ("S", True)}
+        leaves = Crossing("dwell_after", "S", "s_dwell") if "s_dwell" in scene.operation else None
+        return Studied(("stroke-dwell",), peaks, motion="S_2", crossing=leaves)
 
     @property
     def views(self) -> JobViews:

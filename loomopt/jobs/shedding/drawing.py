@@ -11,130 +11,107 @@ import numpy as np
 
 from loomopt import tables
 from loomopt.cycle import Floats
-from loomopt.designs import flat
-from loomopt.jobs.shedding import design as shedding_design
-from loomopt.jobs.shedding.cam_curves import Cam, Stations, cam, traced
-from loomopt.jobs.shedding.panels import NEGLIGIBLE
-from loomopt.jobs.shedding.remarks import undercut
+from loomopt.jobs.shedding.cam_curves import Cam, Stations, traced
+from loomopt.jobs.shedding.model import frame
+from loomopt.jobs.shedding.scene import Frame
+from loomopt.mechanisms.cam_motion import Spline
 from loomopt.picture.drawing import Label, arrow, captioned, fixed_pivot, place
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive
+from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.scenes import Scene
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
-PRIMES = {NEAR: "", FAR: "'", LEAST: "''"}
-"""Marks of the arm's joints in each position."""
 PROFILE, PITCH = "profile", "pitch curve"
+NEGLIGIBLE = 1e-8
+"""Share of the largest cam force that is only rounding."""
 STEP = 0.5
 """Degrees of cam angle between the table's rows at most."""
 SAME = 1e-9
 """deg; cam angles this close are one. Relative: one-sided values this close are one."""
 DIGITS = 10
 """Decimals of a degree in the table: 120 deg is 120."""
+Figures = Mapping[str, float | None]
 
 
 @dataclass(frozen=True)
-class Position:
-    """The arm where it is drawn: cam angle, rad; pivot, roller centre and point of contact, mm."""
+class Picture:
+    """The cam with its arm in both dwells and where the cam force is least; theta: cam angle of each, rad."""
 
-    theta: float
-    pivot: Point
-    roller: Point
-    touched: Point
+    cam: Cam
+    theta: Mapping[str, float]
+
+    @property
+    def height(self) -> float:
+        """Text height: 1.8 % of the machine; mm of m."""
+        return 18 * float(self.cam.follower.arm + self.cam.follower.centre_distance)
+
+    def skeleton(self) -> Skeleton:
+        """Return arm B C with its roller, the point T that it touches, the shaft A and both curves."""
+        at, follower = self.cam.at(np.array(list(self.theta.values()))), self.cam.follower
+        distance, fine, shaft = 1000 * follower.centre_distance, traced(self.cam), Point(0.0, 0.0)
+        placed = zip(self.theta.items(), _points(at.pitch), _points(at.profile), strict=True)
+        joints = {
+            name: {"B": shaft.towards(math.pi / 2 - theta, distance), "C": roller, "T": touched}
+            for (name, theta), roller, touched in placed
+        }
+        return Skeleton(
+            {"A": shaft},
+            joints,
+            (("B", "C"),),
+            (("A", 1000 * follower.base_radius), ("A", distance), ("C", 1000 * follower.roller_radius)),
+            (Line(PITCH, _points(fine.pitch), closed=True), Line(PROFILE, _points(fine.profile), closed=True)),
+            {"B": 0.0, "C": 0.25, "T": 0.12},
+        )
 
 
-def positions(found: Cam, least: float) -> dict[str, Position]:
+def picture(found: Cam, least: float) -> Picture:
     """Return the arm in both dwells and at the cam angle of least cam force, rad."""
-    begin, end = found.segments["far dwell"]
-    angles = {NEAR: 0.0, FAR: (begin + end) / 2, LEAST: least}
-    at = found.at(np.array(list(angles.values())))
-    distance = 1000 * found.follower.centre_distance
-    pitch, profile = 1000 * at.pitch, 1000 * at.profile
-    return {
-        name: Position(theta, _round(theta, distance), Point(*map(float, pitch[k])), Point(*map(float, profile[k])))
-        for k, (name, theta) in enumerate(angles.items())
-    }
+    begin, end = found.segments[FAR]
+    return Picture(found, {NEAR: 0.0, FAR: (begin + end) / 2, LEAST: least})
 
 
-def _round(theta: float, radius: float) -> Point:
-    """Return the point of a circle about the shaft over which the arm's pivot stands at a cam angle."""
-    return Point(0.0, 0.0).towards(math.pi / 2 - theta, radius)
-
-
-def linkage(scene: Scene, design: Mapping[str, float]) -> Drawing:
-    """Return the cam with its follower in both dwells and at the least cam force, at full scale. Raises BadInput."""
-    found = cam(scene, design)
-    figures = shedding_design.figures(scene, flat(design))
-    at = positions(found, figures["contact_angle"] or 0.0)
-    follower = found.follower
-    h = 18 * (follower.arm + follower.centre_distance)  # mm of m: 1.8 % of the machine
-    strokes = [*_cam(found), *_arms(found, at, h), *_frame(found, at, h)]
-    texts = place(_labels(found, at, h), strokes, h)
-    return captioned(Drawing(scene.name, h, (*strokes, *texts)), _legend(scene, found, at, figures))
+def linkage(scene: Scene, found: Cam, figures: Figures) -> Drawing:
+    """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
+    drawn = picture(found, figures["contact_angle"] or 0.0)
+    skeleton, h = drawn.skeleton(), drawn.height
+    strokes = [*skeleton.strokes(h), *_frame(found, skeleton, h)]
+    texts = place(_labels(drawn, skeleton), strokes, h)
+    return captioned(Drawing(scene.name, h, (*strokes, *texts)), _legend(scene, drawn, skeleton, figures))
 
 
 def _points(curve: Floats) -> tuple[Point, ...]:
     return tuple(Point(float(x), float(y)) for x, y in 1000 * curve)
 
 
-def _cam(found: Cam) -> list[Primitive]:
-    """Draw the profile, the roller centre's curve and its base circle."""
-    fine = traced(found)
-    return [
-        Circle("paths", Point(0.0, 0.0), 1000 * found.follower.base_radius),
-        Line(PITCH, _points(fine.pitch), closed=True),
-        Line(PROFILE, _points(fine.profile), closed=True),
-    ]
-
-
-def _arms(found: Cam, at: Mapping[str, Position], h: float) -> list[Primitive]:
-    """Draw arm and roller in each position, with the point of contact."""
-    radius = 1000 * found.follower.roller_radius
-    strokes: list[Primitive] = []
-    for layer, position in at.items():
-        strokes += [
-            Line(layer, (position.pivot, position.roller)),
-            Circle(layer, position.roller, radius),
-            Circle("joints", position.roller, 0.25 * h),
-            Circle("joints", position.touched, 0.12 * h),
-        ]
-        if layer != NEAR:
-            strokes.append(Circle(layer, position.pivot, 0.35 * h))
-    return strokes
-
-
-def _frame(found: Cam, at: Mapping[str, Position], h: float) -> list[Primitive]:
-    """Draw shaft and pivot on hatched ground, the pivot's way round, where segments begin, and how the cam turns."""
-    shaft, way = Point(0.0, 0.0), 1000 * found.follower.centre_distance
-    turned = 0.3 * 1000 * found.follower.base_radius
+def _frame(found: Cam, skeleton: Skeleton, h: float) -> list[Primitive]:
+    """Draw the arm's pivot, where segments begin, and how the cam turns."""
+    shaft, pivots = skeleton.pivots["A"], {name: at["B"] for name, at in skeleton.joints.items()}
     begins = np.array([begin for begin, end in found.segments.values() if end > begin])
-    strokes: list[Primitive] = [
-        *fixed_pivot(shaft, h),
-        *fixed_pivot(at[NEAR].pivot, h),
-        Circle("paths", shaft, way),
+    begin, end, radius = math.radians(60), math.radians(150), 300 * found.follower.base_radius
+    return [
+        *fixed_pivot(pivots.pop(NEAR), h),
+        *(Circle(name, pivot, JOINT * h) for name, pivot in pivots.items()),
         *(Line("dimensions", (shaft, point)) for point in _points(found.at(begins).pitch)),
+        Arc("notes", shaft, radius, begin, end),
+        arrow("notes", shaft.towards(end, radius), end + math.pi / 2, 0.8 * h),
     ]
-    begin, end = math.radians(60), math.radians(150)
-    turn = Arc("notes", shaft, turned, begin, end)
-    return [*strokes, turn, arrow("notes", shaft.towards(end, turned), end + math.pi / 2, 0.8 * h)]
 
 
-def _labels(found: Cam, at: Mapping[str, Position], h: float) -> list[Label]:
+def _labels(drawn: Picture, skeleton: Skeleton) -> list[Label]:
     """Name shaft, joints, sizes in mm and the cam's segments in degrees; joints first: they must stand closest."""
-    f, shaft, near = found.follower, Point(0.0, 0.0), at[NEAR]
+    found, shaft, near = drawn.cam, skeleton.pivots["A"], skeleton.joints[NEAR]
     labels = [Label("frame", shaft, -math.pi / 4, "A")]
-    for layer, position in at.items():
-        outward = math.pi / 2 - position.theta
-        labels.append(Label(layer, position.pivot, outward, f"B{PRIMES[layer]}"))
-        labels.append(Label(layer, position.roller, outward, f"C{PRIMES[layer]}"))
-    arm = Point((near.pivot.x + near.roller.x) / 2, (near.pivot.y + near.roller.y) / 2)
-    roller = near.roller.towards(math.pi, 1000 * f.roller_radius)
-    low = math.radians(225)
+    for name, theta in drawn.theta.items():
+        at, mark = skeleton.joints[name], skeleton.primes[name]
+        labels += [Label(name, at[joint], math.pi / 2 - theta, f"{joint}{mark}") for joint in "BC"]
+    size = {name: 1000 * getattr(found.follower, name) for name in SIZES}
+    roller, low = near["C"].towards(math.pi, size["roller_radius"]), math.radians(225)
     labels += [
-        Label(NEAR, arm, math.pi, f"arm = {1000 * f.arm:.6g}"),
-        Label(NEAR, roller, math.pi, f"roller_radius = {1000 * f.roller_radius:.6g}"),
-        Label("paths", shaft.towards(low, 1000 * f.base_radius), low, f"base_radius = {1000 * f.base_radius:.6g}"),
-        Label("paths", shaft.towards(low, 1000 * f.centre_distance), low, _distance(f.centre_distance)),
+        Label(NEAR, near["B"].part(near["C"]), math.pi, f"arm = {size['arm']:.6g}"),
+        Label(NEAR, roller, math.pi, f"roller_radius = {size['roller_radius']:.6g}"),
     ]
+    for name in ("base_radius", "centre_distance"):
+        labels.append(Label("paths", shaft.towards(low, size[name]), low, f"{name} = {size[name]:.6g}"))
     for name, (begin, end) in found.segments.items():
         if end > begin:
             (middle,) = _points(found.at(np.array([(begin + end) / 2])).pitch)
@@ -143,77 +120,62 @@ def _labels(found: Cam, at: Mapping[str, Position], h: float) -> list[Label]:
     return labels
 
 
-def _distance(metres: float) -> str:
-    return f"centre_distance = {1000 * metres:.6g}"
+SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
 
 
-def _legend(
-    scene: Scene, found: Cam, at: Mapping[str, Position], figures: Mapping[str, float | None]
-) -> tuple[tuple[str, str], ...]:
+def settled(least: float, most: float) -> float:
+    """Return the least cam force, N, as it is told: what is only rounding is 0."""
+    return 0.0 if abs(least) <= NEGLIGIBLE * abs(most) else least
+
+
+def _legend(scene: Scene, drawn: Picture, skeleton: Skeleton, figures: Figures) -> tuple[tuple[str, str], ...]:
     """Return the lines below the drawing, each with its layer."""
-    least, most = figures["contact_min"] or 0.0, figures["contact_max"] or 0.0
-    force = 0.0 if abs(least) <= NEGLIGIBLE * abs(most) else least
+    size, found = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
+    force = settled(size["contact_min"], size["contact_max"])
     told = {NEAR: "shed open upward", FAR: "shed open downward", LEAST: f"{force:.6g} N"}
     rows = [
-        (name, f"B{prime} C{prime}  {name}, {told[name]}: cam at {math.degrees(at[name].theta):.2f}°")
-        for name, prime in PRIMES.items()
+        (name, f"B{mark} C{mark}  {name}, {told[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
+        for name, mark in skeleton.primes.items()
     ]
-    swing, travel = math.degrees(found.follower.arm_swing), 1000 * (figures["travel"] or 0.0)
-    pressure, closest = math.degrees(figures["pressure_angle_max"] or 0.0), figures["curvature_max"] or 0.0
+    swing, travel, closest = math.degrees(found.follower.arm_swing), 1000 * size["travel"], size["curvature_max"]
     bent = f"; pitch curve's least convex radius {1000 / closest:.4g}" if closest > 0.0 else ""
+    cut = [(PROFILE, "UNDERCUT: the roller cuts its own profile away")] if found.undercut else []
     return (
         *rows,
         ("notes", f"law {_law(scene, found)}; arm swings {swing:.6g}° for {travel:.6g} of travel"),
-        ("notes", f"pressure angle at most {pressure:.2f}°{bent}"),
-        *((PROFILE, line) for line in (["UNDERCUT: the roller cuts its own profile away"] if undercut(found) else [])),
+        ("notes", f"pressure angle at most {math.degrees(size['pressure_angle_max']):.2f}°{bent}"),
+        *cut,
         ("notes", "the cam is shown still: it turns anticlockwise under an arm that stays; lengths in mm"),
     )
 
 
 def _law(scene: Scene, found: Cam) -> str:
     """Return the name of the law the cam really has."""
-    knots = getattr(found.sampler.model.law, "intervals", None)  # type: ignore[attr-defined]
-    return f"spline of {knots} intervals" if knots else str(scene.mechanism["law"])
+    law = frame(found.sampler.model).law
+    return f"spline of {law.intervals} intervals" if isinstance(law, Spline) else scene.table(Frame).law
 
 
-def joints_csv(scene: Scene, design: Mapping[str, float]) -> str:
-    """Return the profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature; digits
-    round-trip. Raises BadInput.
+def joints_csv(scene: Scene, found: Cam) -> str:
+    """Return the profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
 
-    Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the curvature jumps, the
-    angle stands twice, with both one-sided values.
+    Digits round-trip. Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the
+    curvature jumps, the angle stands twice, with both one-sided values.
     """
     import pandas as pd
 
-    found = cam(scene, design)
     at = _rows(found)
-    pitch, profile = 1000 * at.pitch, 1000 * at.profile
-    columns = {
-        "theta [deg]": np.round(np.degrees(at.theta), DIGITS),
-        "X [mm]": 1000 * at.X,
-        "pitch_x [mm]": pitch[:, 0],
-        "pitch_y [mm]": pitch[:, 1],
-        "profile_x [mm]": profile[:, 0],
-        "profile_y [mm]": profile[:, 1],
-        "pressure_angle [deg]": np.degrees(at.contact.pressure_angle),
-        "curvature [1/m]": at.contact.curvature,
-    }
-    frame = pd.DataFrame(columns)
-    frame.attrs.update(tables.provenance(scene, **_notes(scene, found)))
-    return tables.csv(frame)
-
-
-def _notes(scene: Scene, found: Cam) -> dict[str, str]:
-    """Return what a workshop must know beside the numbers."""
-    f = found.follower
-    sizes = {name: getattr(f, name) for name in ("arm", "centre_distance", "base_radius", "roller_radius")}
-    return {
-        "law": _law(scene, found),
-        **{name: f"{1000 * size:.9g} mm" for name, size in sizes.items()},
-        "arm_swing": f"{math.degrees(f.arm_swing):.9g} deg",
-        "frame": "cam shaft at (0, 0), pivot at (0, centre_distance) at theta = 0; the cam turns anticlockwise",
-        "curvature_of": "the pitch curve (roller centre), positive where convex",
-    }
+    columns = {"theta [deg]": np.round(np.degrees(at.theta), DIGITS), "X [mm]": 1000 * at.X}
+    for name, curve in (("pitch", 1000 * at.pitch), ("profile", 1000 * at.profile)):
+        columns |= {f"{name}_{axis} [mm]": curve[:, k] for k, axis in enumerate("xy")}
+    columns["pressure_angle [deg]"] = np.degrees(at.contact.pressure_angle)
+    columns["curvature [1/m]"] = at.contact.curvature
+    notes = {name: f"{1000 * getattr(found.follower, name):.9g} mm" for name in SIZES}
+    notes["arm_swing"] = f"{math.degrees(found.follower.arm_swing):.9g} deg"
+    notes["frame"] = "cam shaft at (0, 0), pivot at (0, centre_distance) at theta = 0; the cam turns anticlockwise"
+    notes["curvature_of"] = "the pitch curve (roller centre), positive where convex"
+    table = pd.DataFrame(columns)
+    table.attrs.update(tables.provenance(scene, law=_law(scene, found), **notes))
+    return tables.csv(table)
 
 
 def _rows(found: Cam) -> Stations:

@@ -1,0 +1,153 @@
+"""Shedding's own views: the cam, its profile, the cam force, and what a designer should know beside the numbers."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, get_args
+
+from loomopt.cycle import Node
+from loomopt.designs import flat
+from loomopt.effects.kinds import Load
+from loomopt.jobs import registry
+from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
+from loomopt.maths import FLOAT
+from loomopt.picture.job_views import JobViews
+from loomopt.picture.panels import Mark, Panel, split
+from loomopt.program.sampling import Sampler
+from loomopt.scenes import Scene
+
+if TYPE_CHECKING:
+    from loomopt.picture.equations import Equation
+    from loomopt.picture.shapes import Drawing
+
+FORCE = "N [N]"
+ALIKE = 1e-9
+"""Forces this close, relative, in N, are one."""
+
+
+class SheddingViews(JobViews):
+    """The cam with its follower, its equations, forces on the frame, and remarks."""
+
+    angle = "cam angle"
+    lists = {"law": "s'' at {count} knots"}  # noqa: RUF012 (never changed)
+
+    def linkage(self, scene: Scene, design: Mapping[str, Any]) -> "Drawing":
+        """Return the cam with its follower in both dwells and at the least cam force, full scale. Raises BadInput."""
+        from loomopt.jobs.shedding import cam_curves, drawing
+
+        found = cam_curves.cam(scene, design)
+        return drawing.linkage(scene, found, registry.of(scene).figures(scene, flat(design)))
+
+    def joints_csv(self, scene: Scene, design: Mapping[str, Any]) -> str:
+        """Return the profile as CSV. Raises BadInput."""
+        from loomopt.jobs.shedding import cam_curves, drawing
+
+        return drawing.joints_csv(scene, cam_curves.cam(scene, design))
+
+    def missing(self, scene: Scene) -> tuple[str, ...]:
+        """Return the keys of the follower that the scene does not give."""
+        from loomopt.jobs.shedding import cam_curves
+
+        return cam_curves.missing(scene)
+
+    def equations(self, scene: Scene) -> "tuple[Equation, ...]":
+        """Return the equations the scene really uses."""
+        from loomopt.jobs.shedding import equations
+
+        return equations.equations(scene)
+
+    def marks(self, scene: Scene, design: Mapping[str, Any]) -> dict[str, float]:
+        """Return the dwells, cam angles in rad, and where the cam force is least."""
+        job, given = registry.of(scene), flat(design)
+        values = job.sampler(scene, given).given.values
+        found: dict[str, float] = {}
+        if float(values["far_dwell"]) > 0.0:
+            found |= {"far dwell begins": float(values["begin.far"]), "far dwell ends": float(values["begin.return"])}
+        if float(values["near_dwell"]) > 0.0:
+            found |= {"near dwell begins": float(values["begin.near"]), "near dwell ends": 0.0}
+        angle = job.figures(scene, given)["contact_angle"]
+        return found | {"least cam force": math.nan if angle is None else angle}
+
+    def panels(self, scene: Scene, design: Mapping[str, Any], columns: Sequence[str]) -> tuple[Panel, ...]:
+        """Return cam force, forces by effect and travel; pressure angle and curvature where there is a follower."""
+        from loomopt.jobs.shedding.drawing import settled
+
+        job, given = registry.of(scene), flat(design)
+        figures, values = job.figures(scene, given), job.numbers_of(scene, given)
+        angle, force, least = figures["contact_angle"], figures["contact_min"], values["N_min"]
+        points: tuple[Mark, ...] = ()
+        if angle is not None and force is not None:
+            said = settled(force, figures["contact_max"] or 0.0)
+            points = (Mark(angle, force, f"least {said:.6g} N at {math.degrees(angle):.2f} deg"),)
+        level = {f"N_min = {least:.6g} N; below, contact is lost": least}
+        forces = tuple(name for name in columns if split(name)[1] == "N" and name != FORCE)
+        shown = [
+            Panel((FORCE,), "cam force N", level, points, wide=True, today=True),
+            Panel(forces, "forces"),
+            Panel(("X [m]",), "travel X"),
+        ]
+        if "pressure_angle [rad]" in columns:
+            sharpest = {"undercut above 1/roller_radius": 1 / values["roller_radius"]}
+            shown.append(Panel(("pressure_angle [rad]",), "pressure angle"))
+            shown.append(Panel(("curvature [1/m]",), "pitch curvature", sharpest))
+        return tuple(shown)
+
+    def remarks(self, scene: Scene, design: Mapping[str, Any]) -> tuple[str, ...]:
+        """Return what there is to remark upon: forces that are known in the dwells only, an undercut cam."""
+        sampler = registry.of(scene).sampler(scene, flat(design))
+        return (*_partly(sampler), *(() if self.missing(scene) else _undercut(scene, design)))
+
+
+def _undercut(scene: Scene, design: Mapping[str, Any]) -> Iterator[str]:
+    from loomopt.jobs.shedding import cam_curves
+
+    found = cam_curves.cam(scene, design)
+    if found.undercut:
+        angle = math.degrees(found.sampler.angle(found.undercut))
+        roller, radius = 1000 * found.follower.roller_radius, 1000 / found.undercut.value
+        yield (
+            f"the cam is undercut at {angle:.2f} deg: the roller's centre turns there with a radius of {radius:.4g} "
+            f"mm, {roller - radius:.3g} mm less than roller_radius = {roller:.6g} mm, so the profile is cut away and X "
+            f"not followed. What helps: a roller_radius below {radius:.4g} mm, or a larger base_radius"
+        )
+
+
+def _partly(sampler: Sampler) -> Iterator[str]:
+    """Say of loads that are known in the dwells only what acts where contact is then not judged."""
+    acting = " and ".join(_acting(sampler))
+    for load in sampler.model.loads:
+        words = sampler.model.words_of(load.name)
+        if acting and isinstance(load, Load) and load.known_in(words):
+            shape = " and ".join(f"{key} {word}" for key, word in words.items())
+            verb = "act" if " and " in acting else "acts"
+            yield (
+                f"{load.name} with {shape} is known in the dwells only: contact is judged there, and not in the moves, "
+                f"where {acting} {verb}. Choose {_others(load, words)} to judge the whole cycle"
+            )
+
+
+def _others(load: Load[Any], words: Mapping[str, str]) -> str:
+    """Return the words of a load's table with which it is known all over the cycle."""
+    found = []
+    for key, word in words.items():
+        said = [each for each in get_args(load.own.model_fields[key].annotation) if each != word]
+        found.append(f"{key} = " + " or ".join(f'"{each}"' for each in said if not load.known_in({**words, key: each})))
+    return " and ".join(found)
+
+
+def _acting(sampler: Sampler) -> list[str]:
+    """Return the loads that act while the frame moves: they need the speed, or differ between rise and return."""
+    rise, back = (_terms(sampler, segment) for segment in (RISE, RETURN))
+    moved = {load.name for load in sampler.model.loads if "operation.speed" in load.needs}
+    moved |= {name for name, term in rise.items() if not math.isclose(term, back[name], rel_tol=ALIKE, abs_tol=ALIKE)}
+    return [load.name for load in sampler.model.loads if load.name in moved]
+
+
+def _terms(sampler: Sampler, segment: int) -> dict[str, Any]:
+    """Return each load's term a quarter of the way into a move, on the law's first formula."""
+    values = sampler.given.values
+    begin, share, length = {RISE: (0, 1, "rise"), RETURN: (values["begin.near"], -1, "return")}[segment]
+    node = Node(begin + share * values[length] / 4, {SEGMENT: segment, LAW: 0.0})
+    return sampler.model.instant(FLOAT, sampler.given, node).terms()
+
+
+VIEWS = SheddingViews()
