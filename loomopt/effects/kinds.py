@@ -110,6 +110,7 @@ class Load(Effect, Generic[Pose]):
     known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
     moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
+    told: switch → where that formula holds, in words for its equation; by its corners without them.
     """
 
     acts: Literal["output", "drive"]
@@ -119,6 +120,7 @@ class Load(Effect, Generic[Pose]):
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
     moved: Callable[[Values, Values], Number] | None = None
     symbol: str = ""
+    told: Mapping[float, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,6 +45,7 @@ EFFECT = Load(
     force=force,
     reads=("turns",),
     corners=corners,
+    told={1.0: "for S' > 0", -1.0: "for S' < 0"},
     switch=direction,
     examples=({"force": "15 N"},),
 )

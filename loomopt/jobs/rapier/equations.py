@@ -1,34 +1,19 @@
 """The equations a rapier scene really uses: both loops, the rapier's travel, each effect's own formula on symbols."""
 
-from typing import Any
-
 from loomopt import balance, maths
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
-from loomopt.picture.equations import (
-    Angle,
-    Equation,
-    Symbols,
-    equation,
-    latex,
-    loop,
-    moving,
-    own_values,
-    sums,
-    symbol,
-    sympy,
-    text,
-)
-from loomopt.schema import Check, Load
+from loomopt.picture import effect_equations
+from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
+from loomopt.program.model import JobModel
 
 
-def equations(scene: Any) -> tuple[Equation, ...]:
+def equations(model: JobModel) -> tuple[Equation, ...]:
     """Return the equations of a rapier scene: dead centres, both loops, travel, each term, balance, crank torque.
 
-    scene: its job's `effects` by name, and its own `effects`, the tables of those that are on. An effect that is not
-    in the scene leaves no symbol and no term.
+    An effect that is not in the scene leaves no symbol and no term.
     """
     d = Dimensions(*(symbol(name) for name in Dimensions.__dataclass_fields__))
-    return (*_sley(d), *_five_bar(d), *_travel(d), *_forces(scene))
+    return (*_sley(d), *_five_bar(d), *_travel(d), *_forces(model))
 
 
 def _sley(d: Dimensions) -> list[Equation]:
@@ -86,35 +71,6 @@ def _pose() -> balance.Pose:
     return balance.Pose(symbol("phi1"), symbol("omega"), symbol("S"), symbol("S'"), symbol("S''"))
 
 
-def _forces(scene: Any) -> list[Equation]:
+def _forces(model: JobModel) -> list[Equation]:
     """Write each term that is on, their balance and the crank torque, and the checks."""
-    pose, given = _pose(), Symbols()
-    effects = [scene.job.effects[name] for name in scene.effects]
-    loads = [effect for effect in effects if isinstance(effect, Load)]
-    found = [_term(load, pose, given, _words(scene, load.name)) for load in loads]
-    found += sums(loads, pose, symbol("Q"), "Q")
-    for check in (effect for effect in effects if isinstance(effect, Check)):
-        own = own_values(check, _words(scene, check.name))
-        for name, quantity in check.quantities.items():
-            found.append(equation(check.name, symbol(name), quantity(maths.sympy(), pose, given, own)))
-    return found
-
-
-def _words(scene: Any, effect: str) -> dict[str, str]:
-    """Return the values of an effect's table that choose a formula."""
-    return {key: value for key, value in scene.effects[effect].model_dump().items() if isinstance(value, str)}
-
-
-def _term(load: Load, pose: balance.Pose, given: Symbols, words: dict[str, str]) -> Equation:
-    """Write a load's term; one with corners jumps where the rapier turns back: its switch is the sign of S'."""
-    name, own, rate = symbol(f"Q_{load.name}"), own_values(load, words), symbol("S'")
-
-    def force(switch: int) -> Any:
-        return load.force(maths.sympy(), pose, given, own, sympy().Integer(switch))
-
-    if load.corners is None:
-        return equation(load.name, name, force(0))
-    cases = [(force(1), rate > 0), (force(-1), rate < 0)]
-    written = ", ".join(f"{text(term)} for {text(when)}" for term, when in cases)
-    rows = r" \\ ".join(rf"{latex(term)} & {latex(when)}" for term, when in cases)
-    return Equation(load.name, f"{text(name)} = {written}", rf"{latex(name)} = \begin{{cases}} {rows} \end{{cases}}")
+    return effect_equations.forces(model, _pose(), effect_equations.given(model, Symbols()), "Q", "Q")

@@ -1,39 +1,48 @@
 """The equations a shedding scene really uses: cam law, motion, each term's own formula on symbols, balance, contact."""
 
-from dataclasses import dataclass
-from typing import Any
+import dataclasses
+from collections.abc import Callable, Sequence
 
-from loomopt import balance, maths
-from loomopt.jobs.shedding import program as shedding_program
-from loomopt.jobs.shedding.cam_equations import SEGMENTS
-from loomopt.jobs.shedding.model import Shedding, cam_equations
-from loomopt.jobs.shedding.pose import DWELLS, LEAST, MOST
-from loomopt.maths import Number
-from loomopt.picture.equations import (
-    Case,
-    Equation,
-    Expression,
-    cases,
-    equation,
-    own_values,
-    relation,
-    sums,
-    symbol,
-    sympy,
-    text,
+from loomopt import maths
+from loomopt.balance import Acting, Given
+from loomopt.cycle import Node
+from loomopt.effects.kinds import Load, Motion
+from loomopt.jobs.shedding.model import (
+    FAR_DWELL,
+    FOLLOWER,
+    LAW,
+    LEAST,
+    MOST,
+    NEAR_DWELL,
+    RETURN,
+    RISE,
+    SEGMENT,
+    CamFrame,
+    FramePose,
+    frame,
 )
-from loomopt.scenes import Scene
-from loomopt.schema import Check, Load
+from loomopt.maths import Maths, Number
+from loomopt.mechanisms.cam_follower import Contact, Follower
+from loomopt.picture import effect_equations
+from loomopt.picture.cam_laws import Unwritten, law
+from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
+from loomopt.program.model import JobModel
 
 SPEED = "omega"
+SEGMENTS = {
+    RISE: "in the rise",
+    FAR_DWELL: "in the far dwell",
+    RETURN: "in the return",
+    NEAR_DWELL: "in the near dwell",
+}
 
 
-@dataclass(frozen=True)
-class FrameSymbols(balance.Motion):
-    """The frame at one instant, as loads read it: X, X', X'' are symbols; segment, below, worst: data."""
+@dataclasses.dataclass(frozen=True)
+class FrameSymbols(Motion):
+    """The frame at one instant, as loads read it: X, X', X'' are symbols; segment, worst: data."""
 
+    phi: Number
     segment: int
-    below: int
     worst: int
     q: Number
     q1: Number
@@ -44,94 +53,137 @@ class FrameSymbols(balance.Motion):
     omega_dot: Number = None
 
 
-def equations(scene: Scene) -> tuple[Equation, ...]:
+def equations(model: JobModel) -> tuple[Equation, ...]:
     """Return the equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
 
     An effect that is not in the scene leaves no symbol and no term. phi0: the arm's angle at the beginning of the
     rise; omega: speed of the cam shaft; w: |d(x, y)/d theta|.
     """
-    model = shedding_program.model(scene)
-    given = _given(scene, model)
-    found = [*cam_equations.law(model.law), *cam_equations.motion(model, given), *_forces(model, given)]
-    if model.has_follower:
-        found += cam_equations.follower()
-    for check in model.checks:
-        found += _rows(check, given)
-    return tuple(found)
+    known, cam = _given(model), frame(model)
+    found = [*law(cam.law), *motion(cam, known), *_forces(model, known)]
+    if model.has_quantity("curvature"):
+        found += follower()
+    pose = _pose(cam.segments[0], LEAST)
+    return (*found, *(each for check in model.checks for each in effect_equations.check_equations(check, pose, known)))
 
 
-def _given(scene: Scene, model: Shedding) -> balance.Given:
+def _given(model: JobModel) -> Given:
     """Return the scene's numbers as symbols, with the words that choose formulas."""
-    names = {"speed": SPEED}
-    known = [name for name in shedding_program.numbers(scene) if "." not in name and not name.startswith("law_")]
-    values = {name: symbol(names.get(name, name)) for name in known}
+    knots = {name for name in model.known if name.startswith("law_")}
+    values = {name: symbol(name) for name in model.known - knots - set(model.labels)}
+    values |= {"speed": symbol(SPEED)} if "speed" in values else {}
     far = values["rise"]
     turning = far + values["far_dwell"]
     values |= {"begin.far": far, "begin.return": turning, "begin.near": turning + values["return"]}
-    words: dict[str, dict[str, str]] = {}
-    for effect, key, word in model.words:
-        words.setdefault(effect, {})[key] = word
-    own = {effect.name: own_values(effect, words.get(effect.name, {})) for effect in model.effects}
-    return balance.Given(values, own)
+    return effect_equations.given(model, values)
 
 
-def _pose(segment: int, below: int, worst: int) -> FrameSymbols:
+def _pose(segment: int, worst: int) -> FrameSymbols:
     X, X1, X2 = (symbol(name) for name in ("X", "X'", "X''"))
-    return FrameSymbols(segment, below, worst, X, X1, X2, X / symbol("travel"), symbol("u"), symbol(SPEED))
+    lowered, u = X / symbol("travel"), symbol("u")
+    return FrameSymbols(symbol("theta"), segment, worst, X, X1, X2, lowered, u, symbol(SPEED))
 
 
-def _forces(model: Shedding, given: balance.Given) -> list[Equation]:
+def _forces(model: JobModel, known: Given) -> list[Equation]:
     """Write each term, their balance, the torque on the cam, and contact."""
-    found = [_term(model, load, given) for load in model.loads]
-    pose = _pose(model.segments[0], 0, LEAST)
+    segments = frame(model).segments
+    found = [_term(model, segments, load, known) for load in model.loads]
+    pose = _pose(segments[0], LEAST)
     found += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
-    where = " and ".join(SEGMENTS[s] for s in model.segments if s in DWELLS) if model.is_level else "for every theta"
+    judged = [SEGMENTS[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
+    where = " and ".join(judged) if judged else "for every theta"
     return [*found, relation("contact", symbol("N"), ">=", symbol("N_min"), where)]
 
 
-def _term(model: Shedding, load: Load, given: balance.Given) -> Equation:
-    """Write a load's term by its own formula: one, by halves of the shed, or by segments."""
-    name = symbol(f"N_{load.name}")
+def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) -> Equation:
+    """Write a load's term by its own formula: by segments where that differs, else as any load's."""
 
-    def force(segment: int, below: int = 0, worst: int = LEAST) -> Expression:
-        pose = _pose(segment, below, worst)
-        return load.force(maths.sympy(), pose, given.values, given.own[load.name], 0)
+    def force(segment: int, worst: int = LEAST) -> Expression:
+        return effect_equations.force(load, _pose(segment, worst), known, 0)
 
-    by_segment = {segment: force(segment) for segment in model.segments}
-    first = by_segment[model.segments[0]]
-    if any(value != first for value in by_segment.values()):
-        return cases(load.name, name, [_in_segment(model, load, segment, force) for segment in model.segments])
-    lower = force(model.segments[0], below=1)
-    if lower == first:
-        return equation(load.name, name, first)
-    X, half = symbol("X"), symbol("travel") / 2
-    return cases(load.name, name, [(first, (sympy().Integer(0), X, half)), (lower, (half, X, 2 * half))])
+    if len({force(segment) for segment in segments}) > 1:
+        rows = [_in_segment(model, load, segment, force) for segment in segments]
+        return cases(load.name, symbol(f"N_{load.name}"), rows)
+    return effect_equations.term(load, _pose(segments[0], LEAST), known, "N")
 
 
-def _in_segment(model: Shedding, load: Load, segment: int, force: Any) -> Case:
+def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[..., Expression]) -> Case:
     """Return a term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
-    if model.is_level and load.name == "warp_tension" and segment not in DWELLS:
+    known_in = load.known_in(model.words_of(load.name)) if isinstance(load, Load) else ()
+    if known_in and (SEGMENT, float(segment)) not in known_in:
         return "not known", SEGMENTS[segment]
-    least, most = force(segment), force(segment, worst=MOST)
+    least, most = force(segment), force(segment, MOST)
     if least != most:
         return f"any value of {text(least)} ... {text(most)} ({text(least)} for contact)", SEGMENTS[segment]
     return least, SEGMENTS[segment]
 
 
-def _rows(check: Check, given: balance.Given) -> list[Equation]:
-    """Write each row of an effect that takes no part in the balance, and what it must keep."""
-    signs, ends = {-1: ">=", 0: "=", 1: "<="}, {-1: "min", 0: "given", 1: "max"}
-    sp, own, found = sympy(), given.own[check.name], []
-    for name, row in check.rows.items():
-        value = row(maths.sympy(), given.values, own).replace(sp.Abs, lambda positive: positive)
-        demands = [demand for demand in check.demands if demand.row == name]
-        whole = " " in name
-        if not whole:
-            found.append(equation(check.name, symbol(name), value))
-        for each in demands:
-            limit = (
-                symbol(f"{each.value}_{ends[each.sign]}") if isinstance(each.value, str) else sp.nsimplify(each.value)
-            )
-            kind = f"{check.name}: {name}" if whole else check.name
-            found.append(relation(kind, value if whole else symbol(name), signs[each.sign], limit))
-    return found
+def motion(cam: CamFrame, given: Given) -> list[Equation]:
+    """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
+    theta, values, pi = symbol("theta"), given.values, maths.sympy().pi
+    ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
+    spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in cam.segments]
+    poses = {SEGMENTS[k]: pose(cam, given, k) for k in cam.segments}
+    named = (("argument of the law", "u"), ("travel", "X"), ("travel", "X'"), ("travel", "X''"))
+    read: tuple[Callable[[FramePose], Number], ...] = (
+        lambda at: at.u,
+        lambda at: at.q,
+        lambda at: at.q1,
+        lambda at: at.q2,
+    )
+    return [
+        cases("segments", symbol("segment"), spans),
+        *(
+            cases(kind, symbol(name), [(of(at), where) for where, at in poses.items()])
+            for (kind, name), of in zip(named, read, strict=True)
+        ),
+    ]
+
+
+def pose(cam: CamFrame, given: Given, segment: int) -> FramePose:
+    """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
+    unwritten = dataclasses.replace(cam, law=Unwritten(cam.law))
+    return unwritten.pose(maths.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))
+
+
+class _Started(Follower):
+    """A follower whose angle φ0 is a symbol."""
+
+    def start_angle(self, maths: Maths) -> Number:
+        """Return φ0."""
+        return symbol("phi0")
+
+
+def follower() -> list[Equation]:
+    """Return the follower's equations: swing, roller centre, pressure angle, curvature, profile."""
+    system, theta = maths.sympy(), symbol("theta")
+    numbers = [symbol(name) for name in FOLLOWER]
+    at = Contact(system, _Started(*numbers), symbol("phi"), symbol("phi'"), symbol("phi''"))
+    speed = sympy().Symbol("w", positive=True)
+    swing = symbol("arm_swing") / symbol("travel")
+
+    def short(value: Expression) -> Expression:
+        return sympy().sympify(value).subs(at.speed**2, speed**2)
+
+    centre, profile = at.centre(theta), at.profile(theta)
+    return [
+        equation("follower", symbol("phi0"), Follower(*numbers).start_angle(system)),
+        *(equation("follower", symbol(f"phi{p}"), swing * symbol(f"X{p}")) for p in ("", "'", "''")),
+        equation("roller centre", symbol("x"), centre.x),
+        equation("roller centre", symbol("y"), centre.y),
+        equation("roller centre", speed, at.speed),
+        equation("pressure angle", symbol("pressure_angle"), at.pressure_angle),
+        equation("curvature of the roller centre's curve", symbol("curvature"), short(at.curvature)),
+        equation("profile", symbol("x_p"), symbol("x") + short(profile.x - centre.x)),
+        equation("profile", symbol("y_p"), symbol("y") + short(profile.y - centre.y)),
+        equation("profile", symbol("profile_curvature"), _profile_curvature(numbers)),
+    ]
+
+
+def _profile_curvature(numbers: Sequence[Expression]) -> Expression:
+    """Run the profile's curvature on that of the roller centre's curve."""
+
+    class Bent(Contact):
+        curvature = symbol("curvature")
+
+    return Bent(maths.sympy(), Follower(*numbers), 0, 0, 0).profile_curvature

@@ -1,32 +1,22 @@
-"""Equations of a cam: its law piece by piece, the frame's motion by segments, the roller follower [Qiu21, eq 2-3]."""
+"""Equations of cam laws: s(u) and its derivatives piece by piece, or what a law is made of."""
 
-import dataclasses
 import itertools
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable
+from dataclasses import dataclass
 from fractions import Fraction
 
 from loomopt import maths
-from loomopt.balance import Given
-from loomopt.jobs.shedding.model import FOLLOWER, Shedding
-from loomopt.jobs.shedding.pose import FAR_DWELL, NEAR_DWELL, RETURN, RISE, FramePose
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
 from loomopt.picture.equations import Equation, Expression, cases, equation, symbol, sympy
 from loomopt.schema import Values
 
-SEGMENTS = {
-    RISE: "in the rise",
-    FAR_DWELL: "in the far dwell",
-    RETURN: "in the return",
-    NEAR_DWELL: "in the near dwell",
-}
 PRIMES = ("s", "s'", "s''")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Unwritten:
     """A cam law of which nothing is known but its name: s(u) and its derivatives are symbols."""
 
@@ -122,74 +112,3 @@ def _table(found: cam_spline.Table) -> list[Equation]:
         equation(kind, t, u - k),
         equation(kind, symbol("s"), s + v * t + a * t**2 / 2 + jerk * t**3 / 6),
     ]
-
-
-def motion(model: Shedding, given: Given) -> list[Equation]:
-    """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
-    theta, values, pi = symbol("theta"), given.values, maths.sympy().pi
-    ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
-    spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in model.segments]
-    poses = {SEGMENTS[k]: pose(model, given, k) for k in model.segments}
-    named = (("argument of the law", "u"), ("travel", "X"), ("travel", "X'"), ("travel", "X''"))
-    read: tuple[Callable[[FramePose], Number], ...] = (
-        lambda at: at.u,
-        lambda at: at.q,
-        lambda at: at.q1,
-        lambda at: at.q2,
-    )
-    return [
-        cases("segments", symbol("segment"), spans),
-        *(
-            cases(kind, symbol(name), [(of(at), where) for where, at in poses.items()])
-            for (kind, name), of in zip(named, read, strict=True)
-        ),
-    ]
-
-
-def pose(model: Shedding, given: Given, segment: int) -> FramePose:
-    """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
-    unwritten = dataclasses.replace(model, law=Unwritten(model.law))
-    return unwritten.pose(maths.sympy(), given, symbol("theta"), (segment, 0, 0))
-
-
-class _Started(Follower):
-    """A follower whose angle φ0 is a symbol."""
-
-    def start_angle(self, maths: Maths) -> Number:
-        """Return φ0."""
-        return symbol("phi0")
-
-
-def follower() -> list[Equation]:
-    """Return the follower's equations: swing, roller centre, pressure angle, curvature, profile."""
-    system, theta = maths.sympy(), symbol("theta")
-    numbers = [symbol(name) for name in FOLLOWER]
-    at = Contact(system, _Started(*numbers), symbol("phi"), symbol("phi'"), symbol("phi''"))
-    speed = sympy().Symbol("w", positive=True)
-    swing = symbol("arm_swing") / symbol("travel")
-
-    def short(value: Expression) -> Expression:
-        return sympy().sympify(value).subs(at.speed**2, speed**2)
-
-    centre, profile = at.centre(theta), at.profile(theta)
-    return [
-        equation("follower", symbol("phi0"), Follower(*numbers).start_angle(system)),
-        *(equation("follower", symbol(f"phi{p}"), swing * symbol(f"X{p}")) for p in ("", "'", "''")),
-        equation("roller centre", symbol("x"), centre.x),
-        equation("roller centre", symbol("y"), centre.y),
-        equation("roller centre", speed, at.speed),
-        equation("pressure angle", symbol("pressure_angle"), at.pressure_angle),
-        equation("curvature of the roller centre's curve", symbol("curvature"), short(at.curvature)),
-        equation("profile", symbol("x_p"), symbol("x") + short(profile.x - centre.x)),
-        equation("profile", symbol("y_p"), symbol("y") + short(profile.y - centre.y)),
-        equation("profile", symbol("profile_curvature"), _profile_curvature(numbers)),
-    ]
-
-
-def _profile_curvature(numbers: Sequence[Expression]) -> Expression:
-    """Run the profile's curvature on that of the roller centre's curve."""
-
-    class Bent(Contact):
-        curvature = symbol("curvature")
-
-    return Bent(maths.sympy(), Follower(*numbers), 0, 0, 0).profile_curvature

@@ -1,0 +1,119 @@
+"""Equations of effects, by their own formulas on symbols: each load's term, the balance, what checks read and demand."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from loomopt import maths
+from loomopt.balance import Acting, Given
+from loomopt.effects.kinds import Check, Load, Motion
+from loomopt.picture.equations import (
+    Case,
+    Equation,
+    Expression,
+    cases,
+    equation,
+    latex,
+    own_values,
+    relation,
+    sums,
+    symbol,
+    sympy,
+    text,
+)
+from loomopt.program.model import JobModel
+from loomopt.schema import Values
+
+SIGNS, ENDS = {-1: ">=", 0: "=", 1: "<="}, {-1: "min", 0: "given", 1: "max"}
+Piece = tuple[Expression, tuple[Expression, Expression]]
+"""A formula, and the crank angles between which it holds."""
+
+
+def given(model: JobModel, values: Values) -> Given:
+    """Return a scene's numbers as symbols, with the symbols and words of every effect's table."""
+    return Given(values, {effect.name: own_values(effect, model.words_of(effect.name)) for effect in model.effects})
+
+
+def forces(
+    model: JobModel,
+    pose: Motion,
+    known: Given,
+    total: str,
+    letter: str,
+    torque: tuple[str, str] = ("crank torque", "Md"),
+) -> list[Equation]:
+    """Write each term, their balance and the crank torque, then what checks read and demand."""
+    found = [term(load, pose, known, letter) for load in model.loads]
+    found += sums(model.loads, pose, symbol(total), letter)
+    return found + [each for check in model.checks for each in check_equations(check, pose, known)]
+
+
+def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
+    """Write a load's term, with where each of its formulas holds."""
+    name = symbol(f"{letter}_{load.name}")
+    if isinstance(load, Load) and load.told:
+        rows: list[Case] = [(force(load, pose, known, switch), where) for switch, where in load.told.items()]
+        alike = len({formula for formula, _ in rows}) == 1
+        return equation(load.name, name, rows[0][0]) if alike else cases(load.name, name, rows)
+    *inner, (last, _) = pieces(load, pose, known)
+    if not inner:
+        return equation(load.name, name, last)
+    phi = symbol("phi")
+    told = [f"{text(one)} for {text(a)} <= {text(phi)} <= {text(b)}" for one, (a, b) in inner]
+    lines = [rf"{latex(one)} & {latex(a)} \le {latex(phi)} \le {latex(b)}" for one, (a, b) in inner]
+    choice = r" \\ ".join([*lines, rf"{latex(last)} & \text{{else}}"])
+    written = rf"{latex(name)} = \begin{{cases}} {choice} \end{{cases}}"
+    return Equation(load.name, f"{text(name)} = {', '.join(told)}, else {text(last)}", written)
+
+
+def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:
+    """Return a load's formula at a switch."""
+    number = sympy().Rational(switch)
+    return load.force(maths.sympy(), pose, known.values, known.own[load.name], number)
+
+
+def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
+    """Return a load's formula between each corner and the next, the last ending a turn after the first."""
+    whole_turn = 2 * maths.sympy().pi
+    if not isinstance(load, Load) or load.corners is None:
+        return [(force(load, pose, known, 0), (0, whole_turn))]
+    corners = load.corners(maths.sympy(), known.values, known.own[load.name])
+    numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
+    ends, number_ends = (*corners[1:], corners[0] + whole_turn), (*numbers[1:], numbers[0] + 2 * math.pi)
+    middles = [(begin + end) / 2 for begin, end in zip(numbers, number_ends, strict=True)]
+    return [
+        (force(load, pose, known, load.switch(middle, numbers)), span)
+        for middle, span in zip(middles, zip(corners, ends, strict=True), strict=True)
+    ]
+
+
+def check_equations(check: Check[Any], pose: Motion, known: Given) -> list[Equation]:
+    """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
+    system, own = maths.sympy(), known.own[check.name]
+    found = {name: read(system, pose, known.values, own) for name, read in check.quantities.items()}
+    found |= {name: row(system, known.values, own) for name, row in check.rows.items()}
+    return [each for name, value in found.items() for each in _kept(check, name, value)]
+
+
+def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:
+    """Write one figure of a check and what it must keep; a margin, whose name is a phrase, by its demand alone."""
+    sp = sympy()
+    value = sp.sympify(value).replace(sp.Abs, lambda positive: positive)
+    whole = " " in name
+    written = [] if whole else [equation(check.name, symbol(name), value)]
+    for each in (demand for demand in check.demands if demand.row == name):
+        own = isinstance(each.value, str)
+        limit = symbol(f"{each.value}_{ENDS[each.sign]}") if own else sp.nsimplify(each.value)
+        kind = f"{check.name}: {name}" if whole else check.name
+        written.append(relation(kind, value if whole else symbol(name), SIGNS[each.sign], limit))
+    return written
+
+
+def terms(loads: Sequence[Acting], pose: Motion, known: Given) -> Mapping[str, Expression]:
+    """Return each load's term by its effect's name, one expression over the whole turn."""
+    sp, phi, found = sympy(), symbol("phi"), {}
+    for load in loads:
+        own = pieces(load, pose, known)
+        parts = [(formula, (begin <= phi) & (phi <= end)) for formula, (begin, end) in own[:-1]]
+        found[load.name] = sp.Piecewise(*parts, (own[-1][0], True)) if parts else own[0][0]
+    return found
