@@ -8,7 +8,7 @@ from loomopt import maths
 from loomopt.balance import Given, total
 from loomopt.cycle import Node
 from loomopt.maths import Number
-from loomopt.nlp.structure import NodeValues, Structure
+from loomopt.nlp.structure import Structure
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
 from loomopt.schema import Values
@@ -101,15 +101,16 @@ class NodeRows(Rows):
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
         return self.quantities.at(name, self.given, phi, switch)
 
-    def node(self, parameters: Sequence[Number]) -> NodeValues:
-        """Return the node that parameters say."""
-        return self.shape.read(parameters, self.corners)
+    def at(self, name: str, parameters: Sequence[Number]) -> Number:
+        """Return a whole-cycle quantity at the node that parameters say, SI."""
+        return self.quantity(name, *self.shape.read(parameters, self.corners))
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, SI."""
-        nodes = [self.node(parameters) for parameters in self.rules[integral.name]]
-        weighted = [width * self.quantity(integral.quantity, phi, switch) for width, phi, switch in nodes]
-        return total(weighted) / total([node.width for node in nodes])
+        rule = self.rules[integral.name]
+        widths = [self.shape.read_width(parameters, self.corners) for parameters in rule]
+        weighted = [width * self.at(integral.quantity, node) for width, node in zip(widths, rule, strict=True)]
+        return total(weighted) / total(widths)
 
 
 class _Built:
@@ -178,7 +179,5 @@ class _Built:
                 scale = self.limit_scales[family.limit]
                 bound = self.bounds[family.limit] / scale + self.given_way(family.limit)
             for weight, sign, *parameters in self.structure.layout.rows(self.vector, f"family {k}"):
-                node = self.rows.node(parameters)
-                value = self.rows.quantity(family.row, node.phi, node.switch)
-                found.append(weight * (sign * value / scale - bound))
+                found.append(weight * (sign * self.rows.at(family.row, parameters) / scale - bound))
         return found

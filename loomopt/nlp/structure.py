@@ -7,11 +7,10 @@ through a few slots, each a node that the exchange fills; an unused slot weighs 
 import functools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import Cycle, Floats, node_angle
+from loomopt.cycle import Cycle, Floats, Node, node_angle
 from loomopt.maths import Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.layout import Layout
@@ -19,15 +18,6 @@ from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import DATUM, quadrature
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.schema import Values
-
-
-class NodeValues(NamedTuple):
-    """A node read from its parameters: width of its share of a mean, crank angle, rad, and switches by name."""
-
-    width: Number
-    phi: Number
-    switch: Values
 
 
 @dataclass(frozen=True)
@@ -57,11 +47,14 @@ class NodeParameters:
         """Return the parameters of a node of width 1 at a crank angle, rad, that no corner moves."""
         return [1.0, angle, *[0.0] * (2 * self.corners), *(datum if name == DATUM else 0.0 for name in self.switches)]
 
-    def read(self, row: Sequence[Number], corners: Sequence[Number]) -> NodeValues:
+    def read(self, row: Sequence[Number], corners: Sequence[Number]) -> Node:
         """Return the node that parameters say; corners: their crank angles, rad."""
-        of_angle, of_width = row[2 : 2 + self.corners], row[2 + self.corners : 2 + 2 * self.corners]
-        switch = dict(zip(self.switches, row[2 + 2 * self.corners :], strict=True))
-        return NodeValues(node_angle(row[0], of_width, corners), node_angle(row[1], of_angle, corners), switch)
+        phi = node_angle(row[1], row[2 : 2 + self.corners], corners)
+        return Node(phi, dict(zip(self.switches, row[2 + 2 * self.corners :], strict=True)))
+
+    def read_width(self, row: Sequence[Number], corners: Sequence[Number]) -> Number:
+        """Return the width, rad, of a node's share of a mean."""
+        return node_angle(row[0], row[2 + self.corners : 2 + 2 * self.corners], corners)
 
 
 @dataclass(frozen=True, eq=False)

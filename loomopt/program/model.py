@@ -195,13 +195,18 @@ class JobModel:
 
     @functools.cached_property
     def events_read(self) -> tuple[str, ...]:
-        """Events at which rows stand."""
+        """Events at which rows stand; then those of further cases."""
+        return self._events + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._events)
+
+    @functools.cached_property
+    def _events(self) -> tuple[str, ...]:
+        """Events at which rows of one case stand."""
         return tuple(dict.fromkeys(row.event for row in self._rows.values() if row.event))
 
     @functools.cached_property
     def _cased(self) -> dict[str, tuple[str, int]]:
-        """Name of a quantity, row or switch at a further case → (its own name, the case's place)."""
-        names = (*self._quantities, *self._rows, *self._single)
+        """Name of a quantity, row, switch or event at a further case → (its own name, the case's place)."""
+        names = (*self._quantities, *self._rows, *self._single, *self._events)
         return {cased(name, k + 1): (name, k) for k in range(len(self.cases)) for name in names}
 
     @property
@@ -356,25 +361,35 @@ class JobModel:
         self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
     ) -> dict[str, Number]:
         """Return figures and rows that need one position only; all it has of the first case without names."""
-        known = [name for name, row in self._rows.items() if all(need in given.values for need in row.needs)]
-        wanted = known if names is None else [n for n in (*self._rows, *self._cased) if n in names]
-        return {name: self._static(maths, given, stills, name) for name in wanted if self.has_row(name)}
+        if names is None:
+            known = given.values
+            names = [name for name, row in self._rows.items() if all(need in known for need in row.needs)]
+        instants: dict[tuple[str, int], Instant] = {}
+        found = {}
+        for name in names:
+            plain, k = self._cased.get(name, (name, -1))
+            if plain in self._rows:
+                event = self._rows[plain].event
+                if (event, k) not in instants:
+                    instants[event, k] = self._still(maths, given, stills, event, k)
+                found[name] = self._rows[plain].formula(instants[event, k])
+        return found
 
-    def _static(self, maths: Maths, given: Given, stills: Stills, name: str) -> Number:
-        name, k = self._cased.get(name, (name, -1))
-        row, case = self._rows[name], given if k < 0 else given.cases[k]
-        switch = stills.get(row.event, {})
-        return row.formula(
-            Instant(self, maths, case, Node(None, self._switch_of(switch, k) if k >= 0 else switch), row.event)
-        )
+    def _still(self, maths: Maths, given: Given, stills: Stills, event: str, case: int) -> Instant:
+        """Return the mechanism at an event, or nowhere without one; case: -1 for the first."""
+        if case < 0:
+            return Instant(self, maths, given, Node(None, stills.get(event, {})), event)
+        switch = self._switch_of(stills.get(cased(event, case + 1), {}), case)
+        return Instant(self, maths, given.cases[case], Node(None, switch), event)
 
     def event(self, maths: Maths, given: Given, name: str) -> Number:
         """Return the crank angle of an event, rad."""
-        return self.kinematics.events(maths, given)[name]
+        plain, k = self._cased.get(name, (name, -1))
+        return self.kinematics.events(maths, given if k < 0 else given.cases[k])[plain]
 
 
 def cased(name: str, case: int) -> str:
-    """Return the name of a number, quantity, row or switch at a further case, counted from 1."""
+    """Return the name of a number, quantity, row, switch or event at a further case, counted from 1."""
     return f"{name} [case {case}]"
 
 
