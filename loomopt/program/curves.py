@@ -7,7 +7,7 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import TURN, Floats, Pieces
-from loomopt.program.model import Formula, Instant
+from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
 
 STEPS = 720

@@ -14,96 +14,14 @@ from loomopt.cycle import Cycle, Floats, Node, Where
 from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
 from loomopt.maths import Maths, Number, numpy
 from loomopt.owned import label, owned
+from loomopt.program.instant import Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics
 from loomopt.schema import Values
 
+__all__ = ["Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
+
 Stills = Mapping[str, Values]
 """Event → the switches just before it, by name."""
-
-
-class Instant:
-    """The mechanism with its effects at one node, in one number system; what no formula reads is not computed.
-
-    event: where it stands at an event of the motion, whose pose is exact.
-    """
-
-    def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
-        self.model, self.maths, self.given, self.node, self.event = model, maths, given, node, event
-
-    @property
-    def values(self) -> Values:
-        """The scene's numbers and what follows from them, by name."""
-        return self.given.values
-
-    @functools.cached_property
-    def pose(self) -> Any:
-        """The mechanism's pose."""
-        kinematics = self.model.kinematics
-        if self.event:
-            return kinematics.still(self.maths, self.given, self.event, self.node.switch)
-        return kinematics.pose(self.maths, self.given, self.node)
-
-    @functools.cached_property
-    def force(self) -> Number:
-        """Q, N or N·m: what the mechanism must supply at its output."""
-        return balance.output_force(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
-
-    @functools.cached_property
-    def crank_torque(self) -> Number:
-        """The torque on the crank, N·m."""
-        return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
-
-    def terms(self) -> dict[str, Number]:
-        """Return each load's term by its name, N or N·m."""
-        found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
-        return {load.name: term for load, term in found}
-
-    def switched(self, **switch: Number) -> "Instant":
-        """Return the same node with other switches."""
-        node = Node(self.node.phi, {**self.node.switch, **switch})
-        return Instant(self.model, self.maths, self.given, node, self.event)
-
-
-Formula = Callable[[Instant], Number]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A whole-cycle quantity; figure: whether its largest |value| is one.
-
-    signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
-    bound between points is proven with every answer.
-    """
-
-    formula: Formula
-    figure: bool = True
-    signed: bool = False
-    bounded: bool = False
-
-
-@dataclass(frozen=True)
-class Row:
-    """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
-
-    formula: Formula
-    needs: tuple[str, ...] = ()
-    event: str = ""
-
-
-@dataclass(frozen=True)
-class Integral:
-    """A mean of `quantity` over the crank angle; root: its square root.
-
-    Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch
-    "datum".
-    """
-
-    name: str
-    root: str
-    quantity: str
-    where: Where | None = None
-    angles: tuple[float, ...] = ()
-    data: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
