@@ -14,11 +14,11 @@ from loomopt.cycle import Cycle, Floats, Node, Where
 from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
 from loomopt.maths import Maths, Number, numpy
 from loomopt.owned import label, owned
-from loomopt.program.instant import Instant, Integral, Quantity, Row
+from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics
 from loomopt.schema import Values
 
-__all__ = ["Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
+__all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
 
 Stills = Mapping[str, Values]
 """Event → the switches just before it, by name."""
