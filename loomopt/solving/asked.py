@@ -2,9 +2,8 @@
 
 from loomopt.errors import BadInput
 from loomopt.scenes import Scene
-
-ACCURACY = 1e-8
-TIGHTEST = 1e-11
+from loomopt.tolerances import ACCURACY as ACCURACY
+from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 
 
 def target_name(scene: Scene, target: str | None) -> str:
@@ -24,19 +23,19 @@ def target_name(scene: Scene, target: str | None) -> str:
 
 def check_numbers(accuracy: float, starts: int) -> None:
     """Raise BadInput for settings outside what can be kept."""
-    if not TIGHTEST <= accuracy <= 0.1:
+    if not TIGHTEST <= accuracy <= COARSEST:
         raise BadInput(
             "the accuracy is out of range",
             key="--accuracy",
             value=f"{accuracy:g}",
-            allowed=f"{TIGHTEST:g} to 0.1",
+            allowed=f"{TIGHTEST:g} to {COARSEST:g}",
             remedy="Write --accuracy 1e-8, or leave it out.",
         )
-    if not 1 <= starts <= 10_000:
+    if not 1 <= starts <= MOST_STARTS:
         raise BadInput(
             "the number of starts is out of range",
             key="--starts",
             value=str(starts),
-            allowed="1 to 10000",
+            allowed=f"1 to {MOST_STARTS}",
             remedy="Write --starts 20, or leave it out.",
         )

@@ -17,11 +17,7 @@ from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler, Tally
-
-MOST_BOXES = 20_000
-STRIPS = 2048
-"""Boxes of one piece over which a mean is enclosed."""
-
+from loomopt.tolerances import MEAN_BOXES, MOST_BOXES
 
 CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""
@@ -71,12 +67,12 @@ class Boxes(Reading):
         """
         if integral.angles:
             return super().mean(integral)
-        half = 0.5 / STRIPS
+        half = 0.5 / MEAN_BOXES
         total, width = self.maths.number(0.0), self.maths.number(0.0)
         for piece in np.flatnonzero(self.cycle.on(integral.where)):
             length = self.starts[piece + 1] - self.starts[piece]
             width = width + length
-            for strip in range(STRIPS):
+            for strip in range(MEAN_BOXES):
                 centre = (2 * strip + 1) * half
                 value = self._series(integral.quantity, int(piece), centre, 0.0)[0]
                 bend = self._series(integral.quantity, int(piece), centre, half)[2]

@@ -6,11 +6,7 @@ from dataclasses import replace
 from loomopt.quantities import show
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
-
-FARTHEST = 4
-"""Sizes tried on either side before there is none."""
-SAME = 1e-9
-"""Share of an objective by which two sizes are equally good."""
+from loomopt.tolerances import FARTHEST_SIZE, SAME_SIZE
 
 Solve = Callable[[Scene], Solution]
 Tried = tuple[float, Solution]
@@ -23,7 +19,7 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
     where there is none, ideal is returned with a message that says so, as no answer to build.
     """
     value = ideal.design[name]
-    if any(abs(value - size) <= SAME * size for size in sizes):
+    if any(abs(value - size) <= SAME_SIZE * size for size in sizes):
         return ideal
     unit = scene.unit(name, "length")
     found, tried = [], []
@@ -47,7 +43,7 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
 def _until_admissible(scene: Scene, name: str, sizes: Iterator[float], solve: Solve) -> Iterator[Tried]:
     """Yield sizes with their answers, ending with the first that is optimal."""
     bound = scene.bounds[name]
-    for _, size in zip(range(FARTHEST), sizes, strict=False):
+    for _, size in zip(range(FARTHEST_SIZE), sizes, strict=False):
         if not bound.min <= size <= bound.max:
             return
         answer = solve(scene.set(f"bounds.{name}", f"{size!r} m"))
@@ -60,6 +56,6 @@ def _better(one: Solution, other: Solution) -> bool:
     """Say whether one answer's objectives are less, level by level."""
     for level in one.certificate.levels if one.certificate else ():
         a, b = one.figures.get(level.objective) or 0.0, other.figures.get(level.objective) or 0.0
-        if abs(a - b) > SAME * max(abs(a), abs(b)):
+        if abs(a - b) > SAME_SIZE * max(abs(a), abs(b)):
             return a < b
     return False

@@ -7,18 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.nlp import exchange
+from loomopt.nlp.families import families
 from loomopt.nlp.point import Point, Settings
-from loomopt.nlp.transcribe import families
 from loomopt.program.program import Limit, Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
-
-PRICED = 1e-6
-"""Multipliers above this belong to the clash."""
-ENOUGH = 3
-"""Starts that must agree on the least sum of relaxations before the rest need not be tried."""
-NEEDED = 1e-9
-"""Excess, in natural sizes, below which a set of limits is admissible after all."""
+from loomopt.tolerances import AGREEING, NEEDED, PRICED
 
 
 def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Settings, words: Words) -> Clash:
@@ -64,7 +58,7 @@ def _least(
         gain = _total(program, best) - _total(program, point) if best else math.inf
         agreeing = 1 if gain > NEEDED else agreeing + (gain >= -NEEDED)
         best = point if gain > 0.0 else best
-        if agreeing == ENOUGH:
+        if agreeing == AGREEING:
             break
     return (best, _by_limit(program, best.relaxed)) if best else None
 

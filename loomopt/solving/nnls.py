@@ -3,6 +3,7 @@
 import numpy as np
 
 from loomopt.cycle import Floats
+from loomopt.tolerances import NNLS_EXCHANGES, NNLS_GONE, NNLS_PULL, NNLS_RANK
 
 
 def nnls(matrix: Floats, target: Floats) -> Floats:
@@ -13,8 +14,8 @@ def nnls(matrix: Floats, target: Floats) -> Floats:
     count = matrix.shape[1]
     chosen = np.zeros(count, dtype=bool)
     answer = np.zeros(count)
-    tolerance = 1e-13 * (1 + np.abs(matrix).sum())
-    for _ in range(10 * count):
+    tolerance = NNLS_PULL * (1 + np.abs(matrix).sum())
+    for _ in range(NNLS_EXCHANGES * count):
         pull = np.where(chosen, -np.inf, matrix.T @ (target - matrix @ answer))
         if chosen.all() or pull.max(initial=-np.inf) <= tolerance:
             break
@@ -28,7 +29,7 @@ def nnls(matrix: Floats, target: Floats) -> Floats:
             leaving = chosen & (trial <= 0)
             step = np.min(answer[leaving] / (answer[leaving] - trial[leaving]))
             answer = answer + step * (trial - answer)
-            chosen &= answer > 1e-15 * max(1.0, float(np.abs(answer).max()))
+            chosen &= answer > NNLS_GONE * max(1.0, float(np.abs(answer).max()))
             answer[~chosen] = 0
             trial = _least_squares(matrix, target, chosen)
         answer = trial
@@ -39,5 +40,5 @@ def _least_squares(matrix: Floats, target: Floats, chosen: np.ndarray) -> Floats
     """Return the unconstrained solution over the chosen columns, 0 elsewhere."""
     result = np.zeros(matrix.shape[1])
     if chosen.any():
-        result[chosen] = np.linalg.lstsq(matrix[:, chosen], target, rcond=1e-14)[0]
+        result[chosen] = np.linalg.lstsq(matrix[:, chosen], target, rcond=NNLS_RANK)[0]
     return result

@@ -1,8 +1,15 @@
-"""What a limit costs: its multiplier in the units a designer reads."""
+"""What a limit costs: its multiplier in the units a designer reads, and the figure that it is told of."""
 
 from loomopt.program.program import Limit, Objective
 from loomopt.program.sampling import Sampler
 from loomopt.solving.verdict import Binding
+
+
+def figure_of(sampler: Sampler, objective: Objective) -> float:
+    """Return the figure of an objective, SI: with its sign where it is a number of its own."""
+    if objective.form != "peak" and objective.figure in sampler.figures:
+        return sampler.figures[objective.figure]
+    return float(sampler.merit(objective) ** (1 / objective.power))
 
 
 def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
@@ -10,7 +17,7 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
     weight = sampler.single(limit.weight) if limit.weight else 1.0
     worth = abs(multiplier) * objective.scale / limit.scale * weight
     if objective.power != 1:
-        figure = sampler.single(objective.figure)
-        worth /= abs(objective.power * figure ** (objective.power - 1))
+        # The row is a power of the figure: its slope with respect to the figure.
+        worth /= abs(objective.power * figure_of(sampler, objective) ** (objective.power - 1))
     side = limit.sign or (1 if multiplier > 0 else -1)
     return Binding(limit, side, objective, worth)

@@ -23,9 +23,8 @@ from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
+from loomopt.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 
-SLACK = 1e-8
-LEAST_SLACK, MOST_SLACK = 1e-13, 0.1
 RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""
 
@@ -79,8 +78,8 @@ def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, 
     full = {**job.today(scene), **design}
     own, asked = job.adopted(scene, full, name)
     program = job.program(own, asked)
-    court = _Court(own, job, program, full, slack)
-    return Proofs(scene.name, name, tuple(_merged(list(court.proofs()))))
+    reads = _readings(own, job, program, full, slack)
+    return Proofs(scene.name, name, tuple(_merged(list(_proofs(program, job, Words(own), *reads)))))
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:
@@ -93,73 +92,81 @@ def _merged(found: list[Proof]) -> Iterator[Proof]:
         yield replace(worst, boxes=sum(proof.boxes for proof in rows))
 
 
-class _Court:
-    """One design, its program, and its numbers as balls."""
+@dataclass(frozen=True)
+class _Read:
+    """A design read in floats and in balls; slack: relative, what proofs leave open."""
 
-    def __init__(self, scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float) -> None:
-        self.scene, self.job, self.program, self.slack = scene, job, program, slack
-        self.words = Words(scene)
-        known = job.numbers(scene)
-        chosen = {scene.full(name): value for name, value in design.items()}
-        # What the target's program does not choose is the design's own too, and today's where it names nothing.
-        parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
-        program = replace(program, parameters=parameters)
-        values = {**parameters, **job.values(program, {**known, **chosen})}
-        self.sampler = Sampler(program.model, values)
-        self.boxes = Boxes(self.sampler)
-        self.whole = job.sampler(scene, design)
-        self.whole_boxes = Boxes(self.whole)
+    sampler: Sampler
+    boxes: Boxes
+    slack: float
 
-    def proofs(self) -> Iterator[Proof]:
-        """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
-        for limit in (limit for limit in self.program.limits if limit.family != "variable"):
-            yield self._cycle(limit) if limit.family == "cycle" else self._static(limit)
-        for name, (quantity, most) in self.whole.model.assembly.items():
-            peak = self.whole.peak(quantity)
-            yield self._row(self.whole, self.whole_boxes, name, name, quantity, most, peak)
-        for figure, quantity in self.job.peaks(self.whole.model).items():
-            peak = self.whole.peak(quantity)
-            if math.isfinite(peak):
-                text = f"{figure} as claimed"
-                yield self._row(self.whole, self.whole_boxes, f"peak {figure}", text, quantity, peak, peak)
 
-    def _cycle(self, limit: Limit) -> Proof:
-        text = limit.name if limit.hidden else self.words.limit(limit)
-        peak = self.sampler.peak(limit.row, limit.where)
-        return self._row(self.sampler, self.boxes, limit.name, text, limit.row, limit.bound, peak, limit.where)
+@dataclass(frozen=True)
+class _Claim:
+    """That |quantity| (of a signed one, the quantity) stays below a bound; peak: its refined largest; all SI."""
 
-    def _row(
-        self,
-        sampler: Sampler,
-        boxes: Boxes,
-        name: str,
-        text: str,
-        quantity: str,
-        bound: float,
-        peak: float,
-        where: Where | None = None,
-    ) -> Proof:
-        """Bound one quantity on boxes; both signs where its magnitude counts."""
-        slack = self.slack * _largest(sampler, quantity)
-        signs = (1.0,) if quantity in sampler.model.signed else (1.0, -1.0)
-        found = [boxes.bound(quantity, sign, bound + slack, where) for sign in signs]
-        worst = max(found, key=lambda each: RANK[each.status])
-        count = sum(each.boxes for each in found)
-        angle = None if worst.angle is None else worst.angle % (2 * math.pi)
-        return Proof(name, text, worst.status, bound - peak, slack, count, angle)
+    limit: str
+    text: str
+    quantity: str
+    bound: float
+    peak: float
+    where: Where | None = None
 
-    def _static(self, limit: Limit) -> Proof:
-        """Enclose one value of the design alone."""
-        residual = self.boxes.excess(limit) + self.boxes.maths.number(0.0)
-        weight = float(self.boxes.single(limit.weight)) if limit.weight else 1.0
-        residual = residual / weight if weight else residual
-        value = abs(float(self.boxes.single(limit.row)))
-        size = max(value / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
-        excess = abs(residual) if limit.sign == 0 else residual
-        slack = self.slack * size
-        status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
-        text = limit.name if limit.hidden else self.words.limit(limit)
-        return Proof(limit.name, text, status, -float(excess.mid()), slack, 1)
+
+def _readings(
+    scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float
+) -> tuple[_Read, _Read]:
+    """Return the design read by the target's program, and by the job as a whole."""
+    known = job.numbers(scene)
+    chosen = {scene.full(name): value for name, value in design.items()}
+    # What the target's program does not choose is the design's own too, and today's where it names nothing.
+    parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
+    asked = replace(program, parameters=parameters)
+    values = {**parameters, **job.values(asked, {**known, **chosen})}
+    samplers = Sampler(program.model, values), job.sampler(scene, design)
+    own, whole = (_Read(sampler, Boxes(sampler), slack) for sampler in samplers)
+    return own, whole
+
+
+def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
+    """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
+    for limit in (limit for limit in program.limits if limit.family != "variable"):
+        text = limit.name if limit.hidden else words.limit(limit)
+        if limit.family == "cycle":
+            peak = own.sampler.peak(limit.row, limit.where)
+            yield _over_cycle(own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where))
+        else:
+            yield _single(own, limit, text)
+    for name, (quantity, most) in whole.sampler.model.assembly.items():
+        yield _over_cycle(whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity)))
+    for figure, quantity in job.peaks(whole.sampler.model).items():
+        peak = whole.sampler.peak(quantity)
+        if math.isfinite(peak):
+            yield _over_cycle(whole, _Claim(f"peak {figure}", f"{figure} as claimed", quantity, peak, peak))
+
+
+def _over_cycle(read: _Read, claim: _Claim) -> Proof:
+    """Bound one quantity on boxes; both signs where its magnitude counts."""
+    slack = read.slack * _largest(read.sampler, claim.quantity)
+    signs = (1.0,) if claim.quantity in read.sampler.model.signed else (1.0, -1.0)
+    found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where) for sign in signs]
+    worst = max(found, key=lambda each: RANK[each.status])
+    count = sum(each.boxes for each in found)
+    angle = None if worst.angle is None else worst.angle % (2 * math.pi)
+    return Proof(claim.limit, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle)
+
+
+def _single(read: _Read, limit: Limit, text: str) -> Proof:
+    """Enclose one value of the design alone."""
+    residual = read.boxes.excess(limit) + read.boxes.maths.number(0.0)
+    weight = float(read.boxes.single(limit.weight)) if limit.weight else 1.0
+    residual = residual / weight if weight else residual
+    value = abs(float(read.boxes.single(limit.row)))
+    size = max(value / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
+    excess = abs(residual) if limit.sign == 0 else residual
+    slack = read.slack * size
+    status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
+    return Proof(limit.name, text, status, -float(excess.mid()), slack, 1)
 
 
 def _largest(sampler: Sampler, quantity: str) -> float:

@@ -9,10 +9,10 @@ from loomopt.program import numbers
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.solving.certificate import FEASIBILITY
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
+from loomopt.tolerances import FEASIBLE
 
 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
@@ -54,7 +54,7 @@ def _findings(
         sizes[key] = max(sizes.get(key, 0.0), size)
     found = []
     for (name, chosen), ends in sides.items():
-        value, slack = (design if chosen else values)[name], FEASIBILITY * sizes[name, chosen]
+        value, slack = (design if chosen else values)[name], FEASIBLE * sizes[name, chosen]
         low, high = ends.get(-1), ends.get(1)
         ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
         found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))

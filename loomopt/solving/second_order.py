@@ -1,92 +1,169 @@
-"""Second order: the least curvature over the directions that are open, and what happens along flat ones."""
+"""Second order: does the Lagrangian curve upward along every direction that binding rows leave open?
 
-import functools
+Tested is the sufficient condition d'Hd > 0 for every d ≠ 0 of the critical cone [Nocedal and Wright, Numerical
+Optimization, 2nd ed., Theorem 12.6], H the Hessian of the level's Lagrangian; at an extreme of the cycle a row's own
+is g_xx − g_xφ g_φx / g_φφ [Hettich and Kortanek, SIAM Review 35 (1993), 380-429]. Binding rows are equalities; touching
+ones without a multiplier bound the cone.
+
+Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
+decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from a few seeds
+(`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
+Lagrangian is read at a few steps along the line (`lagrangian`: what falls along a curve only is not looked for).
+"""
+
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.nlp.point import sampler_at
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
-from loomopt.solving.nnls import nnls
-
-SEEDS, STEPS = 12, 30
-OPEN = 1e-9
-"""Slope up to which a direction does not leave a limit."""
-PROBES = 1e-2, 3e-3
-"""Steps along a direction without curvature, in natural sizes."""
-NOTICED = 1e-12
-
-
-def least_on_cone(hessian: Floats, slopes: Floats) -> float:
-    """Return the least d'Hd over unit directions d with slopes d ≤ 0 that was found; infinite without any.
-
-    hessian: (n, n), symmetric; slopes: (m, n). Projected gradients from eigenvectors and from a few fixed seeds.
-    """
-    values, vectors = np.linalg.eigh(hessian)
-    if not len(slopes):
-        return float(values[0])
-    seeds = [sign * vector for vector in vectors.T for sign in (1.0, -1.0)]
-    seeds += list(np.random.default_rng(0).normal(size=(SEEDS, len(hessian))))
-    pace, least = 1.0 / max(float(np.abs(hessian).sum(axis=0).max()), 1e-300), np.inf
-    for seed in seeds:
-        direction = _onto(seed, slopes)
-        for _ in range(STEPS):
-            if direction is None:
-                break
-            bend = float(direction @ hessian @ direction)
-            least = min(least, bend)
-            direction = _onto(direction - pace * (hessian @ direction - bend * direction), slopes)
-    return float(least)
-
-
-def _onto(direction: Floats, slopes: Floats) -> Floats | None:
-    """Return the unit direction of the nearest point of the cone slopes d ≤ 0; None where that is its tip."""
-    kept = direction - slopes.T @ nnls(slopes.T, direction)
-    length = float(np.linalg.norm(kept))
-    if length <= 1e-9 * max(1.0, float(np.linalg.norm(direction))) or np.any(slopes @ kept > OPEN * length):
-        return None
-    return np.asarray(kept / length)
+from loomopt.solving import settle
+from loomopt.solving.cone import least_on_cone
+from loomopt.solving.exact import Exact
+from loomopt.solving.kkt import Multipliers, System
+from loomopt.solving.lagrangian import Lagrangian
+from loomopt.solving.rows import ActiveSet
+from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 
 
 @dataclass(frozen=True)
-class Lagrangian:
-    """The Lagrangian of one level as the program's own values have it: true extremes, no derivatives.
-
-    place: the level; prices: multiplier of each limit by its place, and of each earlier objective by its own.
-    """
+class Local:
+    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them."""
 
     program: Program
     x: Mapping[str, float]
-    place: int
-    prices: Mapping[int, float]
-    held: Mapping[int, float]
+    sampler: Sampler
+    active: ActiveSet
+    exact: Exact
+    gradients: Floats
 
-    def falls(self, direction: Mapping[str, float], slope: float) -> bool:
-        """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
-        base = self._base
-        if base is None:
-            return False
-        found = ((step, self._value(step, direction)) for step in PROBES)
-        return all(value is not None and value - base < -(10 * slope * step + NOTICED) for step, value in found)
+    @property
+    def scales(self) -> Floats:
+        """Natural sizes of the variables that slopes are with respect to."""
+        sizes = {v.name: v.scale for v in self.program.variables}
+        return np.array([sizes[name] for name in self.exact.names])
 
-    @functools.cached_property
-    def _base(self) -> float | None:
-        return self._value(0.0, {})
 
-    def _value(self, step: float, direction: Mapping[str, float]) -> float | None:
-        sampler = sampler_at(self.program, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()})
-        if sampler is None:
-            return None
-        value = self._objective(sampler, self.place)
-        value += sum(price * self._objective(sampler, k) for k, price in self.held.items())
-        return value + sum(price * self._limit(sampler, k) for k, price in self.prices.items())
+@dataclass(frozen=True)
+class Curvature:
+    """What second order says of one level.
 
-    def _objective(self, sampler: Sampler, place: int) -> float:
-        objective = self.program.objectives[place]
-        return sampler.merit(objective) / objective.scale
+    minimum: nothing falls along a curved direction; unique: along every open direction something rises; falls: the
+    Lagrangian falls along a direction without curvature; settled: a single design is left, but for moves that change
+    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct.
+    """
 
-    def _limit(self, sampler: Sampler, place: int) -> float:
-        return sampler.excess(self.program.limits[place])
+    minimum: bool = True
+    unique: bool = True
+    falls: bool = False
+    settled: bool = False
+    step: Floats = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Critical:
+    """What binding rows leave open: basis (variables, k) of the directions that none forbids.
+
+    back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis.
+    """
+
+    basis: Floats
+    back: Floats
+    slopes: Floats
+
+
+def critical(local: Local, system: System, multipliers: Multipliers) -> Critical:
+    """Return the critical cone of one level.
+
+    Binding are limits with a multiplier, equalities, what earlier levels hold, and the differences between pieces that
+    share the largest value of their group.
+    """
+    active, bound = local.active, multipliers.positive
+    fixed = {k for k, row in enumerate(active.rows) if row.limit and row.limit.row in local.program.fixed}
+    limits = sorted({*system.equalities, *fixed, *(k for k in range(active.limits) if k in bound)})
+    unit = np.eye(len(active.rows))
+    shared = [[k for k in group if k in bound] for group in system.groups]
+    apart = [unit[k] - unit[of[0]] for of in shared for k in of[1:]]
+    sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
+    jacobian = sums @ local.gradients
+    _, sizes, rows = np.linalg.svd(jacobian)
+    basis = rows[int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0)))) :].T
+    excess = np.array([row.excess for row in active.rows])
+    missed = sums @ np.where(np.isfinite(excess), excess, 0.0)
+    back = -np.linalg.lstsq(jacobian, missed, rcond=RANK)[0]
+    slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
+    return Critical(basis, back, slopes[np.abs(slopes).max(axis=1, initial=0.0) > FLAT])
+
+
+def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
+    """Return what second order says of one level with one set of multipliers."""
+    cone = critical(local, system, multipliers)
+    if cone.basis.shape[1] == 0:
+        step = _newton(local, cone, np.zeros((0, 0)), np.zeros(0), multipliers)
+        return Curvature(settled=True, step=step)
+    hessian = np.tensordot(multipliers.of, local.exact.curvatures(cone.basis), axes=1)
+    values, vectors = np.linalg.eigh(hessian)
+    curved = values > NEWTON_CURVED
+    step = _newton(local, cone, vectors[:, curved], values[curved], multipliers)
+    settled = bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian)
+    if values.min() < -FLAT and least_on_cone(hessian, cone.slopes) < -FLAT:
+        return Curvature(minimum=False, unique=False, settled=settled, step=step)
+    unique, ways = True, []
+    for value, vector in zip(values, vectors.T, strict=True):
+        open_ways = [way for way in (vector, -vector) if np.max(cone.slopes @ way, initial=-np.inf) <= FLAT]
+        unique = unique and (bool(value > FLAT) or not open_ways)
+        ways += [cone.basis @ way for way in open_ways] if value <= FAINT else []
+    falls = bool(ways) and _falls(local, level, multipliers, ways)
+    return Curvature(unique=unique, falls=falls, settled=settled, step=step)
+
+
+def _newton(local: Local, cone: Critical, vectors: Floats, bends: Floats, multipliers: Multipliers) -> Floats:
+    """Return Newton's step: back onto the binding rows, and along curved directions down the slope.
+
+    vectors: (k, curved) in the cone's basis; bends: their curvatures.
+    """
+    directions = cone.basis @ vectors
+    pull = directions.T @ (multipliers.of @ local.gradients)
+    if max(np.abs(pull).max(initial=0.0), np.abs(cone.back).max(initial=0.0)) <= NEWTON_DONE:
+        return np.zeros(0)
+    return np.asarray(cone.back - directions @ (pull / bends))
+
+
+def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats) -> bool:
+    """Say whether all but moves that change nothing is curved: then later levels have nothing to choose."""
+    last = level == len(local.program.objectives) - 1
+    moves = [] if last else settle.unchanging(local.program, local.x)
+    directions = [np.array([move.get(name, 0.0) for name in local.exact.names]) / local.scales for move in moves]
+    inside = [basis.T @ way for way in (d / np.linalg.norm(d) for d in directions) if _is_open(basis, way)]
+    if not inside:
+        return False
+    left, sizes, _ = np.linalg.svd(np.array(inside).T)
+    rest = left[:, int(np.sum(sizes > RANK)) :]
+    return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > FLAT)
+
+
+def _is_open(basis: Floats, way: Floats) -> bool:
+    """Say whether a unit direction lies among those that no binding row forbids."""
+    return bool(np.linalg.norm(way - basis @ (basis.T @ way)) <= RANK)
+
+
+def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats]) -> bool:
+    """Say whether the Lagrangian falls along directions without curvature."""
+    active = local.active
+    prices: dict[int, float] = {}
+    for k in sorted(multipliers.positive):
+        if k < active.limits:
+            place = active.rows[k].place
+            prices[place] = prices.get(place, 0.0) + float(multipliers.of[k])
+    held = {k: held_multiplier(active, k, multipliers) for k in range(level)}
+    weights = {k: weight for k, weight in held.items() if weight}
+    lagrangian = Lagrangian(local.program, local.x, level, prices, weights)
+    found = (dict(zip(local.exact.names, map(float, way * local.scales), strict=True)) for way in ways)
+    return any(lagrangian.falls(direction, multipliers.residual) for direction in found)
+
+
+def held_multiplier(active: ActiveSet, level: int, multipliers: Multipliers) -> float:
+    """Return the multiplier by which an earlier objective is held: that of each of its groups."""
+    return float(sum(multipliers.of[k] for k in active.pieces(level)) / len(active.levels[level]))

@@ -4,22 +4,19 @@ They run only along moves verified flat at this design: objectives unchanged to 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.program.program import Move, Program, Wish
+from loomopt.program.program import Limit, Move, Program, Wish
 from loomopt.program.sampling import Sampler
+from loomopt.tolerances import ACTIVE, BEYOND, GIVES_WAY, MOVED, SETTLE_BISECTIONS, SETTLE_NODES, UNCHANGED
 
-UNCHANGED = 1e-10
-SLACK, NOTICED = 1e-12, 1e-9
-"""What a limit may give way, in its natural size; the least move, in the variable's scale, that is a choice."""
-BISECTIONS = 60
-NODES = 64
+Numbers = Mapping[str, float]
 
 
-def settle(program: Program, x: Mapping[str, float]) -> tuple[dict[str, float], tuple[str, ...]]:
+def settle(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return x (SI) after the silent levels, and what they settled."""
     settled = []
     for move in program.moves:
@@ -29,19 +26,19 @@ def settle(program: Program, x: Mapping[str, float]) -> tuple[dict[str, float], 
             continue
         share = _reach(program, x, goal)
         moved = [share * abs(goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in goal]
-        if max(moved, default=0.0) > NOTICED:
+        if max(moved, default=0.0) > MOVED:
             settled.append(f"{move.name}: {wish.reason}")
         x = _part_way(x, goal, share)
     return dict(x), tuple(settled)
 
 
-def wished(program: Program, move: Move, x: Mapping[str, float]) -> Wish | None:
+def wished(program: Program, move: Move, x: Numbers) -> Wish | None:
     """Return the first wish of a move that holds at x (SI)."""
     values = {**program.parameters, **x}
     return next((wish for wish in move.wishes if not wish.when or values[wish.when] > wish.above), None)
 
 
-def goal_of(move: Move, wish: Wish, x: Mapping[str, float]) -> dict[str, float]:
+def goal_of(move: Move, wish: Wish, x: Numbers) -> dict[str, float]:
     """Return where a wish would go from x (SI), within the move's bounds; nothing where there is no room."""
     if move.kind == "scale":
         return _scaled(move, wish, x)
@@ -54,13 +51,12 @@ def goal_of(move: Move, wish: Wish, x: Mapping[str, float]) -> dict[str, float]:
     return goal
 
 
-def _scaled(move: Move, wish: Wish, x: Mapping[str, float]) -> dict[str, float]:
+def _scaled(move: Move, wish: Wish, x: Numbers) -> dict[str, float]:
     """Return x scaled in common: nearest to today's, in bound widths, or as small or as large as the bounds allow."""
     widths = {name: move.bounds[name][1] - move.bounds[name][0] for name in move.along}
-    scales = [sorted((move.bounds[n][0] / x[n], move.bounds[n][1] / x[n])) for n in move.along if x[n]]
-    if min(widths.values()) <= 0.0 or not scales:
+    if min(widths.values()) <= 0.0 or not any(x[name] for name in move.along):
         return {}
-    least, most = max(low for low, _ in scales), min(high for _, high in scales)
+    least, most = _factors(move, x)
     factor = least if wish.toward == "least" else most
     if wish.toward == "today":
         pull = math.fsum(x[n] * move.today[n] / widths[n] ** 2 for n in move.along)
@@ -68,25 +64,75 @@ def _scaled(move: Move, wish: Wish, x: Mapping[str, float]) -> dict[str, float]:
     return {n: min(max(x[n] * factor, move.bounds[n][0]), move.bounds[n][1]) for n in move.along}
 
 
-def _part_way(x: Mapping[str, float], goal: Mapping[str, float], share: float) -> dict[str, float]:
+def _factors(move: Move, x: Numbers) -> tuple[float, float]:
+    """Return the least and the largest common factor that bounds allow; above the largest where they leave none."""
+    scales = [sorted((move.bounds[n][0] / x[n], move.bounds[n][1] / x[n])) for n in move.along if x[n]]
+    return max(low for low, _ in scales), min(high for _, high in scales)
+
+
+def unchanging(program: Program, x: Numbers) -> list[dict[str, float]]:
+    """Return the directions, SI, of the moves along which nothing changes at x (SI) as far as bounds allow.
+
+    Neither an objective, nor a limit that is touched, but for the bounds of what moves.
+    """
+    ways = ((move, way) for move in program.moves for way in _directions(move, x))
+    return [way for move, way in ways if all(_is_same(program, x, end) for end in _ends(move, way, x))]
+
+
+def _directions(move: Move, x: Numbers) -> Iterator[dict[str, float]]:
+    """Yield the directions, SI, of a move that has room, but not without end."""
+    room = [name for name in move.along if 0.0 < move.bounds[name][1] - move.bounds[name][0] < math.inf]
+    if move.kind == "axis":
+        yield from ({name: 1.0} for name in room)
+    elif len(room) == len(move.along) and any(x[name] for name in room):
+        yield {name: x[name] for name in room}
+
+
+def _ends(move: Move, way: Numbers, x: Numbers) -> Iterator[dict[str, float]]:
+    """Yield where a direction of a move ends at its bounds."""
+    if move.kind == "scale":
+        yield from ({name: factor * x[name] for name in way} for factor in _factors(move, x))
+    else:
+        yield from ({name: end} for name in way for end in move.bounds[name])
+
+
+def _is_same(program: Program, x: Numbers, goal: Numbers) -> bool:
+    """Say whether neither the objectives nor a limit that is touched changes on the way to the goal."""
+    try:
+        before, there = _excesses(program, x), _excesses(program, {**x, **goal})
+        if not is_flat(program, x, goal):
+            return False
+    except (ValueError, ZeroDivisionError):
+        return False
+    pairs = zip(program.limits, before, there, strict=True)
+    touched = [(one, other) for limit, one, other in pairs if one >= -ACTIVE and not _bounds(limit, goal)]
+    return all(abs(other - one) <= UNCHANGED for one, other in touched)
+
+
+def _bounds(limit: Limit, goal: Numbers) -> bool:
+    """Say whether a limit is the bound of a variable that moves."""
+    return limit.family == "variable" and limit.row in goal
+
+
+def _part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
     """Return x moved a share of the way to the goal."""
     if share == 1.0:
         return {**x, **goal}
     return {**x, **{name: x[name] + share * (end - x[name]) for name, end in goal.items()}}
 
 
-def is_flat(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> bool:
+def is_flat(program: Program, x: Numbers, goal: Numbers) -> bool:
     """Say whether the objectives stay the same along the way to the goal, and a little beyond x."""
     before = _objectives(program, x)
-    nearby = {name: x[name] * (1 + 1e-3) for name in goal}
+    nearby = {name: x[name] * (1 + BEYOND) for name in goal}
     shares = [_part_way(x, goal, share) for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
     return all(np.abs(_objectives(program, trial) - before).max() <= UNCHANGED for trial in shares)
 
 
-def _objectives(program: Program, x: Mapping[str, float]) -> Floats:
+def _objectives(program: Program, x: Numbers) -> Floats:
     """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
     sampler = Sampler(program.model, {**program.parameters, **x})
-    pieces, u = sampler.grid(NODES)
+    pieces, u = sampler.grid(SETTLE_NODES)
     parts = []
     for objective in program.objectives:
         if objective.form == "peak":
@@ -96,9 +142,9 @@ def _objectives(program: Program, x: Mapping[str, float]) -> Floats:
     return np.concatenate(parts)
 
 
-def _reach(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) -> float:
+def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
     """Return the largest share of the way along which no limit gets worse than it is allowed."""
-    allowed = [max(0.0, excess) + SLACK for excess in _excesses(program, x)]
+    allowed = [max(0.0, excess) + GIVES_WAY for excess in _excesses(program, x)]
 
     def holds(share: float) -> bool:
         now = _excesses(program, _part_way(x, goal, share))
@@ -107,13 +153,13 @@ def _reach(program: Program, x: Mapping[str, float], goal: Mapping[str, float]) 
     if holds(1.0):
         return 1.0
     low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
+    for _ in range(SETTLE_BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
 
 
-def _excesses(program: Program, x: Mapping[str, float]) -> list[float]:
+def _excesses(program: Program, x: Numbers) -> list[float]:
     """Return by how much every limit is exceeded, in its natural size; an equality how far it is missed."""
     sampler = Sampler(program.model, {**program.parameters, **x})
     found = [(limit, sampler.excess(limit)) for limit in program.limits]

@@ -4,9 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from loomopt.program.program import Limit, Objective
-
-ROUNDING = 1e-15
-"""Nothing is known better, relative to its natural size."""
+from loomopt.tolerances import ROUNDED
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Certificate:
         method would still move the design.
         """
         amiss = max((level.complementarity for level in self.levels), default=0.0)
-        return max(self.feasibility, self.violation, amiss, self.step, ROUNDING)
+        return max(self.feasibility, self.violation, amiss, self.step, ROUNDED)
 
     @property
     def residual(self) -> float:

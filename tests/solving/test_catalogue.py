@@ -4,9 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from loomopt.solving.catalogue import FARTHEST, fitted
+from loomopt.solving.catalogue import fitted
 from loomopt.solving.solution import Solution
 from loomopt.solving.verdict import Certificate, Level
+from loomopt.tolerances import FARTHEST_SIZE
 
 MM = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 SIZES = tuple(float(f"{size:g}e-3") for size in MM)
@@ -114,7 +115,7 @@ def test_an_answer_that_is_not_certified_is_none(status):
 
 
 def test_the_walk_ends_after_a_few_sizes():
-    assert FARTHEST == 4
+    assert FARTHEST_SIZE == 4
     found, tried = fit(6.5, {1.0: objectives(1), 2.0: objectives(1), 11.0: objectives(1)})
     assert tried == [6.0, 5.0, 4.0, 3.0, 7.0, 8.0, 9.0, 10.0]
     assert found.status == "infeasible"

@@ -2,7 +2,6 @@
 
 import math
 from math import sqrt
-from types import SimpleNamespace
 
 import hock_schittkowski
 import hock_schittkowski_larger
@@ -10,6 +9,8 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt import maths
+from loomopt.balance import Given
 from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8
@@ -190,7 +191,7 @@ def test_equalities_that_depend_on_each_other_get_prices_of_measure():
         certificate = certify(_hs55(), along(t), ACCURACY)
         assert certificate.passed, certificate.reasons
         assert sum(binding.worth for binding in certificate.binding) < 1e2
-        assert _hs55().model.static(None, SimpleNamespace(values=along(t)), ())["f"] == pytest.approx(least, rel=1e-12)
+        assert _hs55().model.static(maths.FLOAT, Given(along(t), {}), {})["f"] == pytest.approx(least, rel=1e-12)
 
 
 @pytest.mark.parametrize(("t", "reason"), [(0.5, "f can still fall"), (1 - 1e-6, "f can still fall"), (None, "second")])

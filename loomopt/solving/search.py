@@ -1,0 +1,202 @@
+"""The search for the best certified design: starts → exchange → silent levels → certificate, as steps on records."""
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from loomopt.jobs.base import Job
+from loomopt.nlp import exchange
+from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
+from loomopt.program.program import Program
+from loomopt.solving.certificate import certify
+from loomopt.solving.settle import settle
+from loomopt.solving.verdict import Certificate
+from loomopt.tolerances import (
+    CORRECTIONS,
+    FEASIBLE,
+    HELD_MARGIN,
+    MORE_STARTS,
+    MOST_ALIKE,
+    PRECISE,
+    SAME_OBJECTIVE,
+    STATIONARY,
+    STRONGER,
+    STRONGEST_PENALTY,
+)
+
+OnStart = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle."""
+
+    point: Point
+    objectives: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate after the silent levels: its variables, SI, and their certificate."""
+
+    candidate: Candidate
+    x: Mapping[str, float]
+    certificate: Certificate
+
+
+@dataclass(frozen=True)
+class Search:
+    """How far a search has come.
+
+    settings: those of the next solve; candidates: of every solve, in order; best: the best that was reached, judged;
+    built, solved, certified: seconds of making NLPs, of solves with that, and of certificates.
+    """
+
+    job: Job
+    program: Program
+    settings: Settings
+    candidates: tuple[Candidate, ...] = ()
+    best: Judged | None = None
+    built: float = 0.0
+    solved: float = 0.0
+    certified: float = 0.0
+
+    @property
+    def passed(self) -> bool:
+        """Whether the best has its certificate."""
+        return self.best is not None and self.best.certificate.passed
+
+    @property
+    def reached(self) -> list[Candidate]:
+        """Candidates that are worth a certificate."""
+        return [candidate for candidate in self.candidates if candidate.point.reached]
+
+    @property
+    def ranked(self) -> list[Candidate]:
+        """Those, the best first."""
+        return sorted(self.reached, key=functools.cmp_to_key(compared))
+
+
+def searched(search: Search, count: int, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
+    """Return the search after `count` starts; after more where none is certified; after none where `near` leads on."""
+    if near is not None:
+        search = tried(search, near.x, near)
+        search = judged(search) if search.candidates[-1].point.reached else search
+        if search.passed:
+            return search
+    done = 0
+    for wanted in dict.fromkeys((count, max(count, MORE_STARTS))):
+        chosen = exchange.starts(search.program, wanted, seed)
+        for place, start in enumerate(chosen[done:], done + 1):
+            if on_start:
+                on_start(place, len(chosen))
+            search = tried(search, start)
+        done = max(done, len(chosen))
+        search = judged(search)
+        if search.passed:
+            break
+    return search
+
+
+def tried(search: Search, start: Mapping[str, float], warm: Point | None = None) -> Search:
+    """Return the search after one more solve."""
+    began = time.perf_counter()
+    point = exchange.solve(search.program, start, search.settings, warm)
+    spent = time.perf_counter() - began
+    candidate = Candidate(point, objectives(search.program, point.x) if point.reached else ())
+    return replace(
+        search,
+        candidates=(*search.candidates, candidate),
+        built=search.built + point.built,
+        solved=search.solved + spent,
+    )
+
+
+def objectives(program: Program, x: Mapping[str, float]) -> tuple[float, ...]:
+    """Return the objectives of variables x (SI) in their natural sizes; infinite where they have no value."""
+    sampler = sampler_at(program, x)
+    if sampler is None:
+        return (math.inf,) * len(program.objectives)
+    return tuple(sampler.merit(objective) / objective.scale for objective in program.objectives)
+
+
+def compared(one: Candidate, other: Candidate) -> int:
+    """Order candidates by their objectives, level by level."""
+    for a, b in zip(one.objectives, other.objectives, strict=True):
+        if abs(a - b) > SAME_OBJECTIVE:
+            return -1 if a < b else 1
+    return 0
+
+
+def judged(search: Search) -> Search:
+    """Return the search with its best candidate settled and certified.
+
+    Where an earlier objective gave way to a later one, it is solved again with a stronger weight between them.
+    """
+    while search.reached:
+        first = search.ranked[0]
+        if search.best is None or search.best.candidate is not first:
+            search = _certified(search, first)
+        if search.best is None or not _too_weak(search.settings, search.best.certificate):
+            break
+        weight = search.settings.penalty * STRONGER
+        search = tried(replace(search, settings=replace(search.settings, penalty=weight)), first.point.x)
+        if not search.candidates[-1].point.reached:
+            break
+        search = replace(search, candidates=tuple(c for c in search.candidates if c is not first))
+    return search if search.passed else _another(search)
+
+
+def _another(search: Search) -> Search:
+    """Return the search with another candidate of the same objectives as its best, if one passes."""
+    best = search.best
+    if best is None:
+        return search
+    others = [c for c in search.reached if c is not best.candidate and compared(c, best.candidate) == 0]
+    for candidate in others[:MOST_ALIKE]:
+        search = _certified(search, candidate)
+        if search.passed:
+            return search
+    return replace(search, best=best)
+
+
+def _too_weak(settings: Settings, certificate: Certificate) -> bool:
+    """Say whether an earlier objective gave way to a later one: its weight must exceed its multiplier, with room."""
+    if settings.penalty * STRONGER > STRONGEST_PENALTY:
+        return False
+    held = max((level.held for level in certificate.levels[1:]), default=0.0)
+    earlier = any(level.stationarity > STATIONARY for level in certificate.levels[:-1])
+    return earlier or settings.penalty <= HELD_MARGIN * held
+
+
+def _certified(search: Search, candidate: Candidate) -> Search:
+    """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
+    began, accuracy = time.perf_counter(), search.settings.accuracy
+    x, certificate = _settled(search, candidate.point.x)
+    for _ in range(CORRECTIONS):
+        precise = max(min(PRECISE, accuracy), ROUNDING)
+        close = certificate.residual <= precise and certificate.error <= accuracy
+        if not certificate.correction or close:
+            break
+        moved, better = _settled(search, _stepped(search.program, x, certificate.correction))
+        if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
+            break
+        x, certificate = moved, better
+    spent = time.perf_counter() - began
+    return replace(search, best=Judged(candidate, x, certificate), certified=search.certified + spent)
+
+
+def _settled(search: Search, x: Mapping[str, float]) -> tuple[dict[str, float], Certificate]:
+    """Return x (SI) after the silent levels, and its certificate."""
+    job, program = search.job, search.program
+    settled, said = settle(program, job.tidy(program, x))
+    exact = job.values(program, job.design(program, settled))
+    return settled, replace(certify(program, exact, search.settings.accuracy), settled=said)
+
+
+def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:
+    """Return x moved by a step, both SI, within its bounds."""
+    moved = {v.name: x[v.name] + step.get(v.name, 0.0) for v in program.variables}
+    return {v.name: min(max(moved[v.name], v.lower), v.upper) for v in program.variables}
