@@ -13,9 +13,11 @@ from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
 from loomopt.mechanisms.cam_motion import Spline, knots
 from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
-from loomopt.program.model import Formula, Instant, JobModel
+from loomopt.program.instant import Formula, Instant
+from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
+from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
@@ -103,6 +105,13 @@ class Shedding(Job):
             after,
             also=tuple(sampler.angle(extreme) for extreme in sampler.extremes("lift")),
         )
+
+    def studied(self, scene: Scene) -> Studied:
+        """Return what studies read: least springs, the cam force, and what a free law tends to."""
+        from loomopt.jobs.shedding.limit_law import FAMILY
+
+        peaks = {"contact_max": ("cam_force", False)}
+        return Studied(("stiffness", "law"), peaks, motion="X_2", family=FAMILY)
 
     @property
     def views(self) -> JobViews:
