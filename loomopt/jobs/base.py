@@ -1,8 +1,10 @@
 """All that the rest of the house knows of a job: one object. What few jobs need has a default here."""
 
 import abc
+import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
@@ -26,12 +28,10 @@ class Job(abc.ABC):
     """A loom mechanism and what can be asked of it; all numbers SI."""
 
     name: str
+    own_schema: SceneSchema
+    """What a scene may hold, where that does not depend on the scene."""
 
     # What every job says.
-
-    @abc.abstractmethod
-    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a scene may hold; document: the raw scene, on which that may depend."""
 
     @abc.abstractmethod
     def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:
@@ -57,17 +57,27 @@ class Job(abc.ABC):
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return what the curves over the cycle show of the motion, and what force and torque are called."""
 
-    @property
-    @abc.abstractmethod
-    def views(self) -> JobViews:
-        """The job's own pictures, equations and remarks; imported when it is first asked for."""
+    # What few jobs say otherwise.
+
+    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
+        """Return what a scene may hold; document: the raw scene, on which that may depend."""
+        return self.own_schema
 
     @property
-    @abc.abstractmethod
+    def package(self) -> str:
+        """The package of the job's own files."""
+        return type(self).__module__.rpartition(".")[0]
+
+    @property
+    def views(self) -> JobViews:
+        """The job's own pictures, equations and remarks: VIEWS of its views.py, imported when it is first asked for."""
+        found: JobViews = importlib.import_module(f"{self.package}.views").VIEWS
+        return found
+
+    @property
     def resources(self) -> Traversable:
         """The folder with the job's template.toml, and problems/ and results/ where it brings any."""
-
-    # What few jobs say otherwise.
+        return files(self.package)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""

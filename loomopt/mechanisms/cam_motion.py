@@ -2,10 +2,10 @@
 
 import functools
 import itertools
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import cam_spline
@@ -160,3 +160,26 @@ def knots(values: Mapping[str, Number]) -> tuple[Number, ...]:
 def named_knots(accelerations: Iterable[Number]) -> dict[str, Number]:
     """Return s'' at the knots of a spline law by name."""
     return {f"{PREFIX}{k}": value for k, value in enumerate(accelerations)}
+
+
+def segment_at(present: tuple[int, ...], angle: float, corners: tuple[float, ...]) -> float:
+    """Return the segment that a cam angle lies in; corners: where those that are present begin."""
+    return float(present[sum(angle >= corner for corner in corners) - 1])
+
+
+def piece_at(angle: float, corners: tuple[float, ...]) -> float:
+    """Return the law's piece at a cam angle; corners: its breaks on the rise, then, mirrored, those on the return."""
+    half = len(corners) // 2
+    return float(sum(angle >= c for c in corners[:half]) - sum(angle >= c for c in corners[half:]))
+
+
+def mirrored(values: Values, shares: Sequence[Any]) -> tuple[Number, ...]:
+    """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
+    rise = [_part(values["rise"], share) for share in shares]
+    back = [values["begin.near"] - _part(values["return"], share) for share in shares]
+    return (*rise, *back)
+
+
+def _part(angle: Number, share: Any) -> Number:
+    """Return a share of an angle; a fraction without rounding it first."""
+    return angle * share.numerator / share.denominator if isinstance(share, Fraction) else angle * share

@@ -1,4 +1,4 @@
-"""Equations of effects, by their own formulas on symbols: each load's term, the balance, what checks read and demand."""
+"""Equations of effects by their own formulas on symbols: each load's term, the balance, what checks read and demand."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
 
 from loomopt.effects.kinds import Check
+from loomopt.errors import BadInput
 from loomopt.owned import label, owned
+from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Variable, Wish
 from loomopt.scenes import Scene
 
@@ -70,7 +73,7 @@ def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
 
 
 def demanded(
-    scene: Scene, checks: Iterable[Check], known: Mapping[str, float], sizes: Mapping[str, float]
+    scene: Scene, checks: Iterable[Check[Any]], known: Mapping[str, float], sizes: Mapping[str, float]
 ) -> list[Limit]:
     """Return what checks demand of their rows and quantities while they are on.
 
@@ -82,10 +85,26 @@ def demanded(
         for each in check.demands:
             value = each.value if isinstance(each.value, float) else known[owned(check, each.value)]
             firm = each.row in scene.schema.margins or not isinstance(each.value, str)
-            family = "cycle" if each.row in check.quantities else "static"
+            family: Literal["static", "cycle"] = "cycle" if each.row in check.quantities else "static"
             size = sizes.get(each.row) or abs(value) or 1.0
-            found.append(Limit(each.row, each.sign, each.row, value, size, family, relaxable=not firm))  # type: ignore[arg-type]
+            found.append(Limit(each.row, each.sign, each.row, value, size, family, relaxable=not firm))
     return found
+
+
+def demand_figures(scene: Scene, model: JobModel, rows: Mapping[str, Sequence[str]], remedy: str) -> None:
+    """Raise BadInput for a limit on a figure that nothing in the scene gives.
+
+    rows: figure → the rows and quantities that it is read from, itself without any; remedy: with the figure's "{name}".
+    """
+    for name in scene.limits:
+        if not all(model.has_row(row) or model.has_quantity(row) for row in rows.get(name, (name,))):
+            raise BadInput(
+                f"nothing in the scene gives the figure {name}",
+                file=scene.origin,
+                key=f"limits.{name}",
+                allowed="figures whose numbers and effects the scene has",
+                remedy=remedy.format(name=name),
+            )
 
 
 def inside(variables: Iterable[Variable], values: Mapping[str, float]) -> dict[str, float]:
@@ -106,8 +125,9 @@ def scale_move(
     name: str, along: tuple[str, ...], known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
 ) -> Move:
     """Return the move that scales lengths in common, and would stay nearest to today's."""
-    today, ranges = ({n: of[n] for n in along if n in of} for of in (known, limited))  # type: ignore[index]
-    return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, ranges)  # type: ignore[arg-type]
+    today = {n: known[n] for n in along if n in known}
+    ranges = {n: limited[n] for n in along if n in limited}
+    return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, ranges)
 
 
 def axis_moves(scene: Scene, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> list[Move]:

@@ -1,24 +1,17 @@
 """The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24]."""
 
-from collections.abc import Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from typing import Any
-
 import numpy as np
 
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.beatup import design as designs
 from loomopt.jobs.beatup import program as programs
 from loomopt.jobs.beatup.scene import SCHEMA
-from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import bounds
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
 
@@ -26,10 +19,7 @@ class Beatup(Job):
     """A four-bar crank-rocker with the reed on its rocker."""
 
     name = "beatup"
-
-    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a beat-up scene may hold."""
-        return SCHEMA
+    own_schema = SCHEMA
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the crank-rocker with the effects the scene calls for."""
@@ -97,18 +87,6 @@ class Beatup(Job):
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: the balance, the peak torque, the reed torque at front dead centre."""
         return Studied(("balance",), {"peak_torque": ("peak_torque", False)}, ("M3_fdc",), "psi_2")
-
-    @property
-    def views(self) -> JobViews:
-        """Pictures and equations."""
-        from loomopt.jobs.beatup.views import VIEWS
-
-        return VIEWS
-
-    @property
-    def resources(self) -> Traversable:
-        """The folder of the template."""
-        return files("loomopt.jobs.beatup")
 
 
 JOB = Beatup()

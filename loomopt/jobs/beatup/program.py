@@ -11,7 +11,7 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
-from loomopt.program.numbers import bound_limits, demanded, ends
+from loomopt.program.numbers import bound_limits, demand_figures, demanded, ends
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scene_tables import Limit as Limited
@@ -50,7 +50,7 @@ def program(scene: Scene, target: str) -> Program:
     sizes = _Sizes(physics, scene, known, limited)
     direct = _reads_counterweight(scene, target, limited)
     variables = _variables(scene, sizes, limited, direct)
-    _demand_figures(scene, physics)
+    demand_figures(scene, physics, ROWS, "Take the limit off, or add what {name} needs.")
     limits = [limit for v in variables if v.called in scene.bounds for limit in bound_limits(v, False)]
     limits += [] if direct else _mass_limits(limited["m4e"], sizes)
     limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sizes)]
@@ -118,7 +118,7 @@ def _reed(sampler: Sampler) -> list[float]:
     """Return today's inertia of the reed without a counterweight, kg·m², by each load that reads s."""
     given, loads = sampler.given, [load for load in sampler.model.loads if isinstance(load, Load)]
     own = [(load.moved, given.own[load.name]) for load in loads if load.moved and "s" in load.reads]
-    return [moved({**given.values, "s": 0.0}, values) for moved, values in own if moved]
+    return [moved({**given.values, "s": 0.0}, values) for moved, values in own]
 
 
 def _variables(scene: Scene, sizes: _Sizes, limited: Mapping[str, tuple[float, float]], direct: bool) -> list[Variable]:
@@ -159,19 +159,6 @@ def demand(scene: Scene, target: str) -> None:
                 key=f"targets.retrofit.weights.{name}",
                 allowed=", ".join(VARIABLES),
                 remedy="Name a design variable.",
-            )
-
-
-def _demand_figures(scene: Scene, physics: JobModel) -> None:
-    """Raise BadInput for a limit on a figure that nothing in the scene gives."""
-    for name in scene.limits:
-        if not all(physics.has_row(row) or physics.has_quantity(row) for row in ROWS.get(name, (name,))):
-            raise BadInput(
-                f"nothing in the scene gives the figure {name}",
-                file=scene.origin,
-                key=f"limits.{name}",
-                allowed="figures whose numbers and effects the scene has",
-                remedy=f"Take the limit off, or add what {name} needs.",
             )
 
 

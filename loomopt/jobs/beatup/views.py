@@ -34,7 +34,7 @@ class BeatupViews(JobViews):
         """Return the equations the scene really uses."""
         from loomopt.jobs.beatup import equations
 
-        return equations.equations(scene)
+        return equations.equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
         """Return both dead centres, rad, and where the cloth begins and ceases to resist."""

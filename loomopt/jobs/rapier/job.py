@@ -1,23 +1,17 @@
 """The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17]."""
 
 import math
-from collections.abc import Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from typing import Any
 
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.rapier import design as designs
 from loomopt.jobs.rapier import program as programs
 from loomopt.jobs.rapier.scene import SCHEMA
 from loomopt.maths import FLOAT
-from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Crossing, Studied
-from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
 
@@ -25,10 +19,7 @@ class Rapier(Job):
     """A five-bar rapier drive on the sley of a four-bar, with one 2:1 gear."""
 
     name = "rapier"
-
-    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a rapier scene may hold."""
-        return SCHEMA
+    own_schema = SCHEMA
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the drive with the effects the scene calls for."""
@@ -90,18 +81,6 @@ class Rapier(Job):
         peaks = {"peak_acceleration": ("peak_acceleration", False), "stroke": ("S", True)}
         leaves = Crossing("dwell_after", "S", "s_dwell") if "s_dwell" in scene.operation else None
         return Studied(("stroke-dwell",), peaks, motion="S_2", crossing=leaves)
-
-    @property
-    def views(self) -> JobViews:
-        """Pictures and equations."""
-        from loomopt.jobs.rapier.views import VIEWS
-
-        return VIEWS
-
-    @property
-    def resources(self) -> Traversable:
-        """The folder of the template."""
-        return files("loomopt.jobs.rapier")
 
 
 JOB = Rapier()

@@ -156,7 +156,10 @@ class RapierDrive:
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Return both dead centres of the sley, rad."""
         values = given.values
-        return {"front dead centre": 0, "rear dead centre": maths.pi + values["centres"].beta_r - values["centres"].beta}
+        return {
+            "front dead centre": 0,
+            "rear dead centre": maths.pi + values["centres"].beta_r - values["centres"].beta,
+        }
 
 
 def _turn(k: int) -> str:

@@ -34,7 +34,7 @@ class RapierViews(JobViews):
         """Return the equations the scene really uses."""
         from loomopt.jobs.rapier import equations
 
-        return equations.equations(scene)
+        return equations.equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
         """Return the sley's dead centres, rad, the hand-over and the dwell."""

@@ -1,11 +1,7 @@
 """Between the NLP's variables and the spring, cam and law a person reads; figures and words of a design."""
 
 import math
-from collections.abc import Mapping
 
-import numpy as np
-
-from loomopt.cycle import Floats
 from loomopt.effects.kinds import Load
 from loomopt.jobs.base import Figures
 from loomopt.jobs.shedding.model import frame
@@ -14,6 +10,7 @@ from loomopt.mechanisms.cam_motion import Spline, named_knots
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program, Variable
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.program.speeds import speed_reached
 from loomopt.scenes import Scene
 from loomopt.units import show
 
@@ -32,9 +29,6 @@ GAVE_WAY = 1e-7
 """A number that a target keeps has given way when it is off by this, in its natural size."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
-AT_REST = 1e-12
-"""Share of the largest cam force by which contact at rest may miss its limit: rounding."""
-NEWTON, CONVERGED = 30, 1e-15
 
 
 def design(program: Program, x: Numbers) -> dict[str, float]:
@@ -76,7 +70,7 @@ def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     found |= {name: sampled.peak(name) for check in physics.checks for name in check.quantities}
     found["contact_speed"] = None
     if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
-        speed = contact_speed(physics, sampled.values, scene.operation["N_min"])
+        speed = speed_reached(physics, sampled.values, "lift", -scene.operation["N_min"])
         found["contact_speed"] = speed if math.isfinite(speed) else None
     return found
 
@@ -87,56 +81,6 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     size = max(abs(extreme.value) for extreme in found)
     alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
-
-
-def contact_speed(model: JobModel, values: Mapping[str, float], least: float) -> float:
-    """Return the cam speed, rad/s, up to which the cam force stays above `least`, N; infinite where it always does.
-
-    The force is quadratic in the speed at every cam angle: the first root is sampled, then followed by Newton's method
-    with the refined least force. 0 where contact is lost at rest.
-    """
-    unit = float(values["speed"])
-    still = Sampler(model, {**values, "speed": 0.0})
-    pieces, u = still.grid()
-
-    def force(speed: float) -> Floats:
-        return -Sampler(model, {**values, "speed": speed}).at("lift", pieces, u)
-
-    rest, ahead, back = force(0.0), force(unit), force(-unit)
-    room = AT_REST * float(np.abs(np.concatenate([rest, ahead])).max())
-    spare = rest - least
-    if spare.min() < -room:
-        return 0.0
-    square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
-    shares = _first_roots(square, linear, np.maximum(spare, 0.0), room)
-    share = float(shares.min())
-    return math.inf if math.isinf(share) else _settled(model, values, least, unit * share)
-
-
-def _first_roots(square: Floats, linear: Floats, spare: Floats, room: float) -> Floats:
-    """Return the least positive x with square x² + linear x + spare = 0 at each angle, infinite without one."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inside = linear**2 - 4 * square * spare
-        root = 2 * spare / (-linear + np.sqrt(np.maximum(inside, 0.0)))
-    falls = (inside >= 0.0) & (root > 0.0) & ((np.abs(square) > room) | (np.abs(linear) > room))
-    return np.where(falls, root, np.inf)
-
-
-def _settled(model: JobModel, values: Mapping[str, float], least: float, speed: float) -> float:
-    """Return the speed, rad/s, where the refined least force is `least`, from one nearby."""
-    for _ in range(NEWTON):
-        sampler = Sampler(model, {**values, "speed": speed})
-        lowest = sampler.extremes("lift")[0]
-        node = np.array([lowest.piece]), np.array([lowest.u])
-        ends = [float(Sampler(model, {**values, "speed": w}).at("lift", *node)[0]) for w in (0.0, 2 * speed)]
-        slope = (ends[1] - ends[0]) / (2 * speed)
-        if not slope > 0.0:
-            break
-        step = (-least - lowest.value) / slope
-        speed += step
-        if abs(step) <= CONVERGED * speed:
-            break
-    return speed
 
 
 def say(scene: Scene, now: Figures, dwells_only: bool, target: str, figures: Figures) -> str:

@@ -1,8 +1,6 @@
 """The shedding job: the least return spring that keeps the roller on the cam [Qiu21]."""
 
 from collections.abc import Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Any
 
 from loomopt.jobs.base import Figures, Job
@@ -11,14 +9,12 @@ from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import follower, moving
 from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
 from loomopt.mechanisms.cam_motion import Spline, knots
-from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 
 
@@ -26,10 +22,7 @@ class Shedding(Job):
     """A heald frame between its cam and its return spring."""
 
     name = "shedding"
-
-    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
-        """Return what a shedding scene may hold."""
-        return SCHEMA
+    own_schema = SCHEMA
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the frame with the effects the scene calls for, and a design's own law where it has one."""
@@ -57,7 +50,8 @@ class Shedding(Job):
 
         Of target law the law is then given: what remains is contact, and the bound on its acceleration.
         """
-        own, changes = knots(design), {}
+        own = knots(design)
+        changes: dict[str, object] = {}
         if own:
             changes = {"mechanism.law": "spline", "mechanism.law_coefficients": list(map(float, own))}
         if target == "law" and "law_acceleration" not in scene.limits:
@@ -112,18 +106,6 @@ class Shedding(Job):
 
         peaks = {"contact_max": ("cam_force", False)}
         return Studied(("stiffness", "law"), peaks, motion="X_2", family=FAMILY)
-
-    @property
-    def views(self) -> JobViews:
-        """Pictures and equations."""
-        from loomopt.jobs.shedding.views import VIEWS
-
-        return VIEWS
-
-    @property
-    def resources(self) -> Traversable:
-        """The folder of the template."""
-        return files("loomopt.jobs.shedding")
 
 
 JOB = Shedding()

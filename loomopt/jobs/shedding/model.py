@@ -6,7 +6,7 @@ must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning 
 
 import functools
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -18,7 +18,7 @@ from loomopt.effects.shedding import FramePose as Frame
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.mechanisms.cam_motion import CamLaw, Spline
+from loomopt.mechanisms.cam_motion import CamLaw, Spline, mirrored, piece_at, segment_at
 from loomopt.mechanisms.turning_points import newton
 from loomopt.program.kinematics import Arcs, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
@@ -118,17 +118,6 @@ class FramePose(Motion):
         )
 
 
-def _segment(present: tuple[int, ...], angle: float, corners: tuple[float, ...]) -> float:
-    """Return the segment that a cam angle lies in; corners: where those that are present begin."""
-    return float(present[sum(angle >= corner for corner in corners) - 1])
-
-
-def _piece(angle: float, corners: tuple[float, ...]) -> float:
-    """Return the law's piece at a cam angle; corners: its breaks on the rise, then, mirrored, those on the return."""
-    half = len(corners) // 2
-    return float(sum(angle >= c for c in corners[:half]) - sum(angle >= c for c in corners[half:]))
-
-
 @dataclass(frozen=True)
 class CamFrame:
     """The frame's motion. law: the cam law; dwells: whether far and near dwell are there at all."""
@@ -155,8 +144,8 @@ class CamFrame:
     def arcs(self) -> tuple[Arcs, ...]:
         """The segments, and the law's pieces."""
         return (
-            Arcs(SEGMENT, self._begins, functools.partial(_segment, self.segments)),
-            Arcs(LAW, lambda maths, given: mirrored(given.values, self.law.breaks), _piece),
+            Arcs(SEGMENT, self._begins, functools.partial(segment_at, self.segments)),
+            Arcs(LAW, lambda maths, given: mirrored(given.values, self.law.breaks), piece_at),
         )
 
     def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
@@ -221,18 +210,6 @@ class CamFrame:
         """Return where the segments begin, rad."""
         names = ("begin.far", "begin.return", "begin.near")
         return {"begin.rise": 0, **{name: given.values[name] for name in names}}
-
-
-def mirrored(values: Values, shares: Sequence[Any]) -> tuple[Number, ...]:
-    """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
-    rise = [_part(values["rise"], share) for share in shares]
-    back = [values["begin.near"] - _part(values["return"], share) for share in shares]
-    return (*rise, *back)
-
-
-def _part(angle: Number, share: Any) -> Number:
-    """Return a share of an angle; a fraction without rounding it first."""
-    return angle * share.numerator / share.denominator if isinstance(share, Fraction) else angle * share
 
 
 def follower(values: Values) -> Follower:

@@ -8,7 +8,7 @@ from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CYCLE, contact_speed
+from loomopt.jobs.shedding.design import CYCLE
 from loomopt.jobs.shedding.model import FOLLOWER, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen
 from loomopt.jobs.shedding.sizes import Sizes
@@ -17,9 +17,10 @@ from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
 from loomopt.owned import owned
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
-from loomopt.program.numbers import axis_moves, bound_limits, demanded, ends, inside
+from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
+from loomopt.program.speeds import speed_reached
 from loomopt.scenes import Scene
 
 SPEED = "operation.speed"
@@ -69,7 +70,7 @@ def demand(scene: Scene, target: str) -> None:
 
 def _survived(scene: Scene) -> float:
     """Return the speed, rad/s, up to which today's spring keeps contact."""
-    return contact_speed(model(scene), numbers(scene), scene.operation["N_min"])
+    return speed_reached(model(scene), numbers(scene), "lift", -scene.operation["N_min"])
 
 
 def program(scene: Scene, target: str) -> Program:
@@ -228,13 +229,14 @@ class _Task:
 
     def _figures(self) -> list[Limit]:
         """Return the scene's limits on figures."""
+        remedy = f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out."
+        demand_figures(self.scene, self.physics, {name: (row,) for name, row in CYCLE.items()}, remedy)
         found = []
         for name, limit in self.scene.limits.items():
             if name == "law_acceleration" and self.law:
                 continue
             row = CYCLE.get(name, name)
             cycle = name in CYCLE or self.physics.has_quantity(row)
-            self._demand_quantity(name, row)
             for sign, value in ((-1, limit.min), (1, limit.max)):
                 if value is not None and cycle:
                     # The least of a quantity is the largest of its opposite, which the row then is.
@@ -242,15 +244,6 @@ class _Task:
                 elif value is not None:
                     found.append(Limit(name, sign, name, value, abs(value) or 1.0, "static"))
         return found
-
-    def _demand_quantity(self, name: str, row: str) -> None:
-        if not (self.physics.has_quantity(row) or self.physics.has_row(row)):
-            raise BadInput(
-                f"nothing in the scene gives the figure {name}",
-                file=self.scene.origin,
-                key=f"limits.{name}",
-                remedy=f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out.",
-            )
 
     def _checks(self) -> list[Limit]:
         """Return what the effects that are checks demand."""

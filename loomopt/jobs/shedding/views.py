@@ -53,7 +53,7 @@ class SheddingViews(JobViews):
         """Return the equations the scene really uses."""
         from loomopt.jobs.shedding import equations
 
-        return equations.equations(scene)
+        return equations.equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, Any]) -> dict[str, float]:
         """Return the dwells, cam angles in rad, and where the cam force is least."""
