@@ -1,12 +1,12 @@
 """Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
 
 import datetime
+import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
 from loomopt.jobs import registry
-from loomopt.program import curves as cycle_curves
 from loomopt.program import sparse_curves
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
@@ -68,13 +68,12 @@ def curves(scene: Scene, design: Mapping[str, float], accuracy: float | None = N
     import pandas as pd
 
     job = registry.of(scene)
-    sampler = job.sampler(scene, {**job.today(scene), **designs.flat(design)})
-    shown = job.columns(scene, sampler)
+    rows = functools.partial(job.curves, scene, {**job.today(scene), **designs.flat(design)})
     more: dict[str, object] = {}
     if accuracy is None:
-        columns = cycle_curves.curves(sampler, shown)
+        columns = rows()
     else:
-        columns, error = sparse_curves.curves(sampler, shown, accuracy)
+        columns, error = sparse_curves.curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))

@@ -15,7 +15,7 @@ import pytest
 from loomopt import api, shell
 from loomopt.cli import run
 from loomopt.effects import BEATUP
-from loomopt.jobs import load
+from loomopt.jobs.registry import load
 from loomopt.jobs.template import BEATUP_TEMPLATE
 from loomopt.packaged import problem_names
 from loomopt.quantities import read

@@ -7,7 +7,7 @@ import pytest
 
 from loomopt import designs
 from loomopt.errors import BadInput
-from loomopt.jobs import load
+from loomopt.jobs.registry import load
 
 SCENE = load("beatup")
 DESIGN = {"l1": 0.03, "l2": 0.077, "l3": 0.148, "l4": 0.167, "m4e": 6.3, "r4e": 0.08}

@@ -1,13 +1,12 @@
 """Curves in as few rows as an accuracy asks for: coarse equal steps, and rows added where a column is largest."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from loomopt.cycle import SAME_ANGLE, TURN, Floats
-from loomopt.program import curves as even
 from loomopt.program import spikes
-from loomopt.program.curves import ANGLE, Columns
+from loomopt.program.curves import ANGLE
 from loomopt.program.sampling import Sampler
 
 STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
@@ -18,9 +17,11 @@ NEARLY = 0.8
 LEVEL = 2e-13
 """Share of a top by which rows beside it may differ on a level."""
 MOST_ROWS = 20_000
+Rows = Callable[[int, Sequence[float]], dict[str, Floats]]
+"""rows(steps, also): the curves at equal steps of one turn and at other crank angles, rad."""
 
 
-def curves(sampler: Sampler, columns: Columns, accuracy: float) -> tuple[dict[str, Floats], float]:
+def curves(sampler: Sampler, rows: Rows, accuracy: float) -> tuple[dict[str, Floats], float]:
     """Return the curves (SI), and an estimate of the relative error of each column's largest magnitude.
 
     Around every top rows are added between it and its neighbours, in thirds and at the vertex of their parabola, until
@@ -30,7 +31,7 @@ def curves(sampler: Sampler, columns: Columns, accuracy: float) -> tuple[dict[st
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
     also += [spikes.graded(centre) for centre in sampler.singular]
     for _ in range(ROUNDS):
-        found = even.curves(sampler, columns, steps, np.concatenate(also).tolist())
+        found = rows(steps, np.concatenate(also).tolist())
         added, left = _around_tops(found, accuracy / 10)
         if not added or len(found[ANGLE]) > MOST_ROWS:
             break

@@ -10,7 +10,6 @@ import numpy as np
 from loomopt.designs import flat
 from loomopt.jobs import registry
 from loomopt.owned import label, owned
-from loomopt.program import curves as cycle_curves
 from loomopt.scenes import Scene
 from loomopt.solving.words import Words
 from loomopt.views.layout import GAP, Grid
@@ -101,8 +100,7 @@ def curves(scene: Scene, design: Mapping[str, float], width: int | None) -> list
     """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
     job = registry.of(scene)
     full = {**job.today(scene), **flat(design)}
-    sampler = job.sampler(scene, full)
-    columns = cycle_curves.curves(sampler, job.columns(scene, sampler))
+    columns = dict(job.curves(scene, full))
     angle = np.degrees(columns.pop("phi [rad]"))
     places = {name: math.degrees(value) for name, value in _single(job.views.marks(scene, full)).items()}
     rows = [

@@ -8,7 +8,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.studies import accuracy, digits, limit_law, optima, readings
+from loomopt.jobs.shedding import limit_law
+from loomopt.studies import accuracy, digits, optima, readings
 from loomopt.studies.ladders import FLOOR, Ladder, Outcome, Reference, Row, climbed, grouped, knee, order
 from loomopt.studies.subject import Target
 
@@ -222,12 +223,15 @@ def test_the_limit_law_falls_to_that_of_an_impulse_as_the_bound_goes():
     "changed",
     [
         lambda scene: scene.with_effect("damping"),
+        lambda scene: scene.with_effect("dry_friction"),
+        lambda scene: scene.with_effect("coil"),
+        lambda scene: scene.without_effect("inertia"),
         lambda scene: scene.set("targets.law.symmetric", True),
         lambda scene: scene.set("effects.warp_tension.shape", "step"),
         lambda scene: scene.update({"mechanism.return": "100 deg", "mechanism.near_dwell": "80 deg"}),
         lambda scene: scene.free(["rise"]),
     ],
-    ids=["damping", "symmetric", "step", "unlike", "free angles"],
+    ids=["damping", "friction", "coil", "no inertia", "symmetric", "step", "unlike", "free angles"],
 )
 def test_where_the_limit_law_does_not_hold_there_is_none(changed):
     assert limit_law.least_stiffness(changed(lo.load("shedding")), 1e5) is None

@@ -7,7 +7,7 @@ import pytest
 from loomopt import packaged
 from loomopt.cli import run
 from loomopt.errors import BadInput
-from loomopt.jobs import load
+from loomopt.jobs.registry import load
 from loomopt.solving import engine
 from loomopt.studies import check as study
 

@@ -10,21 +10,22 @@ import pytest
 
 import loomopt as lo
 from loomopt import packaged
-from loomopt.jobs import JOBS
+from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-from loomopt.jobs.tasks import TASKS
+from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import LAYERS
-from loomopt.views import job_views, scene_view
+from loomopt.views import scene_view
 from loomopt.views.layout import Grid
 
 
 def test_every_job_has_its_views():
-    assert set(JOBS) <= set(job_views.VIEWS)
+    for name in registry.names():
+        assert isinstance(registry.find(name).views, JobViews)
 
 
 def test_numbers_a_design_leaves_out_are_todays():
     scene = lo.load("beatup")
-    view = job_views.view(scene)
+    view = registry.of(scene).views
     assert view.linkage(scene, {}) == crank_rocker_drawing.linkage(scene.mechanism, scene.name)
     changed = crank_rocker_drawing.linkage({**scene.mechanism, "l2": 0.07}, scene.name)
     assert view.linkage(scene, {"l2": 0.07}) == changed
@@ -33,9 +34,9 @@ def test_numbers_a_design_leaves_out_are_todays():
 
 def test_a_beatup_drawn_imports_neither_the_rapiers_views_nor_sympy():
     script = (
-        "import sys, loomopt as lo; from loomopt.views import job_views; s = lo.load('beatup');"
-        "job_views.view(s).linkage(s, {});"
-        "print([m for m in sys.modules if 'sympy' in m or 'views.rapier' in m or 'matplotlib' in m])"
+        "import sys; from loomopt.jobs import registry; s = registry.load('beatup');"
+        "registry.of(s).views.linkage(s, {});"
+        "print([m for m in sys.modules if 'sympy' in m or 'rapier' in m or 'shedding' in m or 'matplotlib' in m])"
     )
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout == "[]\n"
@@ -44,14 +45,11 @@ def test_a_beatup_drawn_imports_neither_the_rapiers_views_nor_sympy():
 def shown(monkeypatch, marks):
     """Return the first line and the crank angles, deg, of a table of curves with these marks, deg."""
     angles = np.unique(np.radians([*np.arange(0, 361, 0.5), *marks.values()]))
-    task = SimpleNamespace(
-        today=lambda scene: {},
-        curves=lambda scene, design: {"phi [rad]": angles, "S [m]": np.sin(angles)},
-        marks=lambda scene, design: {name: math.radians(value) for name, value in marks.items()},
-    )
-    monkeypatch.setitem(TASKS, "drive", task)
-    scene = SimpleNamespace(job=SimpleNamespace(name="drive"), title="Drive")
-    head, table = scene_view.curves(scene, {}, None)
+    views = SimpleNamespace(marks=lambda scene, design: {name: math.radians(value) for name, value in marks.items()})
+    columns = {"phi [rad]": angles, "S [m]": np.sin(angles)}
+    job = SimpleNamespace(today=lambda scene: {}, curves=lambda scene, design: columns, views=views)
+    monkeypatch.setattr(registry, "of", lambda scene: job)
+    head, table = scene_view.curves(SimpleNamespace(title="Drive"), {}, None)
     assert isinstance(table, Grid)
     return head, [float(line[0]) for line in table.lines]
 
@@ -76,17 +74,17 @@ def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
 @pytest.mark.parametrize("name", packaged.problem_names())
 def test_every_packaged_scene_is_drawn_and_its_equations_printed(name):
     scene = lo.load(name)
-    view, task = job_views.view(scene), TASKS[scene.job.name]
+    job, view = registry.of(scene), registry.of(scene).views
     drawn = view.linkage(scene, {})
-    marks = {mark for mark in task.marks(scene, task.today(scene)) if mark in LAYERS}
-    assert marks >= MARKED[scene.job.name]
+    marks = {mark for mark in view.marks(scene, job.today(scene)) if mark in LAYERS}
+    assert marks >= MARKED[scene.job]
     assert marks <= {primitive.layer for primitive in drawn.primitives}
     assert len(view.joints_csv(scene, {}).splitlines()) > 6
     printed = {equation.name for equation in view.equations(scene)}
     assert set(scene.effects) <= printed
-    assert NAMED[scene.job.name] <= printed
+    assert NAMED[scene.job] <= printed
     assert view.missing(scene) == view.remarks(scene, {}) == ()
-    columns = ("phi [rad]", *task.curves(scene, task.today(scene)))
+    columns = tuple(job.curves(scene, job.today(scene)))
     shown = {column for panel in view.panels(scene, {}, columns) for column in panel.columns}
     assert shown
     assert shown <= set(columns)
@@ -99,6 +97,6 @@ NAMED = MARKED | {"shedding": {"cam law cycloidal", "return_spring", "balance", 
 
 def test_a_job_shows_every_column_with_a_unit_unless_it_says_otherwise():
     scene = lo.load("beatup")
-    panels = job_views.view(scene).panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
+    panels = registry.of(scene).views.panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
     assert [panel.columns for panel in panels] == [("psi [rad]",), ("M3 [N*m]",)]
     assert [(panel.label, panel.unit) for panel in panels] == [("psi", "rad"), ("M3", "N*m")]

@@ -7,12 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt import api
-from loomopt.effects import BEATUP
-from loomopt.jobs import load
+from loomopt.effects import found
+from loomopt.jobs.registry import load
 from loomopt.views import layout, scene_view, terminal
 from loomopt.views.layout import Grid
 
 SCENE = load("beatup-light")
+EFFECTS = found.of("loomopt.effects.beatup")
 WORDS = st.text(st.characters(codec="ascii", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 CELLS = st.lists(WORDS, max_size=12).map(" ".join)
 GRID = Grid("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))
@@ -153,12 +154,12 @@ def test_a_scene_shows_every_number_with_its_unit():
     assert row(shown, "operation.speed") == ["operation.speed", "600", "rpm", "62.8318531", "rad/s"]
     assert row(shown, "limits.swing.min") == ["limits.swing.min", "22.9", "deg", "0.399680399", "rad"]
     assert row(shown, "effects.resistance.pulse")[1:3] == ["29.8", "deg"]
-    assert all(effect in shown for effect in BEATUP)
-    assert all(figure in shown for figure in SCENE.job.figures)
+    assert all(effect in shown for effect in EFFECTS)
+    assert all(figure in shown for figure in SCENE.schema.figures)
     assert max(map(len, shown.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("effect", sorted(set(BEATUP) - set(SCENE.effects)))
+@pytest.mark.parametrize("effect", sorted(set(EFFECTS) - set(SCENE.effects)))
 def test_equations_are_short_and_hold_only_what_is_on(effect):
     off = text(*scene_view.equations(SCENE), columns=None)
     on = text(*scene_view.equations(SCENE.with_effect(effect)), columns=None)

@@ -13,13 +13,13 @@ import pytest
 import loomopt as lo
 from loomopt import designs
 from loomopt.errors import BadInput
+from loomopt.jobs import registry
 from loomopt.jobs.shedding import cam_curves
-from loomopt.jobs.shedding import design as shedding_design
 from loomopt.jobs.shedding import drawing as shedding_drawing
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture import shapes
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
-from loomopt.views import dxf, job_views, svg
+from loomopt.views import dxf, svg
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
@@ -67,7 +67,7 @@ def plain(scene, law, theta):
 
 def drawn(scene, design, tmp_path):
     path = tmp_path / "cam.dxf"
-    dxf.write(job_views.view(scene).linkage(scene, design), path)
+    dxf.write(registry.of(scene).views.linkage(scene, design), path)
     return ezdxf.readfile(path)
 
 
@@ -126,20 +126,20 @@ def test_each_roller_touches_the_profile_and_cuts_no_sound_cam(tmp_path):
 def test_the_positions_are_the_dwells_and_the_least_cam_force():
     scene = lo.load("shedding")
     least = lo.evaluate(scene).figures["contact_angle"]
-    found = shedding_drawing.positions(cam_curves.cam(scene, {}), least)
-    assert {name: at.theta for name, at in found.items()} == {
+    found = shedding_drawing.picture(cam_curves.cam(scene, {}), least)
+    assert found.theta == {
         "near dwell": 0.0,
         "far dwell": pytest.approx(math.radians(150)),
         "least cam force": least,
     }
-    _, centre, profile, *_ = plain(scene, plain_cam.cycloidal, np.array([at.theta for at in found.values()]))
-    for at, middle, touched in zip(found.values(), centre, profile, strict=True):
-        assert at.roller == pytest.approx(tuple(middle), abs=1e-9)
-        assert at.touched == pytest.approx(tuple(touched), abs=1e-9)
+    _, centre, profile, *_ = plain(scene, plain_cam.cycloidal, np.array(list(found.theta.values())))
+    for at, middle, touched in zip(found.skeleton().joints.values(), centre, profile, strict=True):
+        assert at["C"] == pytest.approx(tuple(middle), abs=1e-9)
+        assert at["T"] == pytest.approx(tuple(touched), abs=1e-9)
 
 
 def table(scene, design):
-    text = job_views.view(scene).joints_csv(scene, design)
+    text = registry.of(scene).views.joints_csv(scene, design)
     head = [line for line in text.splitlines() if line.startswith("#")]
     return head, pd.read_csv(io.StringIO(text), comment="#", dtype=str).astype(float)
 
@@ -209,14 +209,14 @@ def test_a_freed_rise_and_a_free_law_are_drawn_as_the_design_says():
     rows = table(scene, design)[1]
     assert rows.loc[rows["X [mm]"] > 65.6 - 1e-9, "theta [deg]"].agg(["min", "max"]).tolist() == [130, 180]
     packed, flat = {"law": knots()}, designs.flat({"law": knots()})
-    assert job_views.view(scene).linkage(scene, packed) == job_views.view(scene).linkage(scene, flat)
+    assert registry.of(scene).views.linkage(scene, packed) == registry.of(scene).views.linkage(scene, flat)
     assert table(scene, packed)[1].loc[30, "X [mm]"] != table(scene, {})[1].loc[30, "X [mm]"]
 
 
 @pytest.mark.parametrize("name", PACKAGED)
 def test_no_two_texts_overlap_and_all_stand_on_the_sheet(name):
     scene = lo.load(name)
-    drawing = job_views.view(scene).linkage(scene, {})
+    drawing = registry.of(scene).views.linkage(scene, {})
     texts = [p for p in drawing.primitives if isinstance(p, Text)]
     boxes = [shapes.text_box(text, drawing.height) for text in texts]
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
@@ -231,7 +231,7 @@ def test_no_two_texts_overlap_and_all_stand_on_the_sheet(name):
 
 def test_the_svg_shows_the_profile_at_full_scale():
     scene = lo.load("shedding")
-    drawing = job_views.view(scene).linkage(scene, {})
+    drawing = registry.of(scene).views.linkage(scene, {})
     assert 'data-layer="profile"' in svg.render(drawing)
     (line,) = [p for p in drawing.primitives if isinstance(p, Line) and p.layer == "profile"]
     assert line.closed
@@ -242,7 +242,7 @@ def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
     changes, _, _ = CAMS["undercut"]
     scene = lo.load("shedding").update(changes)
     assert lo.evaluate(scene).figures["curvature_max"] > 1 / 0.020
-    drawing = job_views.view(scene).linkage(scene, {})
+    drawing = registry.of(scene).views.linkage(scene, {})
     assert any("UNDERCUT" in p.text for p in drawing.primitives if isinstance(p, Text))
 
 
@@ -256,7 +256,7 @@ def without(scene, *names):
 @pytest.mark.parametrize("names", [FOLLOWER, ("roller_radius",), ("arm", "arm_swing")])
 def test_a_scene_without_its_follower_is_refused_by_its_missing_keys(names):
     scene = without(lo.load("shedding"), *names)
-    view = job_views.view(scene)
+    view = registry.of(scene).views
     assert view.missing(scene) == tuple(name for name in FOLLOWER if name in names)
     for draw in (view.linkage, view.joints_csv):
         with pytest.raises(BadInput) as caught:
@@ -268,7 +268,7 @@ def test_a_scene_without_its_follower_is_refused_by_its_missing_keys(names):
 def test_a_follower_that_cannot_work_is_refused():
     scene = lo.load("shedding")
     with pytest.raises(BadInput, match="cannot be drawn"):
-        job_views.view(scene).linkage(scene, {"arm": 0.3})
+        registry.of(scene).views.linkage(scene, {"arm": 0.3})
 
 
 def test_tracing_a_machine_of_any_size_ends():
@@ -281,7 +281,7 @@ def test_tracing_a_machine_of_any_size_ends():
 
 def test_the_least_force_of_a_design_is_where_its_figures_say(tmp_path):
     scene, stiff = lo.load("shedding"), {"K1": 102602.609425357, "X0": 0.08}
-    angle = shedding_design.figures(scene, stiff)["contact_angle"]
+    angle = registry.of(scene).figures(scene, stiff)["contact_angle"]
     assert math.degrees(angle) == pytest.approx(88.3705853902866, abs=1e-6)
-    legend = [p.text for p in job_views.view(scene).linkage(scene, stiff).primitives if isinstance(p, Text)]
+    legend = [p.text for p in registry.of(scene).views.linkage(scene, stiff).primitives if isinstance(p, Text)]
     assert "B'' C''  least cam force, 0 N: cam at 88.37°" in legend

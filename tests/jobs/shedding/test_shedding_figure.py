@@ -7,9 +7,10 @@ import pytest
 
 import loomopt as lo
 from loomopt import tables
+from loomopt.jobs import registry
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.panels import Mark, Panel, split
-from loomopt.views import figure, job_views, outputs, scene_view
+from loomopt.views import figure, outputs, scene_view
 
 LEAST = {"K1": 102602.609425357, "X0": 0.08}
 PACKAGED = ("shedding", "shedding-static", "shedding-printed-travel")
@@ -171,7 +172,7 @@ def test_a_design_with_a_law_is_shown_by_its_own_curves():
     scene = lo.load("shedding")
     law = cycloid_like(4)
     columns = tuple(tables.curves(scene, {}).columns)
-    with_law = job_views.view(scene).panels(scene, {"law": law}, columns)
-    today = job_views.view(scene).panels(scene, {}, columns)
+    with_law = registry.of(scene).views.panels(scene, {"law": law}, columns)
+    today = registry.of(scene).views.panels(scene, {}, columns)
     assert with_law[0].points != today[0].points
     assert with_law[0].columns == today[0].columns

@@ -6,14 +6,14 @@ import re
 import pytest
 
 import loomopt as lo
+from loomopt.jobs import registry
 from loomopt.mechanisms.cam_spline import cycloid_like
-from loomopt.views import job_views
 
 SCENE = lo.load("shedding")
 
 
 def remarks(scene, design=None):
-    return job_views.view(scene).remarks(scene, design or {})
+    return registry.of(scene).views.remarks(scene, design or {})
 
 
 def narrow(**more):
