@@ -78,7 +78,7 @@ class _Sizes:
         known: Mapping[str, float],
         limited: Mapping[str, tuple[float, float]],
     ) -> None:
-        sampler = Sampler(physics, _unchanged(physics) | known, SAMPLES)
+        sampler = Sampler(physics, {**_unchanged(physics), **known}, SAMPLES)
         resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
         self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
