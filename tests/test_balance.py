@@ -6,8 +6,10 @@ import pytest
 
 from loomopt import balance, maths
 from loomopt.balance import Given, Pose
-from loomopt.effects import BEATUP
-from loomopt.schema import Load, Table
+from loomopt.effects.beatup.inertia import EFFECT as INERTIA
+from loomopt.effects.beatup.resistance import EFFECT as RESISTANCE
+from loomopt.effects.kinds import Load
+from loomopt.schema import Table
 
 POSE = Pose(phi=1.2, omega=60.0, q=-1.7, q1=0.25, q2=-0.3)
 NOTHING = Given({}, {})
@@ -19,7 +21,7 @@ def load(name, value, acts="output"):
     def force(system, pose, given, own, switch):
         return value(switch) if callable(value) else value
 
-    return Load(name, "", Table, acts, force)
+    return Load(name=name, summary="", own=Table, acts=acts, force=force)
 
 
 def given(*loads):
@@ -28,12 +30,12 @@ def given(*loads):
 
 def test_the_output_force_is_the_sum_of_output_terms_alone():
     loads = load("a", 3.0), load("b", 100.0, "drive"), load("c", -5.0)
-    assert balance.output_force(maths.FLOAT, loads, POSE, given(*loads), [0, 0, 0]) == -2.0
+    assert balance.output_force(maths.FLOAT, loads, POSE, given(*loads), {}) == -2.0
 
 
 def test_output_terms_reach_the_crank_through_q_prime_and_drive_terms_as_they_are():
     loads = load("a", 3.0), load("b", 100.0, "drive"), load("c", -5.0)
-    assert balance.crank_torque(maths.FLOAT, loads, POSE, given(*loads), [0, 0, 0]) == -2.0 * 0.25 + 100.0
+    assert balance.crank_torque(maths.FLOAT, loads, POSE, given(*loads), {}) == -2.0 * 0.25 + 100.0
 
 
 @pytest.mark.parametrize(
@@ -45,7 +47,7 @@ def test_output_terms_reach_the_crank_through_q_prime_and_drive_terms_as_they_ar
     ],
 )
 def test_absent_kinds_of_terms_are_absent_from_the_sums(loads, force, torque):
-    arguments = (maths.FLOAT, loads, POSE, given(*loads), [0] * len(loads))
+    arguments = (maths.FLOAT, loads, POSE, given(*loads), {})
     assert balance.output_force(*arguments) == force
     assert balance.crank_torque(*arguments) == torque
 
@@ -53,7 +55,7 @@ def test_absent_kinds_of_terms_are_absent_from_the_sums(loads, force, torque):
 def test_a_drive_alone_needs_no_output_motion():
     nothing_known = Pose(phi=1.2, omega=None, q=None, q1=None, q2=None)
     loads = (load("b", 7.0, "drive"),)
-    assert balance.crank_torque(maths.FLOAT, loads, nothing_known, given(*loads), [0]) == 7.0
+    assert balance.crank_torque(maths.FLOAT, loads, nothing_known, given(*loads), {}) == 7.0
 
 
 def test_each_load_is_handed_its_own_switch_and_its_own_values():
@@ -63,16 +65,15 @@ def test_each_load_is_handed_its_own_switch_and_its_own_values():
         seen.append((dict(given), dict(own), switch))
         return switch
 
-    loads = [Load(name, "", Table, "output", force) for name in ("a", "b")]
+    loads = [Load(name=name, summary="", own=Table, acts="output", force=force) for name in ("a", "b")]
     numbers = Given({"M0": 1.0}, {"a": {"x": 1.0}, "b": {"y": 2.0}})
-    assert balance.output_force(maths.FLOAT, loads, POSE, numbers, [10.0, 20.0]) == 30.0
+    assert balance.output_force(maths.FLOAT, loads, POSE, numbers, {"b": 20.0, "a": 10.0, "c": 1.0}) == 30.0
     assert seen == [({"M0": 1.0}, {"x": 1.0}, 10.0), ({"M0": 1.0}, {"y": 2.0}, 20.0)]
 
 
-def test_a_switch_too_few_is_an_error():
-    loads = load("a", 3.0), load("b", 4.0)
-    with pytest.raises(ValueError, match="shorter"):
-        balance.output_force(maths.FLOAT, loads, POSE, given(*loads), [0])
+def test_a_load_without_corners_is_handed_0_for_a_switch():
+    loads = load("a", lambda switch: switch), load("b", lambda switch: 10 + switch)
+    assert balance.output_force(maths.FLOAT, loads, POSE, given(*loads), {"b": 5.0}) == 15.0
 
 
 def test_total_adds_no_zero_of_its_own():
@@ -97,8 +98,8 @@ def test_velocity_and_acceleration_of_the_output(omega_dot, acceleration):
 
 
 def test_terms_come_in_the_order_of_the_loads_with_their_numbers():
-    loads = (BEATUP["inertia"], BEATUP["resistance"])
+    loads = (INERTIA, RESISTANCE)
     numbers = Given({"s": 0.0, "M0": 745.0, "beta": 1.2}, {"inertia": {"J4": 0.62}, "resistance": {"pulse": 0.52}})
-    found = [(each.name, term) for each, term in balance.terms(maths.FLOAT, loads, POSE, numbers, [0, 1])]
+    found = [(each.name, term) for each, term in balance.terms(maths.FLOAT, loads, POSE, numbers, {"resistance": 1})]
     assert found == [("inertia", 0.62 * -0.3 * 60.0**2), ("resistance", pytest.approx(745.0 * math.cos(0)))]
-    assert list(balance.terms(maths.FLOAT, (), POSE, NOTHING, ())) == []
+    assert list(balance.terms(maths.FLOAT, (), POSE, NOTHING, {})) == []

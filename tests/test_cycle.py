@@ -11,13 +11,16 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import cycle
-from loomopt.jobs.beatup.design import sampler
-from loomopt.schema import Load, Table
+from loomopt.jobs import registry
 
 TURN = 2 * math.pi
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
-BEATUP = lo.load("beatup")
+BEATUP = registry.load("beatup")
 corner_angles = st.floats(-10, 10)
+
+
+def sampler(scene):
+    return registry.of(scene).sampler(scene, {})
 
 
 def arc(angle, corners):
@@ -26,17 +29,12 @@ def arc(angle, corners):
     return 1.0 if (angle - begin) % TURN < (end - begin) % TURN else 0.0
 
 
-def load(name, switch=None):
-    keywords = {"switch": switch} if switch else {}
-    return Load(name, "", Table, "output", lambda *_: 0.0, **keywords)
-
-
-ARCS = (load("first", arc), load("plain"), load("second", arc))
-
-
 def split(first, second):
-    """Return the cycle of two arcs with a load without corners between them."""
-    return cycle.split(ARCS, (first, (), second))
+    """Return the cycle of two arcs with a switch without corners between them."""
+    corners = (*first, *second)
+    return cycle.split(
+        corners, ("first", "plain", "second"), lambda angle: (arc(angle, first), 0.0, arc(angle, second))
+    )
 
 
 def far_apart(angles, least=1e-6):
@@ -87,6 +85,44 @@ def test_a_node_is_an_affine_function_of_the_corners(a, b, c, d, u):
         assert min(distances) < 1e-13
 
 
+@given(corner_angles, corner_angles, corner_angles, corner_angles, st.lists(st.floats(-20, 20), min_size=1))
+@REPEATABLE
+def test_nodes_at_crank_angles_are_found_alone_and_together(a, b, c, d, angles):
+    assume(far_apart((a, b, c, d)))
+    found = split((a, b), (c, d))
+    pieces, u = found.located(np.array(angles))
+    assert np.all((u >= 0.0) & (u <= 1.0))
+    back = found.angles(pieces, u)
+    for k, angle in enumerate(angles):
+        assert math.remainder(back[k] - angle, TURN) == pytest.approx(0.0, abs=1e-13)
+        assert found.place(angle) == (pieces[k], u[k])
+
+
+def test_switches_are_read_by_name_on_one_piece_or_several():
+    found = split((0.5, 2.0), (1.0, 5.0))
+    assert found.switch(0) == {"first": 1.0, "plain": 0.0, "second": 0.0}
+    several = found.switch(np.array([0, 1, 3]))
+    assert {name: list(values) for name, values in several.items()} == {
+        "first": [1.0, 1.0, 0.0],
+        "plain": [0.0, 0.0, 0.0],
+        "second": [0.0, 1.0, 0.0],
+    }
+    assert list(found.on(("second", 1.0))) == [False, True, True, False]
+    assert list(found.on(None)) == [True] * 4
+
+
+@given(corner_angles, corner_angles, corner_angles, corner_angles)
+@REPEATABLE
+def test_pieces_begin_in_another_number_system_where_they_do_in_floats(a, b, c, d):
+    assume(far_apart((a, b, c, d)))
+    found = split((a, b), (c, d))
+    assert found.begins((a, b, c, d), math.pi) == pytest.approx(list(found.starts), rel=1e-15, abs=1e-14)
+    symbols = ca.SX.sym("corner", 4)
+    begins = ca.Function("f", [symbols], [ca.vertcat(*found.begins(ca.vertsplit(symbols), math.pi))])
+    assert np.asarray(begins([a, b, c, d])).ravel() == pytest.approx(found.starts, rel=1e-15, abs=1e-14)
+    assert cycle.split((), (), lambda angle: ()).begins((), math.pi) == [0.0, TURN]
+
+
 def test_a_corner_is_the_end_of_one_piece_and_the_start_of_the_next():
     found = split((0.5, 2.0), (1.0, 5.0))
     ends = found.angles(np.arange(4), np.ones(4))
@@ -96,7 +132,7 @@ def test_a_corner_is_the_end_of_one_piece_and_the_start_of_the_next():
 
 
 def test_without_corners_the_cycle_is_one_piece():
-    found = cycle.split((load("plain"),), ((),))
+    found = cycle.split((), ("plain",), lambda angle: (0.0,))
     assert (found.pieces, found.order) == (1, ())
     assert list(found.starts) == [0.0, TURN]
     assert found.coefficients(0, 0.25, 0) == (TURN / 4, pytest.approx([]))
@@ -131,7 +167,7 @@ def at_corners(scene, column):
 
 
 def test_curves_show_both_values_of_every_corner_and_friction_jumps_at_the_dead_centres():
-    given_ = sampler(FRICTION, {}).given.values
+    given_ = sampler(FRICTION).given.values
     front, rear = given_["beta"], math.pi + given_["beta_r"]
     half = math.radians(29.8) / 2
     found = at_corners(FRICTION, "M3 [N*m]")
@@ -146,7 +182,7 @@ def test_reed_torque_at_front_dead_centre_is_the_value_just_before_it():
     """There the Coulomb torque is any value in [−T_c, T_c]; on the way to the fell it is +T_c."""
     without, with_friction = (lo.evaluate(scene).figures["M3_fdc"] for scene in (BEATUP, FRICTION))
     assert with_friction - without == pytest.approx(2.0, rel=1e-12)
-    front = sampler(FRICTION, {}).given.values["beta"]
+    front = sampler(FRICTION).given.values["beta"]
     before, after = next(v for angle, v in at_corners(FRICTION, "M3 [N*m]").items() if abs(angle - front) < 1e-12)
     assert with_friction == pytest.approx(before, rel=1e-11)
     assert with_friction == pytest.approx(after + 4.0, rel=1e-11)
@@ -163,7 +199,7 @@ WRAPPED = {
 @pytest.mark.parametrize("name", WRAPPED)
 def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     scene = FRICTION.update(WRAPPED[name])
-    values = sampler(scene, {}).given.values
+    values = sampler(scene).given.values
     curves = lo.simulate(scene)
     phi = curves["phi [rad]"].to_numpy()
     assert (phi[0], phi[-1]) == (0.0, pytest.approx(TURN))
@@ -188,8 +224,8 @@ def test_the_narrowest_pulse_is_felt_at_front_dead_centre(scene, pulse):
     wide = lo.evaluate(scene).figures["M3_fdc"]
     narrow = scene.set("effects.resistance.pulse", f"{pulse!r} rad")
     assert lo.evaluate(narrow).figures["M3_fdc"] == pytest.approx(wide, rel=1e-12)
-    sampled = sampler(narrow, {})
-    on = sampled.cycle.switches[:, list(narrow.effects).index("resistance")] == 1.0
+    sampled = sampler(narrow)
+    on = sampled.cycle.on(("resistance", 1.0))
     assert np.sum(np.diff(sampled.cycle.starts)[on]) == pytest.approx(pulse, rel=0, abs=1e-15)
 
 

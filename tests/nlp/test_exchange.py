@@ -1,68 +1,23 @@
 """Exchange: what holds at a few angles ends up holding at all of them; levels, starts, relaxations, failures."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from waves import objective, program
 
-import loomopt as lo
-from loomopt.balance import Given
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
-from loomopt.program.program import Limit, Objective, Program, Variable
 from loomopt.program.sampling import Sampler
 from loomopt.solving.certificate import certify
 
-
-@dataclass(frozen=True)
-class Wave:
-    """A model of two numbers whose whole-cycle quantity has peaks that are known in closed form."""
-
-    loads = integrals = switched = ()
-    signed = bounded = frozenset()
-    quantities = ("wave", "circle", "sharp")
-    key = "wave"
-
-    def given(self, maths, values):
-        return Given(dict(values), {})
-
-    def corners(self, maths, given):
-        return ()
-
-    def hints(self, given):
-        return {}
-
-    def singular(self, given):
-        return ()
-
-    def implied(self, values):
-        return {}
-
-    def static(self, maths, given, front, names=None):
-        x, y = given.values["x"], given.values["y"]
-        found = {"x": x, "y": y, "sum": x + y, "bowl": (x - 3) ** 2 + (y - 2) ** 2}
-        return {name: value for name, value in found.items() if names is None or name in names}
-
-    def quantity(self, maths, given, name, phi, switches):
-        x, y = given.values["x"], given.values["y"]
-        if name == "wave":
-            return x + maths.cos(phi) + maths.cos(2 * phi) / 2
-        if name == "circle":
-            return x * maths.cos(phi) + y * maths.sin(phi)
-        return x / (1 + 400 * (1 - maths.cos(phi - y)))
-
-    def front_angle(self, given):
-        return 0.0
+BEATUP = registry.load("beatup")
 
 
-def program(limits=(), objectives=(("bowl", "value"),), start=(0.5, 0.4), box=10.0):
-    """Return a program of x and y; limits: (row, sign, value)."""
-    variables = tuple(Variable(name, -box, box, 1.0, (-box, box)) for name in "xy")
-    rows = [Limit(row, s, row, v, 1.0, "cycle" if row in Wave.quantities else "static") for row, s, v in limits]
-    levels = tuple(Objective(row, row, form, 1.0) for row, form in objectives)
-    return Program(Wave(), variables, {}, tuple(rows), levels, (dict(zip("xy", start, strict=True)),))
+def balance(scene=BEATUP):
+    return registry.of(scene).program(scene, "balance")
 
 
 def solved(task, **changes):
@@ -77,7 +32,7 @@ def highest(task, point, name):
 
 def test_the_least_peak_is_half_the_range():
     """cos φ + cos 2φ / 2 runs from −3/4 to 3/2: the best shift is −3/8, the peak 9/8."""
-    task = program(objectives=(("wave", "peak"),))
+    task = program(objectives=(objective("wave", "peak"),))
     point = solved(task)
     assert point.reached
     assert point.x["x"] == pytest.approx(-0.375, abs=1e-10)
@@ -118,7 +73,7 @@ def test_rounds_that_run_out_leave_a_violation_that_is_told():
 
 def test_an_earlier_level_is_kept_when_its_weight_is_large_enough():
     """|x − ...| first, then the bowl: its slope along x + y is 5 at the line, so a weight above 5 is exact."""
-    levels = (("sum", "magnitude"), ("bowl", "value"))
+    levels = (objective("sum", "magnitude"), objective("bowl"))
     exact, weak = (solved(program(objectives=levels), penalty=weight) for weight in (10.0, 1.0))
     assert exact.x == pytest.approx({"x": 0.5, "y": -0.5}, abs=1e-8)
     assert weak.x["x"] + weak.x["y"] > 1.0, "a weight below the multiplier buys the bowl with the first level"
@@ -155,14 +110,14 @@ def test_elastic_solves_give_the_least_sum_of_excesses(limits, needed):
 
 
 def test_a_start_that_does_not_assemble_is_told():
-    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    task = balance()
     folded = {**task.starts[0], "l1": 0.3}
     point = exchange.solve(task, folded, Settings())
     assert (point.status, point.reached) == ("Not_Assembled", False)
 
 
 def test_starts_are_the_jobs_own_then_random_ones_that_assemble():
-    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    task = balance()
     drawn = exchange.starts(task, 40, seed=7)
     assert len(drawn) == 40
     assert drawn[0] == dict(task.starts[0])
@@ -178,7 +133,7 @@ def test_starts_are_the_jobs_own_then_random_ones_that_assemble():
 
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])
 def test_a_loom_s_peak_holds_between_all_nodes(M0):
-    task = TASKS["beatup"].program(lo.load("beatup").set("operation.M0", f"{M0} N*m"), "balance")
+    task = balance(BEATUP.set("operation.M0", f"{M0} N*m"))
     point = exchange.solve(task, task.starts[0], Settings())
     assert point.reached
     sampler = sampler_at(task, point.x)
@@ -190,7 +145,7 @@ def test_a_loom_s_peak_holds_between_all_nodes(M0):
 
 
 def test_a_warm_start_from_the_answer_stays_there():
-    task = TASKS["beatup"].program(lo.load("beatup"), "balance")
+    task = balance()
     cold = exchange.solve(task, task.starts[0], Settings())
     warm = exchange.solve(task, cold.x, Settings(), warm=cold)
     assert warm.reached
@@ -200,9 +155,7 @@ def test_a_warm_start_from_the_answer_stays_there():
 
 
 def test_a_warm_start_goes_where_a_cold_one_goes_even_from_afar():
-    near, far = (
-        TASKS["beatup"].program(lo.load("beatup").set("operation.M0", f"{M0} N*m"), "balance") for M0 in (900, 620)
-    )
+    near, far = (balance(BEATUP.set("operation.M0", f"{M0} N*m")) for M0 in (900, 620))
     from_afar = exchange.solve(near, near.starts[0], Settings())
     warm, cold = (exchange.solve(far, far.starts[0], Settings(), warm=point) for point in (from_afar, None))
     assert warm.reached

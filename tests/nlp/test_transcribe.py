@@ -1,17 +1,21 @@
 """The nonlinear program is the task it was made from: the same rows, the same slopes, built once per structure."""
 
+import functools
+
 import casadi as ca
 import numpy as np
 import pytest
 
-import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt import maths
+from loomopt.cycle import TURN
+from loomopt.jobs import registry
 from loomopt.nlp import transcribe as module
 from loomopt.nlp.calls import Calls
+from loomopt.nlp.families import epigraphs, families
+from loomopt.nlp.layout import Layout
 from loomopt.nlp.point import Settings, sampler_at
-from loomopt.nlp.transcribe import Layout, families, transcribe
-from loomopt.program.sampling import Extreme
-from loomopt.solving.exact import Exact, Row
+from loomopt.nlp.transcribe import transcribe
+from loomopt.program.reading import Reading
 
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 TARGETS = ("balance", "pulse", "torque", "retrofit")
@@ -19,10 +23,10 @@ DESIGN = {"l1": 0.0311, "l2": 0.07, "l3": 0.152, "l4": 0.166, "m4e": 3.0, "r4e":
 
 
 def program_of(effects=(), target="balance", changes=()):
-    scene = lo.load("beatup")
+    scene = registry.load("beatup")
     for name in effects:
         scene = scene.with_effect(name)
-    return TASKS["beatup"].program(scene.update(dict(changes)), target)
+    return registry.of(scene).program(scene.update(dict(changes)), target)
 
 
 def put(program, elastic=False):
@@ -39,18 +43,24 @@ def put(program, elastic=False):
 
 def expected_rows(program, sampler, nodes, extra):
     """Return the rows in the order of the NLP, by plain NumPy: static limits, magnitudes, nodes of each family."""
-    static = {**sampler.given.values, **sampler.figures}
-    rows = [k.residual(static, k.value) / k.scale for k in program.limits if k.family == "static"]
-    epigraphs = [k for k, objective in enumerate(program.objectives) if objective.form != "value"]
-    for place, k in enumerate(epigraphs):
-        objective = program.objectives[k]
+    rows = [sampler.excess(limit) for limit in program.limits if limit.family == "static"]
+    for place, epigraph in enumerate(epigraphs(program)):
+        objective = program.objectives[epigraph.objective]
         if objective.form == "magnitude":
-            rows += [sign * static[objective.row] / objective.scale - extra[place] for sign in (1, -1)]
+            value = sampler.single(objective.row) / objective.scale
+            rows += [sign * value - extra[place] for sign in (1, -1)]
     for family, chosen in zip(families(program), nodes, strict=True):
-        owner = program.objectives[family.objective] if family.objective >= 0 else program.limits[family.limit]
-        bound = extra[epigraphs.index(family.objective)] if family.objective >= 0 else owner.value / owner.scale
+        owner = owner_of(program, family)
+        bound = extra[family.epigraph] if family.epigraph >= 0 else owner.value / owner.scale
         rows += [abs(e.value) / owner.scale - bound for e in chosen] + [0.0] * (6 - len(chosen))
     return np.array(rows)
+
+
+def owner_of(program, family):
+    """Return the objective or limit that a family's rows belong to."""
+    if family.epigraph >= 0:
+        return program.objectives[epigraphs(program)[family.epigraph].objective]
+    return program.limits[family.limit]
 
 
 CASES = [((), target, ()) for target in TARGETS]
@@ -77,23 +87,34 @@ def test_slopes_are_those_of_40_digits(effects, target, changes):
     program = program_of(effects, target, changes)
     nlp, arguments, sampler, nodes, _ = put(program)
     slopes = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[1])[:, : len(program.variables)]
-    x = {variable.name: DESIGN[variable.name] for variable in program.variables}
-    limits = [Row(k.name, k.scale, 1.0, limit=k) for k in program.limits if k.family == "static"]
-    exact = Exact(program, x, sampler, limits).gradients()
+    limits = [limit for limit in program.limits if limit.family == "static"]
+    exact = differences(program, sampler, lambda at: [at.excess(limit) / limit.scale for limit in limits])
     assert slopes[: len(limits)] == pytest.approx(exact, rel=1e-9, abs=1e-9)
     begin = len(slopes) - 6 * len(nodes)
     for place, (family, chosen) in enumerate(zip(families(program), nodes, strict=True)):
         ours = slopes[begin + 6 * place : begin + 6 * place + len(chosen)]
-        exact = at_nodes(program, x, sampler, family, chosen)
-        assert ours == pytest.approx(exact, rel=1e-6, abs=1e-6 * np.abs(exact).max()), "nodes stand at extremes: 1e-7"
+        size = owner_of(program, family).scale
+        exact = differences(program, sampler, functools.partial(at_nodes, family.row, size, chosen))
+        assert ours == pytest.approx(exact, rel=1e-9, abs=1e-9 * np.abs(exact).max())
 
 
-def at_nodes(program, x, sampler, family, chosen):
-    """Return the slopes of extremes, by 40 digits."""
-    owner = program.objectives[family.objective] if family.objective >= 0 else program.limits[family.limit]
-    kind = {"objective": owner} if family.objective >= 0 else {"limit": owner}
-    rows = [Row(family.row, owner.scale, float(np.sign(e.value)), node=e, **kind) for e in chosen]
-    return Exact(program, x, sampler, rows).gradients()
+def at_nodes(name, size, nodes, at):
+    return [e.sign * at.at(name, e.piece, at.maths.number(e.u)) / size for e in nodes]
+
+
+def differences(program, sampler, read):
+    """Return slopes (rows, variables, each scaled) of what `read` gives of a design, by differences at 40 digits."""
+    exact = maths.mpmath(40)
+    step = exact.number("1e-20")
+
+    def at(moved):
+        values = {name: exact.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
+        values |= {v.name: values[v.name] + v.scale * step for v in program.variables if v.name == moved}
+        return read(Reading(program.model, exact, program.model.given(exact, values), sampler.cycle, sampler.stills))
+
+    base = at("")
+    columns = [[float((a - b) / step) for a, b in zip(at(v.name), base, strict=True)] for v in program.variables]
+    return np.array(columns).T.reshape(len(base), len(program.variables))
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -156,7 +177,7 @@ def test_an_elastic_program_has_room_for_every_limit_and_no_objective():
     nlp, arguments, *_ = put(program, elastic=True)
     soft = {(limit.name, limit.sign) for limit in program.limits if limit.relaxable}
     value = ca.Function("f", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])
-    assert nlp.extras == 2 * len(soft)
+    assert nlp.structure.extras == 2 * len(soft)
     assert float(value(arguments["x0"], arguments["p"])) >= 0
     assert families(program, elastic=True) == []
 
@@ -177,10 +198,12 @@ def test_layout_gives_back_what_was_written():
 
 def test_a_node_on_a_corner_keeps_its_side():
     """Both sides of the pulse's begin are one crank angle with and without resistance."""
-    program = program_of()
-    nlp, _, sampler, *_ = put(program)
-    resistance = [load.name for load in program.model.loads].index("resistance")
-    pulse = int(np.flatnonzero(sampler.cycle.switches[:, resistance])[0])
-    before = (pulse - 1) % sampler.cycle.pieces
-    assert nlp.node(sampler, before, 1.0)[-2:] != nlp.node(sampler, pulse, 0.0)[-2:]
-    assert Extreme(before, 1.0, 0.0).u == 1.0
+    nlp, _, sampler, *_ = put(program_of())
+    node, cycle = nlp.structure.node, sampler.cycle
+    pulse = int(np.flatnonzero(cycle.on(("resistance", 1.0)))[0])
+    before = (pulse - 1) % cycle.pieces
+    one, other = node.write(cycle, before, 1.0), node.write(cycle, pulse, 0.0)
+    corners = np.mod([float(angle) for angle in sampler.model.corners(maths.FLOAT, sampler.given)], TURN)
+    angles = [node.read(row, corners).phi % TURN for row in (one, other)]
+    assert angles[0] == pytest.approx(angles[1], abs=1e-14)
+    assert [node.read(row, corners).switch["resistance"] for row in (one, other)] == [0.0, 1.0]

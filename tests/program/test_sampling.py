@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-import loomopt as lo
 from loomopt.cycle import TURN
-from loomopt.jobs.beatup.design import sampler
+from loomopt.jobs import registry
 from loomopt.program.sampling import CHUNK
 
 POINTS = 1_000_000
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
-BEATUP = lo.load("beatup")
+BEATUP = registry.load("beatup")
+JOB = registry.of(BEATUP)
 
 
 def scene(*effects, **changes):
@@ -54,7 +54,7 @@ def vertex(values, k):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_peak_is_that_of_a_scan_of_a_million_points(name):
-    sampled = sampler(SCENES[name], {})
+    sampled = JOB.sampler(SCENES[name], {})
     for quantity in sampled.model.quantities:
         pieces = list(scanned(sampled, quantity))
         highest = max(values.max() for values in pieces)
@@ -69,14 +69,14 @@ def test_peaks_of_other_machines_too_down_to_transmission_angles_of_a_few_degree
         l1 = rng.uniform(0.05, 0.6)
         total, difference = (1 + l1) * (1 + 10 ** rng.uniform(-2.5, 0.2)), rng.uniform(-0.97, 0.97) * (1 - l1)
         ratios = (l1, (total + difference) / 2, (total - difference) / 2, 1.0)
-        sampled = sampler(every, {f"l{k + 1}": float(0.167 * ratio) for k, ratio in enumerate(ratios)})
+        sampled = JOB.sampler(every, {f"l{k + 1}": float(0.167 * ratio) for k, ratio in enumerate(ratios)})
         best = max(vertex(values, int(values.argmax())) for values in scanned(sampled, "peak_torque"))
         assert sampled.peak("peak_torque") == pytest.approx(best, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", ["the paper's", "every effect", "friction above all", "long crank"])
 def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
-    sampled = sampler(SCENES[name], {})
+    sampled = JOB.sampler(SCENES[name], {})
     found = sampled.extremes("peak_torque")
     assert [abs(e.value) for e in found] == sorted((abs(e.value) for e in found), reverse=True)
     for piece, values in enumerate(scanned(sampled, "peak_torque")):
@@ -92,7 +92,7 @@ def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
 
 def test_an_extreme_may_stand_on_one_side_of_a_corner():
     """A Coulomb torque that outweighs all else: |M3| jumps at the dead centres, where one side has the peak."""
-    sampled = sampler(SCENES["friction above all"], {})
+    sampled = JOB.sampler(SCENES["friction above all"], {})
     found = sampled.extremes("M3_square")[0]
     assert found.u in (0.0, 1.0)
     M3 = math.sqrt(max(values.max() for values in scanned(sampled, "M3_square")))
@@ -101,11 +101,10 @@ def test_an_extreme_may_stand_on_one_side_of_a_corner():
 
 @pytest.mark.parametrize("pulse", ["29.8 deg", "0.05 deg", "200 deg"])
 def test_the_mean_over_the_pulse_is_that_of_a_dense_rule(pulse):
-    sampled = sampler(scene("bearing_friction", effects__resistance__pulse=pulse), {})
+    sampled = JOB.sampler(scene("bearing_friction", effects__resistance__pulse=pulse), {})
     integral = sampled.model.integrals[0]
     assert (integral.name, integral.root) == ("pulse_mean_square", "pulse_rms")
-    place = list(BEATUP.effects).index("resistance")
-    on = np.flatnonzero(sampled.cycle.switches[:, place] == 1.0)
+    on = np.flatnonzero(sampled.cycle.on(("resistance", 1.0)))
     total = width = 0.0
     for piece in on:
         u = np.linspace(0, 1, 20_001)
@@ -119,7 +118,7 @@ def test_the_mean_over_the_pulse_is_that_of_a_dense_rule(pulse):
 
 
 def test_values_do_not_depend_on_how_many_are_asked_for_at_once():
-    sampled = sampler(SCENES["every effect"], {})
+    sampled = JOB.sampler(SCENES["every effect"], {})
     rng = np.random.default_rng(0)
     u = rng.random(2 * CHUNK + 7)
     pieces = rng.integers(0, sampled.cycle.pieces, u.shape)
@@ -130,7 +129,7 @@ def test_values_do_not_depend_on_how_many_are_asked_for_at_once():
 
 
 def test_the_grid_holds_both_ends_of_every_piece_and_enough_points_of_the_narrowest():
-    sampled = sampler(SCENES["narrow pulse"], {})
+    sampled = JOB.sampler(SCENES["narrow pulse"], {})
     pieces, u = sampled.grid(720)
     for piece in range(sampled.cycle.pieces):
         own = u[pieces == piece]
@@ -141,5 +140,5 @@ def test_the_grid_holds_both_ends_of_every_piece_and_enough_points_of_the_narrow
 
 def test_a_quantity_that_is_zero_everywhere_has_a_peak_of_zero():
     balanced = scene("centrifugal", mechanism__r4="0 mm")
-    assert sampler(balanced, {}).peak("bearing_force") == 0.0
-    assert lo.evaluate(balanced).figures["shaking_force"] == 0.0
+    assert JOB.sampler(balanced, {}).peak("bearing_force") == 0.0
+    assert JOB.figures(balanced, JOB.today(balanced))["shaking_force"] == 0.0
