@@ -9,10 +9,10 @@ import pytest
 
 from loomopt import packaged
 from loomopt.errors import BadInput
-from loomopt.jobs import load, scene
+from loomopt.jobs.registry import load, scene
 
 BEATUP = load("beatup")
-TEXT = packaged.problem_path("beatup").read_text(encoding="utf-8")
+TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")
 REMOVED = object()
 
 
@@ -165,7 +165,8 @@ CHANGES = [
     ("set", ("effects.gravity.angle", "5 deg"), "effects.gravity.angle", 'unknown key "angle"', "tilt"),
     ("set", ("effects.wind.speed", "5 m/s"), "effects.wind", 'unknown effect "wind"', "inertia"),
     ("set", ("targets.torque", "5"), "targets.torque", "not a table", "[targets.torque]"),
-    ("set", ("problem.job", "rapier"), "problem.job", 'unknown job "rapier"', "beatup"),
+    ("set", ("problem.job", "rapir"), "problem.job", 'unknown job "rapir"', '"rapier"'),
+    ("set", ("problem.job", "rapier"), "operation.M0", 'unknown key "M0"', "stroke"),
     ("set", ("mechanism.l4", "600 mm"), "mechanism.l1, l2, l3, l4", "not a crank-rocker", "shortest"),
     ("with_effect", ("gravty",), "effects", 'unknown effect "gravty"', '"gravity"'),
     ("without_effect", ("resist",), "effects", 'unknown effect "resist"', '"resistance"'),

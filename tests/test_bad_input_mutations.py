@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from loomopt import packaged
 from loomopt.errors import BadInput
-from loomopt.jobs import load, scene
+from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 
 BEATUP = load("beatup")
-TEXT = packaged.problem_path("beatup").read_text(encoding="utf-8")
+TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")
 
 
 SCALARS = st.one_of(
@@ -74,7 +74,7 @@ def read_or_refused(call, *arguments):
         return
     assert isinstance(found, Scene)
     assert len(found.hash) == 12
-    for name, kind in found.job.variables.items():
+    for name, kind in found.schema.variables.items():
         assert found.unit(name, kind)
     assert all(math.isfinite(value) for value in found.mechanism.values())
 

@@ -7,8 +7,9 @@ import re
 import pytest
 
 from loomopt.cli import run
-from loomopt.jobs.template import BEATUP_TEMPLATE
+from loomopt.jobs import registry
 
+TEMPLATE = registry.template("beatup")
 CRANK = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 
 # command line, ~ for a space in a value -> what the line on stderr must say: file, key, value, what to do
@@ -97,9 +98,9 @@ def place(tmp_path, monkeypatch):
     (tmp_path / "latin.toml").write_bytes("title = 'für Gewebe'".encode("cp1252"))
     texts = {
         "broken.toml": "l1 = ",
-        "bare.toml": re.sub(r"(?ms)^\[available\.gravity\].*?(?=^\[)", "", BEATUP_TEMPLATE),
-        "comma.toml": BEATUP_TEMPLATE.replace('"31 mm"', '"31,5 mm"'),
-        "swapped.toml": BEATUP_TEMPLATE.replace('"31 mm"', '"310 mm"'),
+        "bare.toml": re.sub(r"(?ms)^\[available\.gravity\].*?(?=^\[)", "", TEMPLATE),
+        "comma.toml": TEMPLATE.replace('"31 mm"', '"31,5 mm"'),
+        "swapped.toml": TEMPLATE.replace('"31 mm"', '"310 mm"'),
         "full.json": "here already",
         "key.json": json.dumps(CRANK | {"l9": 1.0}),
         "text.json": json.dumps(CRANK | {"l1": "31 mm"}),

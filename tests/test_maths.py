@@ -254,7 +254,9 @@ FORBIDDEN_NAMES = {
 }
 NOT_FORMULAS = {"synthesise", "curves"}
 """Parts of crank_rocker.py that talk to people or fill arrays: they run on plain floats only."""
-EFFECT_FILES = sorted(p.name for p in (PACKAGE / "effects").glob("*.py") if p.name != "__init__.py")
+EFFECT_FILES = sorted(
+    f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"
+)
 
 
 def offences(node):
@@ -282,7 +284,7 @@ def read(*path):
 
 
 def without_structure(node):
-    """Return a function with its `if X is None: return Y` taken out: those ask how the scene is built."""
+    """Return a function without what asks how the scene is built: `if X is None: return`, `A if X == "word" else B`."""
 
     class Structure(ast.NodeTransformer):
         def visit_If(self, found):
@@ -290,7 +292,19 @@ def without_structure(node):
             structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is)
             return found.body if structural and ast.unparse(test.comparators[0]) == "None" else found
 
+        def visit_IfExp(self, found):
+            test = found.test
+            structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Eq)
+            word = structural and isinstance(getattr(test.comparators[0], "value", None), str)
+            return ast.Tuple([found.body, found.orelse], ast.Load()) if word else found
+
     return Structure().visit(node)
+
+
+def test_what_asks_how_the_scene_is_built_is_no_offence_and_what_asks_a_number_is():
+    assert not offences(without_structure(ast.parse('f(x) if own["shape"] == "linear" else ()')))
+    for formula in ("x if y == 0 else 0", 'abs(x) if own["shape"] == "linear" else 0'):
+        assert offences(without_structure(ast.parse(formula)))
 
 
 @pytest.mark.parametrize(

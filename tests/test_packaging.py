@@ -1,5 +1,6 @@
 """The package as it is handed over: what is in the wheel, that it works elsewhere, and a tidy repository."""
 
+import ast
 import email.parser
 import importlib.util
 import json
@@ -15,7 +16,8 @@ import pytest
 
 import loomopt
 from loomopt import packaged
-from loomopt.jobs import load
+from loomopt.errors import BadInput
+from loomopt.jobs.registry import load
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -80,14 +82,22 @@ def test_the_project_says_what_the_package_is():
     assert (ROOT / "LICENSE").is_file()
 
 
+def imported(tree):
+    """Yield the packages that code imports, those that it imports by name too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+            yield from (each.value for each in node.args if isinstance(each, ast.Constant))
+
+
 def test_every_package_the_code_imports_is_a_declared_dependency():
     declared = {re.split(r"[<>=\[; ]", entry)[0].replace("-", "_") for entry in PROJECT["project"]["dependencies"]}
-    used = set()
-    for path in (ROOT / "loomopt").rglob("*.py"):
-        names = re.findall(
-            r"^\s*(?:from|import) (\w+)|import_module\(\"(\w+)\"", path.read_text(encoding="utf-8"), re.M
-        )
-        used |= {first or second for first, second in names}
+    code = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "loomopt").rglob("*.py")]
+    used = {name.split(".")[0] for tree in code for name in imported(tree)}
+    assert used >= {"casadi", "flint", "matplotlib", "pydantic"}
     outside = used - set(sys.stdlib_module_names) - {"loomopt"}
     named = {"flint": "python_flint"}
     assert {named.get(name, name) for name in outside} - {"pydantic_core"} <= declared
@@ -143,14 +153,18 @@ def test_the_installed_command_works_from_any_folder(installed, tmp_path):
 
 def test_packaged_scenes_are_found_by_name_and_paths_stay_paths(tmp_path, monkeypatch):
     assert packaged.problem_names() == sorted(path.stem for path in (ROOT / "problems").glob("*.toml"))
+    assert {name: path.name for name, path in packaged.problems().items()}["beatup"] == "beatup.toml"
     monkeypatch.chdir(tmp_path)
     (tmp_path / "beatup").mkdir()
     (tmp_path / "beatup.toml").write_text("")
-    assert packaged.locate("beatup") == packaged.problem_path("beatup")
-    assert packaged.locate("beatup.toml") == Path("beatup.toml")
-    assert packaged.locate("./beatup") == Path("beatup")
-    assert packaged.locate(tmp_path / "beatup") == tmp_path / "beatup"
+    assert not packaged.is_path("beatup")
+    assert packaged.is_path("beatup.toml")
+    assert packaged.is_path("./beatup")
+    assert packaged.is_path(tmp_path / "beatup")
     assert load("beatup").name == "beatup"
+    for path, problem in (("beatup.toml", "problem"), ("./beatup", "folder"), (tmp_path / "beatup", "folder")):
+        with pytest.raises(BadInput, match=problem):
+            load(path)
 
 
 def test_no_tracked_file_speaks_of_a_machine_or_a_registry():
