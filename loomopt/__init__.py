@@ -1,7 +1,7 @@
 """loomopt: optimal design of weaving-loom mechanisms, certified.
 
 >>> import loomopt as lo
->>> answer = lo.solve(lo.load("beatup"), target="balance")
+>>> answer = lo.solve(lo.load("beatup-light"), target="balance")
 """
 
 import importlib

@@ -106,7 +106,7 @@ class Cycle:
 
 
 def split(corners: Sequence[float], names: Sequence[str], read: Callable[[float], Sequence[float]]) -> Cycle:
-    """Return the cycle's pieces from the corners declared, rad; read(angle): the switches at a crank angle inside one."""
+    """Return the cycle's pieces from the corners declared, rad; read(angle): the switches at an angle inside one."""
     if not corners:
         starts = np.array([0.0, TURN])
         return Cycle(starts, tuple(names), _switches(starts, read), ())

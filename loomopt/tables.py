@@ -1,13 +1,13 @@
 """Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
 
-import datetime
 import functools
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.program import sparse_curves
+from loomopt.provenance import csv as csv
+from loomopt.provenance import provenance as provenance
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -15,18 +15,6 @@ from loomopt.units import factor
 
 if TYPE_CHECKING:
     import pandas as pd
-
-VERSIONED = ("loomopt", "casadi", "numpy")
-
-
-def provenance(scene: Scene, **more: object) -> dict[str, str]:
-    """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
-    import importlib.metadata
-
-    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
-    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
-    told = {name: str(value) for name, value in more.items()}
-    return {"scene": scene.name, "scene_hash": scene.hash, **told, **versions, "date": today}
 
 
 def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
@@ -60,7 +48,7 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
     return found
 
 
-def curves(scene: Scene, design: Mapping[str, float], accuracy: float | None = None) -> "pd.DataFrame":
+def curves(scene: Scene, design: designs.Design, accuracy: float | None = None) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
@@ -78,9 +66,3 @@ def curves(scene: Scene, design: Mapping[str, float], accuracy: float | None = N
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame
-
-
-def csv(frame: "pd.DataFrame") -> str:
-    """Return a table as CSV text, its provenance in comment lines before the header; digits round-trip."""
-    head = "".join(f"# {name}: {value}\n" for name, value in frame.attrs.items())
-    return head + str(frame.to_csv(index=frame.index.name is not None, lineterminator="\n"))

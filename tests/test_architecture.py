@@ -1,28 +1,32 @@
-"""Imports run upward only; CasADi stays in its rooms; every effect is registered and tested."""
+"""Imports run one way, without a circle; a job and an effect are known by name in their own files only."""
 
 import ast
-import importlib
 import re
 from pathlib import Path
 
 import pytest
 
 import loomopt
-from loomopt import effects
+from loomopt.effects import found
+from loomopt.jobs import registry
 
 PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
+JOBS = registry.own_names()
 
 ROOMS = (
-    "maths errors frozen",
+    "maths errors frozen tolerances",
     "units",
     "quantities",
-    "schema store",
+    "schema files",
     "mechanisms",
     "effects",
-    "scene_errors",
+    "scene_errors owned scene_schema",
     "scene_document scene_tables packaged",
     "scenes balance cycle designs",
+    "scene_csv",
+    "program",
+    "picture",
     "jobs",
     "nlp",
     "solving",
@@ -33,32 +37,46 @@ ROOMS = (
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}
+IN_A_JOB = {"__init__", "job", "scene", "model", "program", "design", "equations", "drawing", "views"}
+"""The files that every job's folder has, beside template.toml."""
+LONGEST_FILE, LONGEST_FUNCTION, MEDIAN_FILE, JOBS_TOGETHER = 350, 50, 150, 3900
+MOST_ANY = 60
+"""Annotations `Any` outside maths.Number: raw TOML, and libraries without types."""
 
 
-def modules():
+def modules(folder=PACKAGE):
     """Return every module's name in the package with its file."""
-    return {".".join(path.relative_to(PACKAGE).with_suffix("").parts): path for path in PACKAGE.rglob("*.py")}
+    return {".".join(path.relative_to(folder).with_suffix("").parts): path for path in folder.rglob("*.py")}
 
 
 def room(name):
     return name.split(".")[0]
 
 
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def for_types(tree):
+    """Return the nodes that stand under `if TYPE_CHECKING`: no imports at run time."""
+    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    return {id(node) for block in blocks for inner in block.body for node in ast.walk(inner)}
+
+
 def imports(source):
-    """Return the loomopt modules that source imports, inside functions too, with the line of each."""
-    found = []
-    for node in ast.walk(ast.parse(source)):
+    """Return the loomopt modules that source imports at run time, inside functions too, with the line of each."""
+    tree, names = ast.parse(source), []
+    apart = for_types(tree)
+    for node in (node for node in ast.walk(tree) if id(node) not in apart):
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            names += [(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"line {node.lineno}: imports name the whole path"
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            names += [(f"{node.module}.{alias.name}", node.lineno) for alias in node.names]
         elif isinstance(node, ast.Constant) and re.fullmatch(r"loomopt(\.\w+)+", str(node.value)):
-            names = [node.value]
-        else:
-            continue
-        found += [(name.removeprefix("loomopt."), node.lineno) for name in names if name.startswith("loomopt.")]
-    return [(name, line) for name, line in found if room(name) in FLOOR]
+            names.append((node.value, node.lineno))
+    inner = [(name.removeprefix("loomopt."), line) for name, line in names if name.startswith("loomopt.")]
+    return [(name, line) for name, line in inner if room(name) in FLOOR]
 
 
 def climbing(name, source):
@@ -73,13 +91,8 @@ def test_every_module_has_a_room():
 
 
 def test_imports_run_upward_only():
-    broken = [
-        line
-        for name, path in modules().items()
-        if name != "__init__"
-        for line in climbing(name, path.read_text(encoding="utf-8"))
-    ]
-    assert broken == []
+    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items() if name != "__init__"}
+    assert [line for name, source in sources.items() for line in climbing(name, source)] == []
 
 
 @pytest.mark.parametrize(
@@ -92,18 +105,69 @@ def test_imports_run_upward_only():
     ],
 )
 def test_an_import_from_above_is_found(source):
-    assert len(climbing("jobs.beatup", source)) == 1
+    assert len(climbing("jobs.beatup.model", source)) == 1
 
 
 def test_imports_of_a_module_below_or_beside_are_allowed():
-    assert climbing("jobs.beatup", "from loomopt.jobs import sampling\nfrom loomopt.errors import BadInput") == []
+    below = "from loomopt.program import sampling\nfrom loomopt.errors import BadInput"
+    for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.views import svg"
+    assert climbing("jobs.beatup.model", below) == climbing("jobs.beatup.model", for_reading) == []
 
 
-def test_views_never_solve():
+def arrows():
+    """Return every module with the modules it imports at run time."""
+    known = {name.removesuffix(".__init__"): path for name, path in modules().items()}
+    found_ = {}
+    for name, path in known.items():
+        named = [other for other, _ in imports(path.read_text(encoding="utf-8"))]
+        homes = {other if other in known else other.rpartition(".")[0] for other in named}
+        found_[name] = {home for home in homes if home in known and home != name and known[home].stem != "__init__"}
+    return found_
+
+
+def test_no_file_reaches_itself():
+    graph = arrows()
+
+    def reached(start):
+        seen, todo = set(), [start]
+        while todo:
+            new = graph[todo.pop()] - seen
+            seen |= new
+            todo += new
+        return seen
+
+    assert [name for name in graph if name in reached(name)] == []
+
+
+def test_views_never_solve_and_know_no_job():
     for name, path in modules().items():
         if room(name) == "views":
-            taken = {other for other, _ in imports(path.read_text(encoding="utf-8"))}
+            source = path.read_text(encoding="utf-8")
+            taken = {other for other, _ in imports(source)}
             assert not {other for other in taken if other.startswith(("nlp", "solving.engine"))}, name
+            assert not {other for other in taken if re.match(rf"jobs\.({'|'.join(JOBS)})\b", other)}, name
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_a_job_is_named_in_its_own_files_only(job):
+    word = re.compile(rf"loomopt\.jobs\.{job}\b|[\"']{job}[\"']")
+    strangers = [n for n, path in modules().items() if job not in path.parts and word.search(path.read_text("utf-8"))]
+    assert strangers == []
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job):
+    for name in found.of(f"loomopt.effects.{job}"):
+        word = re.compile(rf"[\"']{name}[\"']")
+        strangers = [n for n, path in modules().items() if word.search(path.read_text("utf-8"))]
+        assert set(strangers) <= {*(n for n in modules() if room(n) == "effects"), *(f"jobs.{j}.scene" for j in JOBS)}
+
+
+def test_jobs_have_the_same_files():
+    for job in JOBS:
+        folder = PACKAGE / "jobs" / job
+        assert {path.stem for path in folder.glob("*.py")} == IN_A_JOB, job
+        assert (folder / "template.toml").is_file()
 
 
 def mentions_casadi(source):
@@ -124,20 +188,62 @@ def test_only_maths_and_the_solver_rooms_use_casadi():
     assert mentions_casadi("def f():\n    import casadi as ca")
 
 
-def test_every_effect_file_is_registered_once():
-    files = {name.split(".")[1] for name in modules() if name.startswith("effects.")} - {"__init__"}
-    declared = [importlib.import_module(f"loomopt.effects.{name}").EFFECT for name in sorted(files)]
-    registered = [effect for table in vars(effects).values() if isinstance(table, dict) for effect in table.values()]
-    for effect in declared:
-        assert registered.count(effect) == 1, f"{effect.name} is not in one table of loomopt.effects"
+def test_every_effect_is_in_a_file_of_its_name():
+    files = {job: {p.stem for p in (PACKAGE / "effects" / job).glob("*.py")} - {"__init__"} for job in JOBS}
+    assert files == {job: set(found.of(f"loomopt.effects.{job}")) for job in JOBS}
 
 
-def test_every_registered_effect_has_a_test_of_its_own():
-    written = "".join(path.read_text(encoding="utf-8") for path in (TESTS / "effects").glob("test_*.py"))
-    for name in effects.BEATUP:
-        assert re.search(rf"\b{name}\b", written), f"no test in tests/effects speaks of {name}"
+def test_ranks_of_a_jobs_effects_differ():
+    for job in JOBS:
+        ranks = [effect.rank for effect in found.of(f"loomopt.effects.{job}").values()]
+        assert len(set(ranks)) == len(ranks), job
 
 
-def test_files_end_naturally():
-    long = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in modules().items()}
-    assert {name: lines for name, lines in long.items() if lines > 320} == {}
+def test_rows_are_read_in_one_place_and_names_are_never_parted():
+    for name, path in modules().items():
+        source = path.read_text(encoding="utf-8")
+        if room(name) != "program":
+            assert ".residual(" not in source, name
+        if room(name) in {"program", "jobs", "nlp", "solving", "studies", "tables", "views"}:
+            assert not re.search(r"r?(partition|split)\(\"\.\"", source), name
+
+
+def lines_of(path):
+    return len(path.read_text(encoding="utf-8").splitlines())
+
+
+def bodies():
+    """Yield every function of the package with its lines, its documentation apart."""
+    for name, path in modules().items():
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.FunctionDef):
+                doc = ast.get_docstring(node, clean=False)
+                yield f"{name}.{node.name}", node.end_lineno - node.lineno - (doc.count("\n") + 1 if doc else 0)
+
+
+def test_files_and_functions_end_naturally():
+    lengths = {name: lines_of(path) for name, path in modules().items()}
+    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
+    assert sorted(lengths.values())[len(lengths) // 2] <= MEDIAN_FILE
+    assert {name: lines for name, lines in bodies() if lines > LONGEST_FUNCTION} == {}
+
+
+def test_jobs_are_small():
+    assert sum(lines_of(path) for job in JOBS for path in (PACKAGE / "jobs" / job).glob("*.py")) <= JOBS_TOGETHER
+
+
+def anything(path):
+    """Return the lines of a file where a parameter, a field or a result is annotated with Any itself."""
+    spots = []
+    for node in ast.walk(parsed(path)):
+        notes = [node.annotation] if isinstance(node, ast.arg | ast.AnnAssign) else []
+        notes += [node.returns] if isinstance(node, ast.FunctionDef) else []
+        spots += [note.lineno for note in notes if isinstance(note, ast.Name) and note.id == "Any"]
+    return spots
+
+
+def test_types_say_what_they_are():
+    spots = {name: len(anything(path)) for name, path in modules().items() if anything(path)}
+    assert sum(spots.values()) <= MOST_ANY, spots
+    scenes = [name for name, path in modules().items() if re.search(r"\bscene: Any\b", path.read_text("utf-8"))]
+    assert scenes == []

@@ -2,6 +2,7 @@
 
 import abc
 import importlib
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -66,7 +67,7 @@ class Job(abc.ABC):
     @property
     def package(self) -> str:
         """The package of the job's own files."""
-        return type(self).__module__.rpartition(".")[0]
+        return str(sys.modules[type(self).__module__].__package__)
 
     @property
     def views(self) -> JobViews:

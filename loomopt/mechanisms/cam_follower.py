@@ -9,9 +9,16 @@ arm l is pivoted at the distance a from the cam's axis. Seen along the arm the c
 import functools
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,31 @@ class Contact:
     def profile_curvature(self) -> Number:
         """Signed curvature of the cam's surface, 1/m; the surface is undercut where curvature × roller radius ≥ 1."""
         return self.curvature / (1 - self.curvature * self.follower.roller_radius)
+
+
+@dataclass(frozen=True)
+class Stations:
+    """What the workshop needs at n cam angles: theta, rad, as the sampler counts them; X, m, and the contact there."""
+
+    theta: "Floats"
+    X: "Floats"
+    contact: Contact
+
+    @property
+    def pitch(self) -> "Floats":
+        """The roller's centre in the cam's frame, (n, 2) m."""
+        return _points(self.contact.centre(self.theta))
+
+    @property
+    def profile(self) -> "Floats":
+        """The cam's surface under the roller, (n, 2) m."""
+        return _points(self.contact.profile(self.theta))
+
+
+def _points(points: Vector) -> "Floats":
+    import numpy as np
+
+    return np.column_stack((points.x, points.y))
 
 
 def fault(follower: Follower) -> str:

@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from loomopt import maths
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 
 EPS = 2.0**-52
@@ -220,7 +220,7 @@ thetas = st.one_of(st.just(0.0), st.floats(-0.3, 0.3), st.floats(-16, -2).map(la
 def test_synthesis_gives_the_angles_it_was_asked_for(theta, beta, swing, l4):
     """Next to a change point every angle grows without bound with the lengths' last digit: 2 % of the frame from it."""
     try:
-        lengths = crank_rocker.synthesise(theta, beta, swing, l4)
+        lengths = crank_rocker_synthesis.synthesise(theta, beta, swing, l4)
     except ValueError:
         assume(False)
     assume(min(crank_rocker.assembly_margins(lengths).values()) > 0.02 * l4)
@@ -233,7 +233,7 @@ def test_synthesis_gives_the_angles_it_was_asked_for(theta, beta, swing, l4):
 def test_synthesis_gives_what_was_asked_for_or_refuses(theta, beta, swing):
     """Far from any loom too: never another linkage in silence."""
     try:
-        lengths = crank_rocker.synthesise(theta, beta, swing, 1.0)
+        lengths = crank_rocker_synthesis.synthesise(theta, beta, swing, 1.0)
     except ValueError:
         return
     centres = dead_centres(maths.FLOAT, lengths)
@@ -248,7 +248,7 @@ def test_synthesis_is_the_papers_eq_13_to_15_with_l1_plus_l2(theta, beta):
     l1 = -half * MP.cos(sweep / 2 + beta) / MP.sin((sweep - swing) / 2)
     l2 = half * MP.sin(sweep / 2 + beta) / MP.cos((sweep - swing) / 2)
     l3 = MP.sqrt((l1 + l2) ** 2 - 2 * (l1 + l2) * MP.cos(beta) + 1)
-    found = crank_rocker.synthesis(maths.FLOAT, float(theta), float(beta), float(swing))
+    found = crank_rocker_synthesis.synthesis(maths.FLOAT, float(theta), float(beta), float(swing))
     assert found == pytest.approx([float(l1), float(l2), float(l3)], rel=1e-14)
 
 
@@ -266,7 +266,7 @@ def test_synthesis_is_the_papers_eq_13_to_15_with_l1_plus_l2(theta, beta):
 def test_synthesis_refuses_angles_of_no_crank_rocker(theta, beta, swing):
     """A length below zero, no assembly, a change point, no swing, a swing of −θ, a rear dead centre below AD."""
     with pytest.raises(ValueError, match="no crank-rocker has these angles"):
-        crank_rocker.synthesise(theta, beta, swing, 1.0)
+        crank_rocker_synthesis.synthesise(theta, beta, swing, 1.0)
 
 
 @given(linkages(), angles, st.integers(-20, 20))

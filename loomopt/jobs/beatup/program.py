@@ -47,7 +47,7 @@ def program(scene: Scene, target: str) -> Program:
     known = numbers(scene)
     limited = scene_numbers.bounds(scene, known)
     physics = model(scene, known, target)
-    sizes = _Sizes(physics, scene, known, limited)
+    sizes = _Sizes(model(scene, known), scene, known, limited)
     direct = _reads_counterweight(scene, target, limited)
     variables = _variables(scene, sizes, limited, direct)
     demand_figures(scene, physics, ROWS, "Take the limit off, or add what {name} needs.")
@@ -78,7 +78,7 @@ class _Sizes:
         known: Mapping[str, float],
         limited: Mapping[str, tuple[float, float]],
     ) -> None:
-        sampler = Sampler(physics, {**_unchanged(physics), **known}, SAMPLES)
+        sampler = Sampler(physics, known, SAMPLES)
         resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
         self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
@@ -105,13 +105,6 @@ class _Sizes:
         kind = self.scene.schema.figures[name].kind
         fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
         return fixed.get(kind) or abs(self.sampler.static[name]) or 1.0
-
-
-def _unchanged(physics: JobModel) -> dict[str, float]:
-    """Return values of the retrofit's norm for which nothing has changed: sizes do not depend on it."""
-    asked = physics.has_row("change")
-    parts = {"today": 0.0, "width": 1.0, "weight": 0.0}
-    return {f"{part}.{name}": value for name in VARIABLES for part, value in parts.items()} if asked else {}
 
 
 def _reed(sampler: Sampler) -> list[float]:

@@ -102,10 +102,8 @@ class Shedding(Job):
 
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: least springs, the cam force, and what a free law tends to."""
-        from loomopt.jobs.shedding.limit_law import FAMILY
-
         peaks = {"contact_max": ("cam_force", False)}
-        return Studied(("stiffness", "law"), peaks, motion="X_2", family=FAMILY)
+        return Studied(("stiffness", "law"), peaks, motion="X_2", family=designs.FAMILY)
 
 
 JOB = Shedding()

@@ -4,14 +4,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from loomopt import maths
+from loomopt.cycle import Floats
 from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.design import CYCLE
-from loomopt.jobs.shedding.model import FOLLOWER, law_rows
+from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen
-from loomopt.jobs.shedding.sizes import Sizes
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
 from loomopt.owned import owned
@@ -28,6 +31,9 @@ SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
 """A start's stiffness over the least that keeps contact at today's law and preload."""
+LEAST_STRETCH = 1e-3
+"""Share of the largest elongation below which a spring is as good as slack."""
+MEGA = 1e6
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -93,7 +99,7 @@ class _Task:
         self.limited = scene_numbers.bounds(scene, self.known)
         self.sampler = Sampler(self.physics, self.known)
         most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
-        self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
+        self.sizes = _Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
         needed = {key for effect in scene.active for key in effect.needs}
         self.kept = ["travel", *(["speed"] if SPEED in needed else [])]
         self.checks = [effect for effect in scene.active if isinstance(effect, Check)]
@@ -269,3 +275,41 @@ class _Task:
         found += [Limit(row, -1, row, 0.0, 1.0, "static", **firm) for row in slopes if row in rows]  # type: ignore[arg-type]
         peaks = [f"law_{side}_{k}" for side in ("push", "pull") for k in knots]
         return found + [Limit("law_acceleration", 1, row, most, most, "static") for row in peaks if row in rows]
+
+
+class _Sizes:
+    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
+
+    sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
+    """
+
+    def __init__(self, sampler: Sampler, stretch: float, most: float) -> None:
+        self.sampler = sampler
+        given = sampler.given
+        pieces, u = sampler.grid()
+        at = sampler.model.instant(maths.numpy(), given, sampler.node(pieces, u))
+        acting = {name: term for name, term in at.terms().items() if name != RETURN_SPRING.name}
+        parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for term in acting.values()]
+        self.travelled: Floats = np.asarray(at.pose.q, dtype=float)
+        self.others: Floats = np.sum(parts, axis=0) if parts else np.zeros(u.shape)
+        least = float(given.values.get("N_min", 0.0))
+        self.force = float(np.sum(np.abs(parts), axis=0).max() if parts else 0.0) + least or 1.0
+        self.stretch = stretch
+        preload = stretch - float(given.values["travel"])
+        self.needed = self.stiffness_for(least, preload) or (self.force / stretch if stretch > 0.0 else 1.0)
+        self.stiffness = min(self.needed, most) or self.needed
+
+    def stiffness_for(self, least: float, preload: float) -> float:
+        """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
+        elongated = np.maximum(self.travelled + preload, min(LEAST_STRETCH * self.stretch, preload) or LEAST_STRETCH)
+        return float(max(0.0, np.max((least - self.others) / elongated)))
+
+    def figure(self, name: str, quantity: str, value: float) -> float:
+        """Return the size of a figure over the cycle."""
+        if name.startswith("contact"):
+            return self.force
+        return abs(value) or abs(self.sampler.peak(quantity)) or 1.0
+
+    def margin(self, kind: str) -> float:
+        """Return what a check's margins of a kind are measured by; 0 where nothing of the frame says."""
+        return {"stiffness": self.stiffness, "pressure": 100 * MEGA, "force": self.force}.get(kind, 0.0)

@@ -5,11 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 
 from loomopt.cycle import Node
-from loomopt.designs import flat
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
-from loomopt.maths import FLOAT
+from loomopt.maths import FLOAT, Number
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Mark, Panel, split
 from loomopt.program.sampling import Sampler
@@ -30,24 +29,24 @@ class SheddingViews(JobViews):
     angle = "cam angle"
     lists = {"law": "s'' at {count} knots"}  # noqa: RUF012 (never changed)
 
-    def linkage(self, scene: Scene, design: Mapping[str, Any]) -> "Drawing":
+    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
         """Return the cam with its follower in both dwells and at the least cam force, full scale. Raises BadInput."""
-        from loomopt.jobs.shedding import cam_curves, drawing
+        from loomopt.jobs.shedding import drawing
 
-        found = cam_curves.cam(scene, design)
-        return drawing.linkage(scene, found, registry.of(scene).figures(scene, flat(design)))
+        found = drawing.cam(scene, design)
+        return drawing.linkage(scene, found, registry.of(scene).figures(scene, design))
 
-    def joints_csv(self, scene: Scene, design: Mapping[str, Any]) -> str:
+    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return the profile as CSV. Raises BadInput."""
-        from loomopt.jobs.shedding import cam_curves, drawing
+        from loomopt.jobs.shedding import drawing
 
-        return drawing.joints_csv(scene, cam_curves.cam(scene, design))
+        return drawing.joints_csv(scene, drawing.cam(scene, design))
 
     def missing(self, scene: Scene) -> tuple[str, ...]:
         """Return the keys of the follower that the scene does not give."""
-        from loomopt.jobs.shedding import cam_curves
+        from loomopt.jobs.shedding import drawing
 
-        return cam_curves.missing(scene)
+        return drawing.missing(scene)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
@@ -55,24 +54,24 @@ class SheddingViews(JobViews):
 
         return equations.equations(registry.of(scene).model(scene))
 
-    def marks(self, scene: Scene, design: Mapping[str, Any]) -> dict[str, float]:
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
         """Return the dwells, cam angles in rad, and where the cam force is least."""
-        job, given = registry.of(scene), flat(design)
-        values = job.sampler(scene, given).given.values
+        job = registry.of(scene)
+        values = job.sampler(scene, design).given.values
         found: dict[str, float] = {}
         if float(values["far_dwell"]) > 0.0:
             found |= {"far dwell begins": float(values["begin.far"]), "far dwell ends": float(values["begin.return"])}
         if float(values["near_dwell"]) > 0.0:
             found |= {"near dwell begins": float(values["begin.near"]), "near dwell ends": 0.0}
-        angle = job.figures(scene, given)["contact_angle"]
+        angle = job.figures(scene, design)["contact_angle"]
         return found | {"least cam force": math.nan if angle is None else angle}
 
-    def panels(self, scene: Scene, design: Mapping[str, Any], columns: Sequence[str]) -> tuple[Panel, ...]:
+    def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
         """Return cam force, forces by effect and travel; pressure angle and curvature where there is a follower."""
         from loomopt.jobs.shedding.drawing import settled
 
-        job, given = registry.of(scene), flat(design)
-        figures, values = job.figures(scene, given), job.numbers_of(scene, given)
+        job = registry.of(scene)
+        figures, values = job.figures(scene, design), job.numbers_of(scene, design)
         angle, force, least = figures["contact_angle"], figures["contact_min"], values["N_min"]
         points: tuple[Mark, ...] = ()
         if angle is not None and force is not None:
@@ -91,16 +90,16 @@ class SheddingViews(JobViews):
             shown.append(Panel(("curvature [1/m]",), "pitch curvature", sharpest))
         return tuple(shown)
 
-    def remarks(self, scene: Scene, design: Mapping[str, Any]) -> tuple[str, ...]:
+    def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what there is to remark upon: forces that are known in the dwells only, an undercut cam."""
-        sampler = registry.of(scene).sampler(scene, flat(design))
+        sampler = registry.of(scene).sampler(scene, design)
         return (*_partly(sampler), *(() if self.missing(scene) else _undercut(scene, design)))
 
 
-def _undercut(scene: Scene, design: Mapping[str, Any]) -> Iterator[str]:
-    from loomopt.jobs.shedding import cam_curves
+def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
+    from loomopt.jobs.shedding import drawing
 
-    found = cam_curves.cam(scene, design)
+    found = drawing.cam(scene, design)
     if found.undercut:
         angle = math.degrees(found.sampler.angle(found.undercut))
         roller, radius = 1000 * found.follower.roller_radius, 1000 / found.undercut.value
@@ -142,7 +141,7 @@ def _acting(sampler: Sampler) -> list[str]:
     return [load.name for load in sampler.model.loads if load.name in moved]
 
 
-def _terms(sampler: Sampler, segment: int) -> dict[str, Any]:
+def _terms(sampler: Sampler, segment: int) -> dict[str, Number]:
     """Return each load's term a quarter of the way into a move, on the law's first formula."""
     values = sampler.given.values
     begin, share, length = {RISE: (0, 1, "rise"), RETURN: (values["begin.near"], -1, "return")}[segment]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 from loomopt.picture import shapes
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Text
 
@@ -35,7 +35,7 @@ def designs(draw):
     beta = draw(st.floats(math.radians(10), math.radians(85)))
     size = draw(st.sampled_from([1e-3, 0.167, 1.0, 1e3]))
     try:
-        found = crank_rocker.synthesise(theta, beta, swing, size)
+        found = crank_rocker_synthesis.synthesise(theta, beta, swing, size)
     except ValueError:
         return PAPER
     return {"l1": found.l1, "l2": found.l2, "l3": found.l3, "l4": found.l4}

@@ -8,7 +8,7 @@ import sympy as sp
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.shedding import cam_curves, cam_equations
+from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import design as shedding_design
 from loomopt.maths import FLOAT
 from loomopt.mechanisms.cam_follower import Contact, Follower

@@ -1,0 +1,27 @@
+"""Where a table comes from, and tables as CSV text that says so."""
+
+import datetime
+from typing import TYPE_CHECKING
+
+from loomopt.scenes import Scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+VERSIONED = ("loomopt", "casadi", "numpy")
+
+
+def provenance(scene: Scene, **more: object) -> dict[str, str]:
+    """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
+    import importlib.metadata
+
+    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    told = {name: str(value) for name, value in more.items()}
+    return {"scene": scene.name, "scene_hash": scene.hash, **told, **versions, "date": today}
+
+
+def csv(frame: "pd.DataFrame") -> str:
+    """Return a table as CSV text, its provenance in comment lines before the header; digits round-trip."""
+    head = "".join(f"# {name}: {value}\n" for name, value in frame.attrs.items())
+    return head + str(frame.to_csv(index=frame.index.name is not None, lineterminator="\n"))
