@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import designs
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp.point import sampler_at
 from loomopt.solving.certificate import certify
 
@@ -33,9 +33,9 @@ def optimum(name):
     """Return the program of a case and its optimum, SI."""
     job, target, changes = OPTIMA[name]
     scene = lo.load(job).update(changes)
-    answer, program = lo.solve(scene, target), TASKS[job].program(scene, target)
+    answer, program = lo.solve(scene, target), registry.find(job).program(scene, target)
     assert answer.status == "optimal", answer.message
-    return program, TASKS[job].values(program, designs.flat(answer.design))
+    return program, registry.find(job).values(program, designs.flat(answer.design))
 
 
 def objectives(program, x):

@@ -13,8 +13,8 @@ from shedding_cases import flat, freed, plain
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.shedding.design import sampler
-from loomopt.jobs.shedding.program import model, numbers
+from loomopt.cycle import Node
+from loomopt.jobs import registry
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.program.sampling import Sampler
@@ -25,12 +25,13 @@ from loomopt.solving.certificate import certify
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 ACCURACY = 1e-8
 ROWS = ("lift", "cam_force", "law_acceleration")
+JOB = registry.find("shedding")
 flint = importlib.import_module("flint")
 
 
 def boxed(scene, design):
     """Return a design's sampler and its boxes."""
-    sampled = sampler(scene, design)
+    sampled = JOB.sampler(scene, design)
     return sampled, Boxes(sampled)
 
 
@@ -50,7 +51,7 @@ def check(sampled, boxes, name, sign=1.0):
     assert (above.status, above.angle) == ("proven", None), name
     below, limit = tried(sampled, boxes, name, sign, -1e-6)
     assert below.status == "violated", name
-    piece, u = sampled.cycle.located(below.angle)
+    piece, u = sampled.cycle.place(below.angle)
     beside = [(piece, u), ((piece - 1) % sampled.cycle.pieces, 1.0), ((piece + 1) % sampled.cycle.pieces, 0.0)]
     places, shares = np.array([p for p, _ in beside]), np.array([u for _, u in beside])
     there = np.abs((sampled.cycle.angles(places, shares) - below.angle + math.pi) % (2 * math.pi) - math.pi) < 1e-9
@@ -88,10 +89,10 @@ def test_the_bound_holds_for_a_free_law_that_touches_at_many_places(symmetric):
 def test_a_bound_on_some_pieces_speaks_of_these_alone():
     """By statics: the dwells (segments 1 and 3) hold; the rise between them is lower by far with this soft spring."""
     sampled, boxes = boxed(lo.load("shedding"), {"K1": 8029.14})
-    inside = sampled.peak("lift", (0, 1.0))
-    assert boxes.bound("lift", 1.0, inside + 1e-6, (0, 1.0)).status == "proven"
-    assert boxes.bound("lift", 1.0, inside - 1e-3, (0, 1.0)).status == "violated"
-    assert boxes.bound("lift", 1.0, inside + 1e-6, (0, 0.0)).status == "violated"
+    inside = sampled.peak("lift", ("segment", 1.0))
+    assert boxes.bound("lift", 1.0, inside + 1e-6, ("segment", 1.0)).status == "proven"
+    assert boxes.bound("lift", 1.0, inside - 1e-3, ("segment", 1.0)).status == "violated"
+    assert boxes.bound("lift", 1.0, inside + 1e-6, ("segment", 0.0)).status == "violated"
 
 
 def test_a_bound_is_undecided_when_the_boxes_run_out(monkeypatch):
@@ -148,27 +149,18 @@ def sunk(m, values, phi):
     return -spiked(m, values, phi)
 
 
-class Bounded(toy.Toy):
-    """A stand-in whose wave runs on series of balls."""
+def program(wave, bounded=True, signed=False):
+    """Return: least x² with |wave| ≤ 1.2 all round; the wave does not depend on x.
 
-    bounded = frozenset({"wave"})
-
-
-class Signed(Bounded):
-    """The same, of which only the highest value counts."""
-
-    signed = frozenset({"wave"})
+    bounded: whether it runs on series of balls; signed: whether only its highest value counts.
+    """
+    square, limits = {"f": lambda v: v["x"] ** 2}, (("wave", 1, 1.2),)
+    return toy.program("x", square, {"wave": wave}, limits=limits, bounded=bounded, signed=signed)
 
 
-def program(wave, kind=Bounded):
-    """Return: least x² with |wave| ≤ 1.2 all round; the wave does not depend on x."""
-    made = toy.program("x", {"f": lambda v: v["x"] ** 2}, {"wave": wave}, limits=(("wave", 1, 1.2),))
-    return replace(made, model=kind(made.model.rows, made.model.waves))
-
-
-def said(wave, kind=Bounded):
+def said(wave, **kinds):
     """Return what the boxes say of the peak that was sampled, and the certificate of x = 0."""
-    made = program(wave, kind)
+    made = program(wave, **kinds)
     sampled = Sampler(made.model, {"x": 0.0})
     assert sampled.peak("wave") < 1.0 + 1e-6, "the spike is not missed: it stands 0.54 higher than the samples see"
     return judged(sampled, [("wave", 1.0, None)], ACCURACY), certify(made, {"x": 0.0}, ACCURACY)
@@ -197,12 +189,12 @@ def test_without_the_spike_the_same_design_passes():
 
 
 def test_a_spike_downward_does_not_count_where_only_the_highest_value_does():
-    assert said(sunk, Signed)[0] == "proven"
-    assert said(spiked, Signed)[0] == "violated"
+    assert said(sunk, signed=True)[0] == "proven"
+    assert said(spiked, signed=True)[0] == "violated"
 
 
 def test_a_wave_that_is_not_declared_to_run_on_balls_is_left_undecided():
-    status, certificate = said(spiked, toy.Toy)
+    status, certificate = said(spiked, bounded=False)
     assert (status, certificate.passed, certificate.by) == ("undecided", True, "refined")
 
 
@@ -228,21 +220,21 @@ SCENES["spline"] = FULL.update({"mechanism.law": "spline", "mechanism.law_coeffi
 def test_the_balls_of_a_box_contain_the_values_at_its_points(name, data):
     """Value, and value + slope h + half the curvature h² with the curvature of the whole box."""
     scene, share = SCENES[name], st.floats(0, 1)
-    physics, sampled, system = model(scene), sampler(scene, {}), maths.balls()
-    values = {key: system.number(value) for key, value in {**numbers(scene), **sampled.hints}.items()}
+    physics, sampled, system = JOB.model(scene), JOB.sampler(scene, {}), maths.balls()
+    values = {key: system.number(value) for key, value in {**JOB.numbers(scene), **sampled.hints}.items()}
     exact = physics.given(system, values)
     piece = data.draw(st.integers(0, sampled.cycle.pieces - 1))
     start, end = map(float, sampled.cycle.starts[piece : piece + 2])
     half = data.draw(st.floats(1e-6, 0.25)) * (end - start)
     centre = start + half + data.draw(share) * (end - start - 2 * half)
-    switches = [float(switch) for switch in sampled.cycle.switches[piece]]
+    switch = {name: float(value) for name, value in sampled.cycle.switch(piece).items()}
     for row in ROWS:
         wide, narrow = (
-            physics.quantity(system, exact, row, maths.ball_series(centre, r), switches) + maths.ball_series(0, 0) * 0
+            physics.quantity(system, exact, row, Node(maths.ball_series(centre, r), switch)) + maths.ball_series(0, 0) * 0
             for r in (half, 0.0)
         )
         for place in (-1.0, 1.0, *(2 * data.draw(share) - 1 for _ in range(3))):
-            value = float(physics.quantity(maths.FLOAT, sampled.given, row, centre + place * half, switches))
+            value = float(physics.quantity(maths.FLOAT, sampled.given, row, Node(centre + place * half, switch)))
             h = flint.arb(centre + place * half) - flint.arb(centre)
             rounding = flint.arb(0, 1e-12 * max(1.0, abs(value), sampled.peak("cam_force") * (row != ROWS[2])))
             assert (wide[0] + rounding).contains(flint.arb(value)), row

@@ -8,10 +8,10 @@ import toy
 from plain_beatup import DESIGN, Machine, least, random_designs
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.solving.certificate import certify
 
-TASK = TASKS["beatup"]
+JOB = registry.find("beatup")
 ACCURACY = 1e-8
 
 
@@ -21,8 +21,8 @@ def scene_of(M0):
 
 def judged(scene, target, design):
     """Return the certificate of a design (SI) as the optimum of a scene's target."""
-    program = TASK.program(scene, target)
-    return certify(program, TASK.values(program, design), ACCURACY)
+    program = JOB.program(scene, target)
+    return certify(program, JOB.values(program, design), ACCURACY)
 
 
 def refused(certificate, reason):

@@ -4,7 +4,7 @@ import pytest
 from plain_beatup import DESIGN, Machine
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp import exchange
 
 BEST = {600: (-76.9811021, 82.3371385326), 745: (0.0, 88.6894134918), 800: (0.0, 96.8757999181)}
@@ -65,7 +65,7 @@ def test_limits_that_bind_are_as_many_as_the_design_can_choose(answers, M0):
 def test_every_random_start_reaches_the_same_design(answers, M0, monkeypatch, record_property):
     """The two silent levels leave nothing to the start: designs agree to 1e-7 of each bound's width."""
     scene, wanted = scene_of(M0), answers[M0]
-    program = TASKS["beatup"].program(scene, "balance")
+    program = registry.find("beatup").program(scene, "balance")
     drawn = exchange.starts(program, STARTS + 1, seed=1)[1:]
     assert len(drawn) == STARTS
     reached = []

@@ -103,8 +103,8 @@ def test_every_packaged_answer_is_proven_and_no_entry_is_missing(name, target):
     assert (proofs.problem, proofs.target) == (name, target)
     assert all(min(proof.boxes, proof.slack) > 0 for proof in proofs.proofs)
     named = {proof.limit for proof in proofs.proofs}
-    wanted = {*scene.limits, *CLOSED[scene.job.name], *(f"peak {each}" for each in CLAIMED[scene.job.name])}
-    free = {"swing", "theta", "sley_mu_min"} if scene.job.name == "rapier" else set()
+    wanted = {*scene.limits, *CLOSED[scene.job], *(f"peak {each}" for each in CLAIMED[scene.job])}
+    free = {"swing", "theta", "sley_mu_min"} if scene.job == "rapier" else set()
     assert named >= (wanted | KEPT.get(target, set())) - free
     if answer.status == "optimal":
         assert proofs.passed, violated(proofs)
@@ -483,14 +483,10 @@ def wrapped(m, values, phi):
     return m.atan2(m.sin(phi - 0.3), m.cos(phi - 0.3)) + 0 * values["x"]
 
 
-class Signed(toy.Toy):
-    signed = bounded = frozenset({"wave"})
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_jump_of_the_angle_inside_a_box_is_not_stepped_over(sign):
-    made = toy.program("x", {"f": lambda v: v["x"] ** 2}, {"wave": wrapped}, limits=(("wave", 1, 3.0),))
-    made = replace(made, model=Signed(made.model.rows, made.model.waves))
+    square, limits = {"f": lambda v: v["x"] ** 2}, (("wave", 1, 3.0),)
+    made = toy.program("x", square, {"wave": wrapped}, limits=limits, signed=True, bounded=True)
     boxes = Boxes(Sampler(made.model, {"x": 0.0}))
     assert "proven" not in {boxes.bound("wave", sign, limit).status for limit in (2.5, 3.0, 3.1)}
 

@@ -9,7 +9,11 @@ import loomopt as lo
 from loomopt.program.program import Move, Wish
 from loomopt.solving.settle import settle
 
-SLIDE = Move("slide", ("y",), "axis")
+
+
+def slide(goal, low=-100.0, high=100.0):
+    """Return the move of y alone that wants it at goal."""
+    return Move("slide", ("y",), "axis", (Wish("today", "tidier"),), {"y": goal}, {"y": (low, high)})
 
 
 def scene_of(M0):
@@ -90,8 +94,8 @@ def test_today_s_own_values_are_kept_where_nothing_asks_for_others():
 
 def slid(rows, goal, limits=(), y=0.5):
     """Return y after the silent level that wants it at goal; f is the objective."""
-    program = toy.program("xy", rows, limits=limits)
-    x, said = settle(program, {"x": 1.0, "y": y}, (SLIDE,), lambda *_: Wish({"y": goal}, "tidier"))
+    program = toy.program("xy", rows, limits=limits, moves=(slide(goal),))
+    x, said = settle(program, {"x": 1.0, "y": y})
     assert x["x"] == 1.0
     return x["y"], said
 
@@ -128,4 +132,4 @@ def test_a_limit_already_met_stops_the_move_at_once():
 def test_nothing_is_said_to_be_settled_where_nothing_moved():
     assert slid(FLAT, 0.5) == (0.5, ())
     program = toy.program("xy", FLAT)
-    assert settle(program, {"x": 1.0, "y": 0.5}, (SLIDE,), lambda *_: None) == ({"x": 1.0, "y": 0.5}, ())
+    assert settle(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
