@@ -20,7 +20,7 @@ import peers
 import plain_beatup as plain
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp import exchange, transcribe
 
 SWEEP = range(600, 901, 10)
@@ -34,7 +34,7 @@ KNOWN = {
 }
 """M0 → best-known M3 and peak torque, N·m; the referee's own best must agree with them."""
 QUICK = {*KNOWN, 700, 740, 850}
-TASK = TASKS["beatup"]
+JOB = registry.find("beatup")
 
 
 def scene(M0):
@@ -90,11 +90,11 @@ class Loomopt:
         took, designs, point = [], {}, self.first.point
         for M0, given in self.scenes.items():
             began = time.perf_counter()
-            program = TASK.program(given, "balance")
+            program = JOB.program(given, "balance")
             point = exchange.solve(program, {}, exchange.Settings(), point)
             took.append(time.perf_counter() - began)
             claimed = point.raw["extra"][-1] * program.objectives[-1].scale
-            designs[M0] = plain_design(TASK.design(program, point.x)), claimed
+            designs[M0] = plain_design(JOB.design(program, point.x)), claimed
         return took, designs
 
     def build(self):

@@ -22,7 +22,7 @@ import plain_rapier as plain
 from scipy.optimize import differential_evolution, minimize
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp import exchange
 
 KNOWN = 0.6949847535697
@@ -31,7 +31,7 @@ WITHIN, NEAR = 1e-6, 1e-4
 GRID, COARSE = 360, 72
 STEP, COMPLEX = 1e-7, 1e-30
 OBJECTIVE = np.append(np.zeros(8), 1.0)
-TASK = TASKS["rapier"]
+JOB = registry.find("rapier")
 
 
 def unscaled(z):
@@ -208,13 +208,13 @@ class Loomopt:
         began = time.perf_counter()
         self.first = lo.solve(self.scene, "stroke-dwell")
         self.first_time = time.perf_counter() - began
-        self.program = TASK.program(self.scene, "stroke-dwell")
+        self.program = JOB.program(self.scene, "stroke-dwell")
 
     def solve(self, start):
         """Return the design of one solve; no silent levels, no certificate."""
         given = self.program.completed(dict(zip(plain.NAMES, map(float, start), strict=True)))
         point = exchange.solve(self.program, given, exchange.Settings())
-        return self._plain(TASK.design(self.program, point.x))
+        return self._plain(JOB.design(self.program, point.x))
 
     def call(self, _=None):
         """Return the design of the whole public call from the scene's own starts, certificate and report with it."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.solving.certificate import certify
 
 sys.path.append(str(Path(__file__).parents[1] / "solving"))
@@ -30,9 +30,9 @@ def optimal(scene, target=None):
 
 
 def judged(scene, design, target):
-    task = TASKS[scene.job.name]
-    program = task.program(scene, target)
-    return certify(program, task.values(program, design), 1e-8)
+    job = registry.of(scene)
+    program = job.program(scene, target)
+    return certify(program, job.values(program, design), 1e-8)
 
 
 def worths(answer):

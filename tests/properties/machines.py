@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.mechanisms import cam_follower, crank_rocker_faults, rapier_faults
 from loomopt.mechanisms.cam_follower import Follower
 from loomopt.mechanisms.cam_laws import LAWS
@@ -124,8 +124,8 @@ def machine(job, *effects, law=""):
         scene = scene.set("effects.rod_inertia.model", law)
     elif law:
         scene = scene.set("mechanism.law", law)
-    task = TASKS[job]
-    sampler = task.sampler(scene, task.today(scene))
+    found = registry.of(scene)
+    sampler = found.sampler(scene, found.today(scene))
     return sampler.model, sampler.values
 
 
@@ -141,7 +141,7 @@ REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "be
 def reeds(draw, without=()):
     """Draw a beat-up mechanism with everything on that can be, but for some effects."""
     model, values = machine("beatup", *REED, law=draw(st.sampled_from(["lumped", "exact"])))
-    model = dataclasses.replace(model, loads=tuple(load for load in model.loads if load.name not in without))
+    model = dataclasses.replace(model, effects=tuple(each for each in model.effects if each.name not in without))
     values = varied(draw, values | {"m4e": 5.0, "r4e": 0.05, "gravity.offset": 0.1})
     values |= dict(zip(("l1", "l2", "l3", "l4"), sides_of(draw(crank_rockers(nearest=1e-3))), strict=True))
     return model, values | {"resistance.pulse": draw(st.floats(0.05, 1.5))}

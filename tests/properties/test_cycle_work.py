@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
 
 from loomopt import maths
+from loomopt.cycle import Node
 from loomopt.program.sampling import Sampler
 
 POINTS = 4096
@@ -24,8 +25,8 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
 def torque_all_round(model, values):
     """Return the crank torque at evenly spread crank angles."""
     phi = np.arange(POINTS) * TURN / POINTS
-    off = [np.zeros(POINTS)] * len(model.switched)
-    return model.quantity(maths.numpy(), model.given(maths.FLOAT, values), "peak_torque", phi, off)
+    off = dict.fromkeys(model.switches, np.zeros(POINTS))
+    return model.quantity(maths.numpy(), model.given(maths.FLOAT, values), "peak_torque", Node(phi, off))
 
 
 @settings(max_examples=60)
@@ -48,12 +49,12 @@ def work(model, values, of):
     """Return the integral of a function of (pose, cam force) over the turn of the cam."""
     sampler, system = Sampler(model, values), maths.numpy()
     total = 0.0
-    for piece, switches in enumerate(sampler.cycle.switches):
+    for piece in range(sampler.cycle.pieces):
         begin, end = sampler.cycle.starts[piece : piece + 2]
         theta = begin + (end - begin) * (1 + NODES) / 2
-        rows = [np.full(theta.shape, switch) for switch in switches]
-        force = -model.quantity(system, sampler.given, "lift", theta, rows)
-        total += (end - begin) / 2 * np.sum(WEIGHTS * of(model.pose(system, sampler.given, theta, rows), force))
+        switch = {name: np.full(theta.shape, value) for name, value in sampler.cycle.switch(piece).items()}
+        at = model.instant(system, sampler.given, Node(theta, switch))
+        total += (end - begin) / 2 * np.sum(WEIGHTS * of(at.pose, at.force))
     return total
 
 

@@ -9,18 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import NAMES, drives, frames, machine, reeds, shares, varied
 
-from loomopt import balance
+from loomopt.cycle import Node
 from loomopt.program.sampling import Sampler
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|); worst of 1000 random machines each: 4.1 reed, 2 heald frame, 5.3 head."""
 
 
-def quantity(system, model, given_, name, angle, switches):
+def quantity(system, model, given_, name, node):
     """Return a whole-cycle quantity, or the reed torque with its sign."""
     if name == "M3":
-        return balance.output_force(system, model.loads, model.pose(system, given_, angle), given_, switches)
-    return model.quantity(system, given_, name, angle, switches)
+        return model.instant(system, given_, node).force
+    return model.quantity(system, given_, name, node)
 
 
 def assert_cycle_right(model, values, quantities, place, inside, static=()):
@@ -31,13 +31,13 @@ def assert_cycle_right(model, values, quantities, place, inside, static=()):
     sampler, names = Sampler(model, values), tuple(values)
     piece = min(int(place * sampler.cycle.pieces), sampler.cycle.pieces - 1)
     begin, end = sampler.cycle.starts[piece : piece + 2]
-    switches = [float(switch) for switch in sampler.cycle.switches[piece]]
+    switch = {name: float(value) for name, value in sampler.cycle.switch(piece).items()}
 
     def formulas(system, *numbers):
         *sizes, angle = numbers
         given_ = model.given(system, dict(zip(names, sizes, strict=True)))
-        found = {name: quantity(system, model, given_, name, angle, switches) for name in quantities}
-        return found | model.static(system, given_, sampler.front, static)
+        found = {name: quantity(system, model, given_, name, Node(angle, switch)) for name in quantities}
+        return found | model.static(system, given_, sampler.stills, static)
 
     terms = {"law_fall": 1}
     if "S" in quantities:

@@ -14,7 +14,7 @@ from machines import powers
 
 import loomopt as lo
 from loomopt import designs
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp.point import sampler_at
 from loomopt.solving.certificate import certify
 
@@ -35,9 +35,9 @@ OPTIMA = {
 def solved(job, target, changes):
     """Return the program of a task and its optimum, SI."""
     scene = lo.load(job).update(changes)
-    answer, program = lo.solve(scene, target), TASKS[job].program(scene, target)
+    answer, program = lo.solve(scene, target), registry.of(scene).program(scene, target)
     assert answer.status == "optimal", answer.message
-    return program, TASKS[job].values(program, designs.flat(answer.design))
+    return program, registry.of(scene).values(program, designs.flat(answer.design))
 
 
 optimum = functools.cache(lambda name: solved(*OPTIMA[name]))

@@ -12,7 +12,7 @@ from shedding_cases import plain, programmed
 import loomopt as lo
 from loomopt import tables
 from loomopt.errors import BadInput
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 
 ACCURACIES = [10.0**-power for power in range(2, 12)]
 BEST = ACCURACIES[-1]
@@ -236,12 +236,12 @@ FIGURE = {
 def highest(name):
     """Return the largest magnitude of each column: 20000 rows a turn, then closer and closer ones around each top."""
     scene = CURVES[name]
-    task, today = TASKS[scene.job.name], TASKS[scene.job.name].today(scene)
-    sampler = task.sampler(scene, today)
+    job, today = registry.of(scene), registry.of(scene).today(scene)
+    sampler = job.sampler(scene, today)
     also = np.concatenate([sampler.cycle.angles(*sampler.grid(20_000)), math.pi + np.geomspace(1e-8, 1e-3, 1000)])
     also = also % (2 * math.pi)
     for _ in range(4):
-        columns = task.curves(scene, today, 360, also)
+        columns = job.curves(scene, today, 360, also)
         phi = columns["phi [rad]"]
         tops = {int(np.nanargmax(np.abs(values))) for key, values in columns.items() if key != "phi [rad]"}
         around = [np.linspace(phi[max(k - 1, 0)], phi[min(k + 1, len(phi) - 1)], 201) for k in tops]

@@ -9,7 +9,7 @@ from shedding_by_hand import peak, plain, product, softest
 
 import loomopt as lo
 from loomopt.errors import BadInput
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.solving.certificate import certify
 
 PAPER = plain.PAPER
@@ -190,10 +190,11 @@ def test_dwells_that_may_vanish_do(angles, damping):
 @pytest.mark.parametrize("share", [-1e-6, 1e-6])
 def test_the_certificate_refuses_a_spring_a_millionth_off(target, name, share):
     """Softer, contact is lost; stiffer, it is no optimum."""
-    scene, task = lo.load(name), TASKS["shedding"]
-    program = task.program(scene, target)
+    scene = lo.load(name)
+    job = registry.of(scene)
+    program = job.program(scene, target)
     answer = solved(scene, target)
-    x = task.values(program, answer.design)
+    x = job.values(program, answer.design)
     assert certify(program, x, 1e-8).passed
     found = certify(program, x | {"K1": x["K1"] * (1 + share)}, 1e-8)
     assert not found.passed
@@ -201,9 +202,10 @@ def test_the_certificate_refuses_a_spring_a_millionth_off(target, name, share):
 
 
 def test_the_certificate_refuses_contact_lost_by_a_hundred_millionth():
-    scene, task = lo.load("shedding"), TASKS["shedding"]
-    program = task.program(scene, "stiffness")
-    x = task.values(program, solved(scene).design)
+    scene = lo.load("shedding")
+    job = registry.of(scene)
+    program = job.program(scene, "stiffness")
+    x = job.values(program, solved(scene).design)
     found = certify(program, x | {"K1": x["K1"] * (1 - 1e-8)}, 1e-8)
     assert not found.passed
     assert found.feasibility > 1e-9

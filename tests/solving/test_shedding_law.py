@@ -15,7 +15,9 @@ from shedding_cases import CYCLOID, TRAVELS, flat, freed, lowest, plain, product
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.shedding.design import sampler
+from loomopt.cycle import Node
+from loomopt.jobs import registry
+from loomopt.jobs.shedding.model import MIDDLE, MIDDLE_PIECE
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import spline
 
@@ -188,8 +190,9 @@ def test_a_symmetric_law_is_symmetric_to_the_last_bit(name):
 def test_a_law_that_is_not_symmetric_has_the_tensions_corner_where_it_passes_the_middle():
     """The slope of the warp's pull along X, -2 T1/h above and -2 T2/h below, jumps there; on the right piece of s."""
     answer = freed(PAPER, 8)
-    sampled, law = sampler(answer.scene, flat(answer.design)), spline(EXACT, list(map(Fraction, answer.design["law"])))
-    piece, middle = int(sampled.hints["middle.piece"]), Fraction(sampled.hints["middle.u"])
+    job, law = registry.of(answer.scene), spline(EXACT, list(map(Fraction, answer.design["law"])))
+    sampled = job.sampler(answer.scene, flat(answer.design))
+    piece, middle = int(sampled.hints[MIDDLE_PIECE]), Fraction(sampled.hints[MIDDLE])
     assert law.s[piece] < Fraction(1, 2) < law.s[piece + 1]
     assert Fraction(piece, 8) < middle < Fraction(piece + 1, 8)
     assert float(law.at(EXACT, middle, piece).s) == pytest.approx(0.5, rel=1e-14)
@@ -207,10 +210,11 @@ def slope(sampled, piece, corner):
     """Return dT/dX, N/m, on a piece next to a corner of it."""
     warp = next(load for load in sampled.model.loads if load.name == "warp_tension")
     start, end = sampled.cycle.starts[piece : piece + 2]
-    inside, switches = (1 if start >= corner - 1e-9 else -1), list(map(float, sampled.cycle.switches[piece]))
+    inside, switch = (1 if start >= corner - 1e-9 else -1), sampled.cycle.switch(piece)
     found = []
     for away in (0.0, 1e-4):
-        pose = sampled.model.pose(maths.FLOAT, sampled.given, corner + inside * away * (end - start), switches)
+        node = Node(corner + inside * away * (end - start), switch)
+        pose = sampled.model.instant(maths.FLOAT, sampled.given, node).pose
         pull = -warp.force(maths.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], 0.0)
         found.append((pose.q, pull))
     return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])

@@ -8,7 +8,7 @@ import scipy.integrate
 from plain_beatup import DESIGN, Machine, dead_centres, least, least_peak, random_designs
 
 import loomopt as lo
-from loomopt.jobs.tasks import TASKS
+from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
 
@@ -171,7 +171,7 @@ def test_worth_of_having_no_counterweight_is_what_a_negative_one_would_gain(answ
 
     A step of 10 g: the radius then binds by a multiplier well above the solver's rounding.
     """
-    program, step = TASKS["beatup"].program(scene_of(M0), target), 1e-2
+    program, step = registry.find("beatup").program(scene_of(M0), target), 1e-2
     (price,) = [price for price in answer_of(M0, target).binding if price.limit == "m4e"]
     here, once, twice = (program_value(program, "m4e", -1, -k * step) for k in (0, 1, 2))
     objective = program.objectives[0]
@@ -182,7 +182,7 @@ def test_worth_of_having_no_counterweight_is_what_a_negative_one_would_gain(answ
 
 @pytest.mark.parametrize("M0", [745, 800])
 def test_worth_of_the_retrofits_balance_is_confirmed_in_its_program(answer_of, M0):
-    program, step = TASKS["beatup"].program(scene_of(M0), "retrofit"), 1e-2
+    program, step = registry.find("beatup").program(scene_of(M0), "retrofit"), 1e-2
     (price,) = [price for price in answer_of(M0, "retrofit").binding if price.limit == "M3_fdc"]
     outward = 1 if price.side == "max" else -1
     tight, loose = (program_value(program, "M3_fdc", 0, k * outward * step) for k in (-1, 1))
