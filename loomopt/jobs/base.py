@@ -43,14 +43,6 @@ class Job(abc.ABC):
         """Return a target as a task: structure and numbers. Raises BadInput."""
 
     @abc.abstractmethod
-    def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design a person reads, by full names, from the NLP's variables."""
-
-    @abc.abstractmethod
-    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of the job; None for one whose numbers the scene does not have."""
-
-    @abc.abstractmethod
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum of the target is worth."""
 
@@ -110,6 +102,16 @@ class Job(abc.ABC):
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
         return curves(sampler, replace(self.columns(scene, sampler), checks=checks), steps, also)
+
+    def design(self, program: Program, x: Numbers) -> dict[str, float]:
+        """Return the design a person reads, by full names, from the NLP's variables: these themselves."""
+        return dict(x)
+
+    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
+        """Return every figure of the job; None for one whose numbers the scene does not have."""
+        sampled = self.sampler(scene, design)
+        found: dict[str, float | None] = {name: sampled.figures.get(name) for name in scene.schema.figures}
+        return found | {name: sampled.peak(quantity) for name, quantity in self.peaks(sampled.model).items()}
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Return the NLP's variables of a design."""

@@ -9,8 +9,11 @@ from loomopt.errors import BadInput
 from loomopt.owned import label, owned
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Variable, Wish
+from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 
+Bounds = Mapping[str, tuple[float, float]]
+"""Lower and upper bound of numbers by full name, SI."""
 LEAST_CHANGE = "least change from today"
 ROOM = 0.01
 """Share of a bound's width that a start keeps from its ends."""
@@ -72,6 +75,17 @@ def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
     return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
 
 
+def figure_limits(scene: Scene, sampler: Sampler) -> list[Limit]:
+    """Return the scene's limits on figures that are rows or quantities of the same name; sampler: today's machine."""
+    found = []
+    for name, limit in scene.limits.items():
+        cycle = sampler.model.has_quantity(name)
+        size = (sampler.peak(name) if cycle else abs(sampler.single(name))) or 1.0
+        sides = ends(limit.min, limit.max)
+        found += [Limit(name, sign, name, value, size, "cycle" if cycle else "static") for sign, value in sides]
+    return found
+
+
 def demanded(
     scene: Scene, checks: Iterable[Check[Any]], known: Mapping[str, float], sizes: Mapping[str, float]
 ) -> list[Limit]:
@@ -121,16 +135,14 @@ def distinct(starts: Sequence[dict[str, float]]) -> tuple[dict[str, float], ...]
     return tuple(start for place, start in enumerate(starts) if start not in starts[:place])
 
 
-def scale_move(
-    name: str, along: tuple[str, ...], known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
-) -> Move:
+def scale_move(name: str, along: tuple[str, ...], known: Mapping[str, float], limited: Bounds) -> Move:
     """Return the move that scales lengths in common, and would stay nearest to today's."""
     today = {n: known[n] for n in along if n in known}
     ranges = {n: limited[n] for n in along if n in limited}
     return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, ranges)
 
 
-def axis_moves(scene: Scene, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]) -> list[Move]:
+def axis_moves(scene: Scene, known: Mapping[str, float], limited: Bounds) -> list[Move]:
     """Return the moves along numbers of checks that may change nothing, and would stay nearest to today's."""
     found = []
     for check in (effect for effect in scene.active if isinstance(effect, Check)):

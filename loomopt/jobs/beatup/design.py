@@ -1,11 +1,11 @@
 """Between the NLP's variables and the design a person reads; figures and words of a design."""
 
 import math
-from collections.abc import Mapping
 
 from loomopt.jobs.base import Figures
 from loomopt.jobs.beatup.model import FRONT
 from loomopt.jobs.beatup.scene import VARIABLES, RetrofitTarget
+from loomopt.program.numbers import Bounds
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
@@ -54,7 +54,7 @@ def tidy(program: Program, x: Numbers) -> dict[str, float]:
 
 
 def figures(
-    scene: Scene, sampled: Sampler, design: Numbers, today: Numbers, limited: Mapping[str, tuple[float, float]]
+    scene: Scene, sampled: Sampler, design: Numbers, today: Numbers, limited: Bounds
 ) -> dict[str, float | None]:
     """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
     static = sampled.figures

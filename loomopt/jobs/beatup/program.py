@@ -11,7 +11,7 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
-from loomopt.program.numbers import bound_limits, demand_figures, demanded, ends
+from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scene_tables import Limit as Limited
@@ -47,7 +47,7 @@ def program(scene: Scene, target: str) -> Program:
     known = numbers(scene)
     limited = scene_numbers.bounds(scene, known)
     physics = model(scene, known, target)
-    sizes = _Sizes(model(scene, known), scene, known, limited)
+    sizes = _Sizes(scene, known, limited)
     direct = _reads_counterweight(scene, target, limited)
     variables = _variables(scene, sizes, limited, direct)
     demand_figures(scene, physics, ROWS, "Take the limit off, or add what {name} needs.")
@@ -71,13 +71,8 @@ def program(scene: Scene, target: str) -> Program:
 class _Sizes:
     """Natural sizes of this machine, SI, from today's design: what the NLP is scaled by."""
 
-    def __init__(
-        self,
-        physics: JobModel,
-        scene: Scene,
-        known: Mapping[str, float],
-        limited: Mapping[str, tuple[float, float]],
-    ) -> None:
+    def __init__(self, scene: Scene, known: Mapping[str, float], limited: Bounds) -> None:
+        physics = model(scene, known)
         sampler = Sampler(physics, known, SAMPLES)
         resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
@@ -114,7 +109,7 @@ def _reed(sampler: Sampler) -> list[float]:
     return [moved({**given.values, "s": 0.0}, values) for moved, values in own]
 
 
-def _variables(scene: Scene, sizes: _Sizes, limited: Mapping[str, tuple[float, float]], direct: bool) -> list[Variable]:
+def _variables(scene: Scene, sizes: _Sizes, limited: Bounds, direct: bool) -> list[Variable]:
     """Return the variables; where mass and radius of the counterweight do not matter apart, s = m4e r4e² is one."""
     labels = scene_numbers.labels(scene)
     names = [name for name in limited if direct or name != "m4e"]
@@ -155,7 +150,7 @@ def demand(scene: Scene, target: str) -> None:
             )
 
 
-def _reads_counterweight(scene: Scene, target: str, limited: Mapping[str, tuple[float, float]]) -> bool:
+def _reads_counterweight(scene: Scene, target: str, limited: Bounds) -> bool:
     """Say whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
     asked = set(scene.limits)
     read = target == "retrofit" or "r4" in asked
@@ -183,9 +178,7 @@ def _starts(
     return scene_numbers.distinct([using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])])
 
 
-def _moves(
-    variables: Sequence[Variable], known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
-) -> tuple[Move, ...]:
+def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: Bounds) -> tuple[Move, ...]:
     """Return the directions that may leave every figure unchanged: first the counterweight's, then a common scale."""
     names = {variable.name for variable in variables}
     most = limited["m4e"][1] * limited["r4e"][1] ** 2
@@ -235,9 +228,7 @@ def _target_limits(scene: Scene, target: str, sizes: _Sizes) -> list[Limit]:
     return [Limit("M3_fdc", sign, "M3_fdc", value, sizes.torque, "static") for sign, value in sides]
 
 
-def _change_parameters(
-    scene: Scene, known: Mapping[str, float], limited: Mapping[str, tuple[float, float]]
-) -> dict[str, float]:
+def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds) -> dict[str, float]:
     """Return today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing."""
     weights = scene.table(RetrofitTarget).weights
     found: dict[str, float] = {}
