@@ -53,6 +53,9 @@ LAYERS: Mapping[str, Layer] = {
 }
 """Layers from back to front."""
 
+POSITIONS = tuple(LAYERS[name] for name in ("front dead centre", "rear dead centre", "hand-over", "pitch curve"))
+"""Looks of a mechanism's positions whose names are no layers here, in turn."""
+
 NOMINAL_HEIGHT = 3.5
 """Text height, mm, that the layers' widths and the dashes are meant for."""
 DASH, GAP = 3.0, 2.0
@@ -115,6 +118,15 @@ class Drawing:
     height: float
     primitives: tuple[Primitive, ...]
     unit: Literal["mm"] = "mm"
+
+    @property
+    def layers(self) -> dict[str, Layer]:
+        """The layers that are drawn on, from back to front; positions of other names lie behind the joints."""
+        drawn = dict.fromkeys(primitive.layer for primitive in self.primitives)
+        others = dict(zip((name for name in drawn if name not in LAYERS), itertools.cycle(POSITIONS), strict=False))
+        front = list(LAYERS).index("joints")
+        known = list(LAYERS.items())
+        return {name: look for name, look in [*known[:front], *others.items(), *known[front:]] if name in drawn}
 
 
 def plain(text: str) -> str:

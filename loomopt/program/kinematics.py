@@ -74,7 +74,7 @@ class Arcs:
 
 
 class Kinematics(Protocol):
-    """A mechanism in every number system; angles rad, lengths m."""
+    """A mechanism in every number system; angles rad, lengths m. One that inherits has what few mechanisms need."""
 
     @property
     def structure(self) -> Hashable:
@@ -83,29 +83,36 @@ class Kinematics(Protocol):
     @property
     def groups(self) -> Mapping[str, Group]:
         """Links that must close, by the prefix that their quantities and rows have."""
+        return {}
 
     @property
     def arcs(self) -> tuple[Arcs, ...]:
         """Stretches of the cycle with formulas of their own."""
+        return ()
 
     @property
     def breaks(self) -> frozenset[str]:
         """Events that lie on corners of its own arcs."""
+        return frozenset()
 
     def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Mapping[str, Number]:
         """Return what follows from the scene's numbers at once; called: events that effects call in."""
+        return {}
 
     def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
         """Return, by name of value, where events lie that no formula gives: Newton's method starts there."""
+        return {}
 
     def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
         """Return the pose at a node."""
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
         """Return the exact pose at an event."""
+        return self.pose(maths, given, Node(self.events(maths, given)[event], switch))
 
     def events(self, maths: Maths, given: Given) -> Mapping[str, Number]:
         """Return the crank angles of events by name."""
+        return {}
 
 
 def four_bar(

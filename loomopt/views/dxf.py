@@ -10,7 +10,6 @@ from typing import Any
 from loomopt.picture.shapes import (
     DASH,
     GAP,
-    LAYERS,
     NOMINAL_HEIGHT,
     Arc,
     Circle,
@@ -52,10 +51,7 @@ def _document(drawing: Drawing) -> Any:
     document.header["$LTSCALE"] = drawing.height / NOMINAL_HEIGHT
     document.linetypes.add(_DASHES, [DASH + GAP, DASH, -GAP], description="__ __ __ __")
     document.styles.add(_TEXT_STYLE, font="arial.ttf")
-    drawn_on = {primitive.layer for primitive in drawing.primitives}
-    for name, layer in LAYERS.items():
-        if name not in drawn_on:
-            continue
+    for name, layer in drawing.layers.items():
         line_type = _DASHES if layer.dashed else "CONTINUOUS"
         document.layers.add(name, color=layer.aci, linetype=line_type, lineweight=round(100 * layer.width))
     box = extent(drawing)

@@ -14,11 +14,11 @@ from loomopt.picture.shapes import (
     CAPITAL,
     DASH,
     GAP,
-    LAYERS,
     NOMINAL_HEIGHT,
     Arc,
     Circle,
     Drawing,
+    Layer,
     Line,
     Primitive,
     Text,
@@ -57,10 +57,10 @@ def draw(drawing: Drawing, path: Path) -> None:
         figure = _figure((box.right - box.left) * inches, (box.top - box.bottom) * inches)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
         axes.set(xlim=(box.left, box.right), ylim=(box.bottom, box.top), xticks=[], yticks=[])
-        for order, name in enumerate(LAYERS):
+        for order, (name, layer) in enumerate(drawing.layers.items()):
             for primitive in drawing.primitives:
                 if primitive.layer == name:
-                    _append(axes, primitive, drawing.height, 72 * inches, order)
+                    _append(axes, primitive, layer, drawing.height, 72 * inches, order)
         _save(figure, path)
 
 
@@ -256,11 +256,10 @@ def _name(axes: Any, names: Sequence[tuple[float, str]]) -> None:
         )
 
 
-def _append(axes: Any, primitive: Primitive, text_height: float, points: float, order: int) -> None:
+def _append(axes: Any, primitive: Primitive, layer: Layer, text_height: float, points: float, order: int) -> None:
     """Add a primitive to axes in mm; points: printer's points per mm of the drawing."""
     from matplotlib import lines, patches
 
-    layer = LAYERS[primitive.layer]
     unit = text_height / NOMINAL_HEIGHT * points
     dash = (0.0, (DASH / layer.width, GAP / layer.width)) if layer.dashed else "solid"
     stroke: dict[str, Any] = {"linewidth": layer.width * unit, "linestyle": dash, "zorder": order}

@@ -7,11 +7,11 @@ from loomopt.picture.shapes import (
     CAPITAL,
     DASH,
     GAP,
-    LAYERS,
     NOMINAL_HEIGHT,
     Arc,
     Circle,
     Drawing,
+    Layer,
     Line,
     Point,
     Primitive,
@@ -44,18 +44,17 @@ def render(drawing: Drawing) -> str:
         "height": _number(height),
     }
     ElementTree.SubElement(root, "rect", sheet | {"fill": "#ffffff"})
-    for name in LAYERS:
-        primitives = [primitive for primitive in drawing.primitives if primitive.layer == name]
-        if primitives:
-            group = ElementTree.SubElement(root, "g", _style(name, drawing.height))
-            for primitive in primitives:
-                _append(group, primitive, drawing.height)
+    for name, layer in drawing.layers.items():
+        group = ElementTree.SubElement(root, "g", _style(name, layer, drawing.height))
+        for primitive in drawing.primitives:
+            if primitive.layer == name:
+                _append(group, primitive, layer, drawing.height)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _style(name: str, text_height: float) -> dict[str, str]:
-    layer, unit = LAYERS[name], text_height / NOMINAL_HEIGHT
+def _style(name: str, layer: Layer, text_height: float) -> dict[str, str]:
+    unit = text_height / NOMINAL_HEIGHT
     style = {
         "data-layer": name,
         "fill": "none",
@@ -66,7 +65,7 @@ def _style(name: str, text_height: float) -> dict[str, str]:
     return style | ({"stroke-dasharray": f"{_number(DASH * unit)} {_number(GAP * unit)}"} if layer.dashed else {})
 
 
-def _append(group: ElementTree.Element, primitive: Primitive, text_height: float) -> None:
+def _append(group: ElementTree.Element, primitive: Primitive, layer: Layer, text_height: float) -> None:
     match primitive:
         case Line(_, points, closed):
             data = "M" + " L".join(_pair(point) for point in points) + (" Z" if closed else "")
@@ -78,9 +77,9 @@ def _append(group: ElementTree.Element, primitive: Primitive, text_height: float
             large, r = int(end - begin > math.pi), _number(radius)
             start, stop = _pair(centre.towards(begin, radius)), _pair(centre.towards(end, radius))
             ElementTree.SubElement(group, "path", {"d": f"M{start} A{r} {r} 0 {large} 0 {stop}"})
-        case Text(layer, at, text, size, anchor):
+        case Text(_, at, text, size, anchor):
             tall = size * text_height
-            style = {"fill": LAYERS[layer].colour, "stroke": "none", "font-size": _number(tall / CAPITAL)}
+            style = {"fill": layer.colour, "stroke": "none", "font-size": _number(tall / CAPITAL)}
             style["text-anchor"] = "middle" if anchor == "centre" else "start"
             place = {"x": _number(at.x), "y": _number(tall / 2 - at.y)}
             ElementTree.SubElement(group, "text", place | style).text = plain(text)
