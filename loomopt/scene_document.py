@@ -69,13 +69,13 @@ def copied(table: Mapping[Any, Any], origin: str, path: tuple[str, ...] = ()) ->
     }
 
 
-def _copied_value(value: Any) -> Any:
+def _copied_value(value: object) -> object:
     return list(value) if isinstance(value, list) else value
 
 
-def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> Any:
+def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
     """Return the raw value of a path of names; None where there is none."""
-    value: Any = document
+    value: object = document
     for part in parts:
         if not isinstance(value, Mapping) or part not in value:
             return None
@@ -83,7 +83,7 @@ def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> Any:
     return value
 
 
-def replaced(document: Mapping[str, Any], parts: Sequence[str], value: Any, origin: str, key: str) -> dict[str, Any]:
+def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, origin: str, key: str) -> dict[str, Any]:
     """Return tables in which one path has another value; tables on the way are made where they are missing.
 
     key: the whole path, for the BadInput raised where it leads through a value.
@@ -97,6 +97,9 @@ def replaced(document: Mapping[str, Any], parts: Sequence[str], value: Any, orig
     return {**document, first: value}
 
 
-def removed(document: Mapping[str, Any], table: str, name: str) -> dict[str, Any]:
-    """Return tables in which one table has lost one name."""
-    return {**document, table: {key: value for key, value in document[table].items() if key != name}}
+def removed(document: Mapping[str, Any], parts: Sequence[str]) -> dict[str, Any]:
+    """Return tables in which the last table on a path of names has lost the last name."""
+    first, *rest = parts
+    if rest:
+        return {**document, first: removed(document[first], rest)}
+    return {key: value for key, value in document.items() if key != first}

@@ -62,14 +62,14 @@ class Place(NamedTuple):
     waits: bool = False
 
 
-def table(raw: Any, origin: str, path: str) -> Mapping[str, Any]:
+def table(raw: object, origin: str, path: str) -> Mapping[str, Any]:
     """Return raw if it is a table."""
     if not isinstance(raw, Mapping):
         raise refusal("it is not a table", origin, path, raw, remedy=f"Write a table [{path}]")
     return raw
 
 
-def checked(model: type[_Model], raw: Any, origin: str, path: str) -> _Model:
+def checked(model: type[_Model], raw: object, origin: str, path: str) -> _Model:
     """Return a raw table as its model."""
     values = dict(table(raw, origin, path))
     for name in values:
@@ -81,7 +81,7 @@ def checked(model: type[_Model], raw: Any, origin: str, path: str) -> _Model:
         raise invalid(error, model, origin, path) from None
 
 
-def problem(raw: Any, jobs: "Jobs", origin: str) -> Problem:
+def problem(raw: object, jobs: "Jobs", origin: str) -> Problem:
     """Return [problem], its name fit for a file name and its job one of `jobs`."""
     found = checked(Problem, raw, origin, "problem")
     if not found.name.replace("-", "").replace("_", "").isalnum() or len(found.name) > 64:
@@ -93,7 +93,7 @@ def problem(raw: Any, jobs: "Jobs", origin: str) -> Problem:
     return found
 
 
-def named(raw: Any, models: Mapping[str, type[Table]], what: str, origin: str, path: str) -> dict[str, Table]:
+def named(raw: object, models: Mapping[str, type[Table]], what: str, origin: str, path: str) -> dict[str, Table]:
     """Return the tables inside a table, in the order of `models`; what: what their names stand for."""
     inner = table(raw, origin, path)
     for name in inner:
@@ -104,7 +104,7 @@ def named(raw: Any, models: Mapping[str, type[Table]], what: str, origin: str, p
     }
 
 
-def effects(raw: Any, schema: SceneSchema, origin: str, path: str) -> dict[Effect, Table]:
+def effects(raw: object, schema: SceneSchema, origin: str, path: str) -> dict[Effect, Table]:
     """Return the effects whose tables stand in a table, in the order of the job, with their values."""
     inner, found = table(raw, origin, path), {}
     for name in inner:
@@ -154,7 +154,7 @@ def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]
             yield Place(path, key, key, quantity, own is not None and getattr(own, key) is not None)
 
 
-def flat(raw: Any, known: Iterable[str], origin: str, path: str) -> dict[str, Any]:
+def flat(raw: object, known: Iterable[str], origin: str, path: str) -> dict[str, Any]:
     """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m"."""
     found: dict[str, Any] = {}
     for name, value in table(raw, origin, path).items():
@@ -163,13 +163,13 @@ def flat(raw: Any, known: Iterable[str], origin: str, path: str) -> dict[str, An
     return found
 
 
-def bounds(raw: Any, schema: SceneSchema, known: list[Place], origin: str) -> dict[str, Bound]:
+def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str) -> dict[str, Bound]:
     """Return [bounds]; known: places of the scene's numbers, any of which may be bounded.
 
     A bound on a number of an effect that is off waits for it: it is checked and left out.
     """
     found = {}
-    for name, each in flat(raw, {place.label for place in known}, origin, "bounds").items():
+    for name, each in flat(raw, [*schema.variables, *(place.label for place in known)], origin, "bounds").items():
         waiting = [p for p in known if p.label == name and p.waits]
         given = any(place.label == name and place.given for place in known)
         quantity = waiting[0].quantity if waiting and not given else _bounded(name, schema, known, origin)
@@ -199,7 +199,7 @@ def _bounded(name: str, schema: SceneSchema, known: list[Place], origin: str) ->
     return given[0].quantity
 
 
-def _bound(raw: Any, quantity: Quantity, origin: str, key: str) -> Bound:
+def _bound(raw: object, quantity: Quantity, origin: str, key: str) -> Bound:
     if not isinstance(raw, Mapping):
         value = _value(quantity, raw, origin, key)
         return Bound(value, value, True, _unit(raw))
@@ -217,7 +217,7 @@ def _bound(raw: Any, quantity: Quantity, origin: str, key: str) -> Bound:
     return Bound(low, high, free, _unit(raw["min"]))
 
 
-def limits(raw: Any, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, Limit]:
+def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, Limit]:
     """Return [limits]: figures of the job, and of the effects that are on."""
     inner = flat(raw, schema.figures, origin, "limits")
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
@@ -233,7 +233,7 @@ def limits(raw: Any, schema: SceneSchema, active: Sequence[Effect], origin: str)
     return {name: _limit(inner[name], schema.figures[name], name, origin) for name in inner}
 
 
-def _limit(raw: Any, figure: Figure, name: str, origin: str) -> Limit:
+def _limit(raw: object, figure: Figure, name: str, origin: str) -> Limit:
     key = f"limits.{name}"
     sides = " and ".join(figure.sides)
     if not isinstance(raw, Mapping):
@@ -271,13 +271,13 @@ def _ordered(raw: Mapping[str, Any], low: float, high: float, origin: str, key: 
         )
 
 
-def _value(quantity: Quantity, raw: Any, origin: str, key: str) -> float:
+def _value(quantity: Quantity, raw: object, origin: str, key: str) -> float:
     try:
         return quantity.validate(raw)
     except QuantityError as error:
         raise misread(error, origin, key, raw) from None
 
 
-def _unit(raw: Any) -> str:
+def _unit(raw: object) -> str:
     """Return the unit of a value that has been read."""
     return unit_of(raw) if isinstance(raw, str) else "1"

@@ -98,17 +98,13 @@ class Scene:
 
     def unit(self, name: str, kind: str) -> str:
         """Return the unit in which a variable or figure is shown: as the scene writes it, else its kind's."""
-        places = [
-            ("mechanism", name),
-            ("operation", name),
-            *(("effects", effect, name) for effect in self.effects),
-        ]
-        places += [(table, name, *end) for table in ("bounds", "limits") for end in ((), ("min",), ("max",))]
-        for place in places:
-            text = looked_up(self.document, place)
-            if isinstance(text, str) and fits(unit_of(text), kind):
-                return unit_of(text)
-        return DISPLAY_UNIT[kind]
+        places: list[tuple[str, ...]] = [("mechanism", name), ("operation", name)]
+        keys = [(effect, key) for effect in self.active for key in effect.own.model_fields]
+        places += [("effects", *effect.path, key) for effect, key in keys if name in (key, label(effect, key))]
+        texts = [looked_up(self.document, place) for place in places]
+        units = [unit_of(text) for text in texts if isinstance(text, str)]
+        units += [table[name].unit for table in (self.bounds, self.limits) if name in table]
+        return next((unit for unit in units if fits(unit, kind)), DISPLAY_UNIT[kind])
 
     def set(self, key: str, value: object) -> "Scene":
         """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
@@ -123,11 +119,13 @@ class Scene:
         document = self.document
         for key, value in values.items():
             parts = self._path(key)
-            table, inside = parts[0], looked_up(document, parts[:2])
-            if table == "effects" and len(parts) > 2 and inside is None:
-                document = _put_on(document, parts[1])
-            if table == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
-                document = replaced(document, parts[:2], {}, self.origin, key)
+            effect = self.schema.effects.get(parts[1]) if parts[0] == "effects" and len(parts) > 1 else None
+            own = parts[: 3 if effect and effect.many else 2]
+            inside = looked_up(document, own)
+            if parts[0] == "effects" and len(parts) > len(own) and inside is None:
+                document = _put_on(document, *own[1:])
+            if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
+                document = replaced(document, own, {}, self.origin, key)
             document = replaced(document, parts, value, self.origin, key)
         return self._rebuilt(document)
 
@@ -148,7 +146,7 @@ class Scene:
         parts = self._effect_path(name)
         if name not in self.effects:
             return self
-        document = removed(self.document, "effects", *parts)
+        document = removed(self.document, ("effects", *parts))
         own, key = looked_up(self.document, ("effects", *parts)), f"available.{name}"
         return self._rebuilt(replaced(document, ("available", *parts), own, self.origin, key))
 
@@ -215,7 +213,7 @@ def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
     """Move an effect's table from [available] to [effects]."""
     own = looked_up(document, ("available", *effect))
     on = replaced(document, ("effects", *effect), {} if own is None else own, "", f"effects.{'.'.join(effect)}")
-    return on if own is None else removed(on, "available", *effect)
+    return on if own is None else removed(on, ("available", *effect))
 
 
 def build(document: Mapping[str, Any], jobs: Jobs, origin: str) -> Scene:

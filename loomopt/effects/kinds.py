@@ -98,6 +98,11 @@ class Effect:
     many: bool = False
     instance: str = ""
 
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Where its table stands inside [effects]: under its name; of an instance under that of its kind first."""
+        return (self.name.removesuffix(f".{self.instance}"), self.instance) if self.instance else (self.name,)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Effect, Generic[Pose]):

@@ -1,0 +1,176 @@
+"""Effects in scenes: instances of one kind, labels with dots, kinds that are not built, tables by their models."""
+
+import copy
+import pickle
+from dataclasses import replace
+
+import pytest
+
+from loomopt import scenes
+from loomopt.effects.beatup import inertia, rocker_inertia
+from loomopt.effects.kinds import Event, Load, Speed, State, ranked
+from loomopt.errors import BadInput
+from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
+from loomopt.jobs.registry import load
+from loomopt.owned import label, owned
+from loomopt.program import numbers
+from loomopt.quantities import Length, PositiveMass
+from loomopt.schema import Figure, Table
+
+BEATUP = load("beatup")
+
+
+class Own(Table):
+    """m: a mass; at: where it sits; kg, m."""
+
+    m: PositiveMass
+    at: Length = 0.0
+
+
+MASS = Load(
+    name="mass",
+    summary="a mass on a link",
+    own=Own,
+    rank=15,
+    acts="output",
+    force=lambda maths, pose, given, own, switch: own["m"] * own["at"] ** 2 * pose.acceleration,
+    figures=(Figure("rod.tension", "force", "pull in the rod", sides=("max",)),),
+    many=True,
+)
+
+
+class Jobs:
+    """The beat-up with more effects."""
+
+    def __init__(self, *effects):
+        variables = {**SCHEMA.variables, "A.x": "length"}
+        self.known = replace(SCHEMA, effects=ranked([*SCHEMA.effects.values(), *effects]), variables=variables)
+
+    def __contains__(self, name):
+        return name == "beatup"
+
+    def names(self):
+        return ("beatup",)
+
+    def schema(self, job, document, effects):
+        return self.known
+
+
+def built(changes, *effects):
+    """Return the packaged scene with tables merged into its own, and more effects declared."""
+
+    def merge(table, more):
+        for name, value in more.items():
+            table[name] = merge(dict(table.get(name, {})), value) if isinstance(value, dict) else value
+        return table
+
+    document = merge(copy.deepcopy(dict(BEATUP.document)), changes)
+    return scenes.build(document, Jobs(*(effects or (MASS,))), "beatup.toml")
+
+
+TWO = {"rod": {"m": "1.5 kg", "at": "30 mm"}, "rocker": {"m": "800 g"}}
+
+
+def test_there_may_be_many_instances_of_an_effect():
+    found = built({"effects": {"mass": TWO}})
+    assert list(found.effects) == ["inertia", "mass.rod", "mass.rocker", "resistance"]
+    assert [found.effects[f"mass.{name}"].m for name in TWO] == [1.5, 0.8]
+    assert [(effect.name, effect.instance) for effect in found.active[1:3]] == [
+        ("mass.rod", "rod"),
+        ("mass.rocker", "rocker"),
+    ]
+    assert found.active == built({"effects": {"mass": TWO}}).active, "one object for one instance"
+    assert [label(found.active[1], "m"), owned(found.active[1], "m")] == ["rod.m", "mass.rod.m"]
+    assert numbers.numbers(found)["mass.rod.at"] == 0.03
+    assert [found.full(name) for name in ("rod.m", "rocker.m", "J4", "l1")] == [
+        *("mass.rod.m", "mass.rocker.m", "inertia.J4", "l1")
+    ]
+    assert len({found.hash, built({}).hash, built({"effects": {"mass": {"rod": TWO["rod"]}}}).hash}) == 3
+
+
+def test_labels_with_dots_may_be_bounded_freed_and_limited():
+    bounds = {
+        "rod": {"m": {"min": "1 kg", "max": "2 kg", "free": False}, "at": "31 mm"},
+        "A": {"x": {"min": "1 mm", "max": "2 mm"}},
+    }
+    limits = {"rod": {"tension": {"max": "5 kN"}}}
+    found = built({"effects": {"mass": TWO}, "bounds": bounds, "limits": limits})
+    assert {"rod.m", "rod.at", "A.x", "l1"} <= set(found.bounds)
+    assert found.bounds["rod.m"] == scenes.Bound(1.0, 2.0, False, "kg")
+    assert found.bounds["A.x"].max == 0.002
+    assert found.limits["rod.tension"] == scenes.Limit(None, 5000.0, "kN")
+    freed = found.free("rod.m")
+    assert freed.bounds["rod.m"].free
+    assert freed.set("bounds.rod.m.max", "2500 g").bounds["rod.m"].max == 2.5
+    assert [found.unit("rod.m", "mass"), found.unit("rocker.m", "mass")] == ["kg", "g"]
+    assert found.unit("rod.tension", "force") == "kN"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "problem"),
+    [
+        ({"effects": {"mass": {"rod": {"m": "1 mm"}}}}, "effects.mass.rod.m", "length, not of mass"),
+        ({"effects": {"mass": {"rod": {}}}}, "effects.mass.rod.m", "m is missing"),
+        ({"effects": {"mass": {"rod": "1 kg"}}}, "effects.mass.rod", "not a table"),
+        ({"effects": {"mass": {"m": "1 kg"}}}, "effects.mass.m", "not a table"),
+        ({"bounds": {"rod": {"m": "1 kg"}}}, "bounds.rod", "unknown number to bound"),
+        ({"limits": {"rod": {"tensoin": {"max": "1 N"}}}}, "limits.rod", "unknown figure to limit"),
+        ({"limits": {"rod": {"tension": {"max": "1 mm"}}}}, "limits.rod.tension.max", "not of force"),
+    ],
+)
+def test_what_is_wrong_with_an_instance_or_a_label_is_told_at_its_key(changes, key, problem):
+    with pytest.raises(BadInput, match=problem) as error:
+        built(changes)
+    assert error.value.key == key
+
+
+def test_an_instance_goes_on_and_off_with_its_values():
+    found = built({"effects": {"mass": TWO}})
+    off = found.without_effect("mass.rod")
+    assert list(off.effects) == ["inertia", "mass.rocker", "resistance"]
+    assert off.with_effect("mass.rod").effects == found.effects
+    assert off.without_effect("mass.rod") is off
+    assert off.set("effects.mass.rod.m", "2 kg").effects["mass.rod"].at == 0.03, "the rest of its values"
+    assert found.set("effects.mass.rod.m", "2 kg").effects["mass.rod"].m == 2.0
+    none = off.without_effect("mass.rocker")
+    assert list(none.effects) == ["inertia", "resistance"]
+    assert none.with_effect("mass.rocker").effects == off.effects
+
+
+UNBUILT = [
+    State(name="shaft", summary="", own=Own, carries=(), derived=lambda *_: {}, force=lambda *_: 0),
+    Speed(name="motor", summary="", own=Own),
+    Event(name="contact", summary="", own=Own),
+]
+
+
+@pytest.mark.parametrize("effect", UNBUILT, ids=lambda effect: type(effect).__name__)
+@pytest.mark.parametrize("table", ["effects", "available"])
+def test_a_kind_that_is_not_built_is_refused_by_name(effect, table):
+    with pytest.raises(BadInput, match=f"effect {effect.name} changes the motion itself") as error:
+        built({table: {effect.name: {"m": "1 kg"}}}, effect)
+    assert error.value.key == f"{table}.{effect.name}"
+    assert built({}, effect).effects == BEATUP.effects
+
+
+def test_tables_are_found_by_their_models():
+    assert BEATUP.own(inertia.Own).J4 == 0.62
+    assert BEATUP.own(rocker_inertia.Own) is None
+    assert BEATUP.with_effect("rocker_inertia").own(rocker_inertia.Own).J3 == 0.05
+    assert BEATUP.table(Operation).M0 == 745.0
+    assert BEATUP.table(Mechanism).l1 == 0.031
+    assert BEATUP.set("targets.torque.M3_tolerance", "5 N*m").table(TorqueTarget).M3_tolerance == 5.0
+    assert BEATUP.table(RetrofitTarget) is BEATUP.targets["retrofit"]
+    with pytest.raises(StopIteration):
+        BEATUP.table(inertia.Own)
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_a_scene_with_every_effect_pickles_to_the_same_scene(name):
+    scene = load(name)
+    for effect in scene.schema.effects:
+        scene = scene.with_effect(effect)
+    again = pickle.loads(pickle.dumps(scene))
+    assert again == scene
+    assert (again.hash, again.active, again.jobs) == (scene.hash, scene.active, scene.jobs)
+    assert again.set("problem.title", "another").effects == scene.effects
