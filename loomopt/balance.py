@@ -30,7 +30,7 @@ class Pose(Motion):
     q: Number
     q1: Number
     q2: Number
-    joints: Any = None
+    joints: object = None
     omega_dot: Number = None
 
 

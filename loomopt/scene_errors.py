@@ -85,7 +85,7 @@ def missing(model: type[BaseModel], origin: str, table: str, name: str, needed: 
 
 def invalid(error: ValidationError, model: type[BaseModel], origin: str, table: str) -> BadInput:
     """Return the error for the first thing pydantic found wrong with a table."""
-    first: Any = error.errors(include_url=False)[0]
+    first = error.errors(include_url=False)[0]
     names = [str(name) for name in first["loc"]]
     if first["type"] == "missing" and len(names) == 1:
         return missing(model, origin, table, names[0])

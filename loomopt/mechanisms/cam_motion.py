@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Protocol
 
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import cam_spline
@@ -173,13 +173,13 @@ def piece_at(angle: float, corners: tuple[float, ...]) -> float:
     return float(sum(angle >= c for c in corners[:half]) - sum(angle >= c for c in corners[half:]))
 
 
-def mirrored(values: Values, shares: Sequence[Any]) -> tuple[Number, ...]:
+def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
     """Return the cam angles of arguments u on the rise, then on the return, where u falls from 1 to 0."""
     rise = [_part(values["rise"], share) for share in shares]
     back = [values["begin.near"] - _part(values["return"], share) for share in shares]
     return (*rise, *back)
 
 
-def _part(angle: Number, share: Any) -> Number:
+def _part(angle: Number, share: Number) -> Number:
     """Return a share of an angle; a fraction without rounding it first."""
     return angle * share.numerator / share.denominator if isinstance(share, Fraction) else angle * share

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from loomopt import balance
 from loomopt.balance import Given
@@ -30,7 +30,7 @@ class Instant:
         return self.given.values
 
     @functools.cached_property
-    def pose(self) -> Any:
+    def pose(self) -> Number:
         """The mechanism's pose."""
         kinematics = self.model.kinematics
         if self.event:

@@ -7,12 +7,12 @@ inside the balls.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import Where
+from loomopt.maths import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
@@ -60,7 +60,7 @@ class Boxes(Reading):
                     boxes += [((low + high) / 2, high), (low, (low + high) / 2)]
         return Bound("proven" if used else "undecided", used)
 
-    def mean(self, integral: Integral) -> Any:
+    def mean(self, integral: Integral) -> Number:
         """Return a ball around an integral's mean over its pieces.
 
         On each box the Taylor polynomial is integrated, what is left of it enclosed.
@@ -97,7 +97,7 @@ class Boxes(Reading):
             within = sign * here[0] + rise + bend.upper() * half**2 <= limit
         return True if within else None
 
-    def _series(self, name: str, piece: int, centre: float, half: float) -> Any:
+    def _series(self, name: str, piece: int, centre: float, half: float) -> Number:
         """Return a quantity's Taylor series in u, to second order, around a ball of u on a piece."""
         u = maths.ball_series(centre, half)
         begin, end = self.starts[piece : piece + 2]

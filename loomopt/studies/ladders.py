@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from loomopt.errors import BadInput
+from loomopt.maths import Number
 from loomopt.program.sampling import Tally
 
 Setting = float | int | str
@@ -40,11 +41,11 @@ class Reference:
     uncertainty: of the value, relative to `size`; size: what errors are relative to, the value itself without one.
     """
 
-    value: Any
+    value: Number
     uncertainty: float = 0.0
     size: float = 0.0
 
-    def error(self, value: Any) -> float:
+    def error(self, value: Number) -> float:
         """Return the largest relative error of a value."""
         pairs = list(zip(_each(value), _each(self.value), strict=True))
         size = self.size or max(abs(true) for _, true in pairs)
@@ -52,7 +53,7 @@ class Reference:
         return float(worst / size) if size else float(worst)
 
 
-def _each(value: Any) -> list[Any]:
+def _each(value: Number) -> list[Number]:
     """Return the numbers of a value; Python's own where they are NumPy's, so that every number system takes them."""
     if isinstance(value, np.ndarray):
         return list(value.astype(float).ravel().tolist())

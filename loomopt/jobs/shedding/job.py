@@ -8,6 +8,7 @@ from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import follower, moving
 from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
+from loomopt.mechanisms.cam_follower import Contact
 from loomopt.mechanisms.cam_motion import Spline, knots
 from loomopt.program.curves import Columns
 from loomopt.program.instant import Formula, Instant
@@ -77,8 +78,9 @@ class Shedding(Job):
         after: dict[str, Formula] = {}
         if sampler.model.has_quantity("curvature"):
 
-            def contact(at: Instant) -> Any:
-                return at.pose.contact(follower(at.values))
+            def contact(at: Instant) -> Contact:
+                found: Contact = at.pose.contact(follower(at.values))
+                return found
 
             after = {
                 "pressure_angle [rad]": lambda at: contact(at).pressure_angle,

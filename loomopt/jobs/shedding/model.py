@@ -9,7 +9,6 @@ import math
 from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from loomopt.balance import Given
 from loomopt.cycle import Node
@@ -168,7 +167,7 @@ class CamFrame:
             found[HALF_OPEN] = mirrored({**values, **found}, [self._middle(maths, {**values, **found})])
         return found
 
-    def _middle(self, maths: Maths, values: Values) -> Any:
+    def _middle(self, maths: Maths, values: Values) -> Number:
         """Return the u where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
         if self.law.symmetric or MIDDLE not in values:
             return Fraction(1, 2)
