@@ -1,12 +1,12 @@
 """The commands that show: scenes, figures of a design, curves, drawings, proofs. Nothing is optimised here."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from loomopt import api
+from loomopt import api, designs
 from loomopt.jobs import registry
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
@@ -25,9 +25,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
 
-def remarked(scene: Scene, design: Mapping[str, Any]) -> None:
+def remarked(scene: Scene, design: designs.Design) -> None:
     """Say on stderr what a reader of a design's figures should know."""
-    for text in registry.of(scene).views.remarks(scene, design):
+    for text in registry.of(scene).views.remarks(scene, designs.flat(design)):
         remark(f"Remark: {text}.")
 
 

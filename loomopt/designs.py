@@ -1,7 +1,7 @@
 """Designs from files: the JSON of a `design` object, or of a whole answer."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ LONGEST = 1000
 """Numbers in a list."""
 LARGEST = 1e60
 """SI; fourth powers of it are still numbers."""
+Design = Mapping[str, float | Sequence[float]]
+"""A design by label, SI and rad; parts of it may be lists of numbers."""
 _ALLOWED = "a finite number in SI units, not negative"
 _GIVE = "Give the JSON that `loomopt solve --json` prints, or its design object"
 
@@ -43,21 +45,22 @@ def read(path: Path, scene: Scene) -> dict[str, float]:
     return checked(data, scene, origin)
 
 
-def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, Any]:
+def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float | Sequence[float]]:
     """Return a design with NAME_0, NAME_1 ... of each named list as one tuple."""
-    found: dict[str, Any] = dict(design)
+    found: dict[str, float | Sequence[float]] = dict(design)
     for name in names:
         members = {k: key for key in design if (k := _place(key, name)) is not None}
         if members:
-            found[name] = tuple(found.pop(members[k]) for k in sorted(members))
+            found = {key: value for key, value in found.items() if key not in members.values()}
+            found[name] = tuple(design[members[k]] for k in sorted(members))
     return found
 
 
-def flat(design: Mapping[str, Any]) -> dict[str, float]:
+def flat(design: Design) -> dict[str, float]:
     """Return a design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
     found: dict[str, float] = {}
     for name, value in design.items():
-        found |= {f"{name}_{k}": v for k, v in enumerate(value)} if isinstance(value, list | tuple) else {name: value}
+        found |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
     return found
 
 
@@ -66,7 +69,7 @@ def _place(key: str, name: str) -> int | None:
     return int(number) if number != key and number.isdigit() else None
 
 
-def checked(data: Any, scene: Scene, origin: str = "<design>") -> dict[str, float]:
+def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, float]:
     """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput."""
     kinds = _numbers(scene)
     lists = {name: Quantity(kind) for name, kind in scene.schema.lists.items()}

@@ -2,6 +2,7 @@
 
 from html import escape
 
+from loomopt.designs import flat
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
@@ -15,7 +16,7 @@ def answer(solution: Solution, scene: Scene) -> str:
     shown = terminal.solution(solution, scene)
     parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
     view = registry.of(scene).views
-    drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, solution.design))
+    drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, flat(solution.design)))
     return f"<div>{''.join(parts)}{drawn}</div>"
 
 

@@ -5,10 +5,10 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from loomopt import __version__, tables
-from loomopt.designs import flat
+from loomopt.designs import Design, flat
 from loomopt.errors import BadInput
 from loomopt.files import atomically, suffix
 from loomopt.jobs import registry
@@ -28,12 +28,12 @@ def document(found: Evaluation) -> str:
     return json_text({"loomopt": __version__, **found.as_dict()})
 
 
-def json_text(data: Mapping[str, Any]) -> str:
+def json_text(data: Mapping[str, object]) -> str:
     """Return data as one JSON object; what is undefined is null."""
     return json.dumps(_speakable(data), indent=1, allow_nan=False)
 
 
-def _speakable(data: Any) -> Any:
+def _speakable(data: object) -> object:
     """Return data without the numbers JSON cannot say."""
     if isinstance(data, Mapping):
         return {name: _speakable(value) for name, value in data.items()}
@@ -65,7 +65,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     }
     view = registry.of(scene).views
     if not view.missing(scene):
-        contents["linkage.svg"] = svg.render(view.linkage(scene, solution.design))
+        contents["linkage.svg"] = svg.render(view.linkage(scene, flat(solution.design)))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -86,7 +86,7 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
 
 
-def curves(path: Path, scene: Scene, design: Mapping[str, float], accuracy: float | None = None) -> None:
+def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = None) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows."""
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy)
@@ -112,22 +112,22 @@ def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], pl
     figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
 
 
-def linkage(path: Path, scene: Scene, design: Mapping[str, float]) -> None:
+def linkage(path: Path, scene: Scene, design: Design) -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
     from loomopt.views import dxf, svg
 
-    ending, view = suffix(path, DRAWINGS), registry.of(scene).views
+    ending, view, given = suffix(path, DRAWINGS), registry.of(scene).views, flat(design)
     if ending == ".csv":
-        text(path, view.joints_csv(scene, design))
+        text(path, view.joints_csv(scene, given))
     elif ending == ".svg":
-        text(path, svg.render(view.linkage(scene, design)))
+        text(path, svg.render(view.linkage(scene, given)))
     else:
-        atomically(path, functools.partial(dxf.write, view.linkage(scene, design)))
+        atomically(path, functools.partial(dxf.write, view.linkage(scene, given)))
 
 
-def picture(path: Path, scene: Scene, design: Mapping[str, float]) -> None:
+def picture(path: Path, scene: Scene, design: Design) -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.views import figure
 
     suffix(path, PICTURES)
-    atomically(path, functools.partial(figure.draw, registry.of(scene).views.linkage(scene, design)))
+    atomically(path, functools.partial(figure.draw, registry.of(scene).views.linkage(scene, flat(design))))

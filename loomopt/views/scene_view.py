@@ -3,11 +3,11 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from loomopt.designs import flat
+from loomopt.cycle import Floats
+from loomopt.designs import Design, flat
 from loomopt.jobs import registry
 from loomopt.owned import label, owned
 from loomopt.scenes import Scene
@@ -37,7 +37,7 @@ def parts(scene: Scene) -> list[str | Grid]:
     for key, name, value in _values(scene):
         number = isinstance(value, int | float)
         unit = words.si(name) if number else "1"
-        size = f"{value:.9g}" if number else listed(value)
+        size = f"{value:.9g}" if isinstance(value, int | float) else listed(value)
         lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
     effects = tuple((name, scene.schema.effects[name].summary) for name in scene.effects)
     off = [name for name in scene.schema.effects if name not in scene.effects]
@@ -63,12 +63,12 @@ def _targets(scene: Scene) -> list[tuple[str, str, str]]:
     return lines
 
 
-def listed(values: Any) -> str:
+def listed(values: str | Sequence[float]) -> str:
     """Return a list of numbers in a few words; "" for a word."""
     return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
 
 
-def _values(scene: Scene) -> Iterator[tuple[str, str, Any]]:
+def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[float]]]:
     """Yield the dotted key of each number, word and list, what a designer calls it, and its SI value."""
     for table in ("operation", "mechanism"):
         for name, value in getattr(scene, table).items():
@@ -96,7 +96,7 @@ def equations(scene: Scene) -> list[str]:
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
-def curves(scene: Scene, design: Mapping[str, float], width: int | None) -> list[str | Grid]:
+def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
     """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
     job = registry.of(scene)
     full = {**job.today(scene), **flat(design)}
@@ -140,7 +140,7 @@ def _width(curve: tuple[str, list[str]]) -> int:
     return max(len(text) for text in (*head.split("\n"), *texts)) + len(GAP)
 
 
-def _curve(name: str, values: Any) -> tuple[str, list[str]]:
+def _curve(name: str, values: Floats) -> tuple[str, list[str]]:
     """Return a curve's heading and its cells, four digits of the largest, angles in degrees; empty where undefined."""
     symbol, _, unit = name.removesuffix("]").partition(" [")
     numbers = np.degrees(values) if unit == "rad" else np.asarray(values, dtype=float)

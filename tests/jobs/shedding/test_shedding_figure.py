@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import tables
+from loomopt import designs, tables
 from loomopt.jobs import registry
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.panels import Mark, Panel, split
@@ -172,7 +172,7 @@ def test_a_design_with_a_law_is_shown_by_its_own_curves():
     scene = lo.load("shedding")
     law = cycloid_like(4)
     columns = tuple(tables.curves(scene, {}).columns)
-    with_law = registry.of(scene).views.panels(scene, {"law": law}, columns)
+    with_law = registry.of(scene).views.panels(scene, designs.flat({"law": law}), columns)
     today = registry.of(scene).views.panels(scene, {}, columns)
     assert with_law[0].points != today[0].points
     assert with_law[0].columns == today[0].columns

@@ -6,6 +6,7 @@ import re
 import pytest
 
 import loomopt as lo
+from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.mechanisms.cam_spline import cycloid_like
 
@@ -13,7 +14,7 @@ SCENE = lo.load("shedding")
 
 
 def remarks(scene, design=None):
-    return registry.of(scene).views.remarks(scene, design or {})
+    return registry.of(scene).views.remarks(scene, designs.flat(design or {}))
 
 
 def narrow(**more):
