@@ -257,7 +257,7 @@ def test_reading_imports_little():
         "class Warm(pydantic.BaseModel): x: float = 0.0\n"
         "alone = sys.modules['loomopt'] = types.ModuleType('loomopt'); alone.__path__ = [sys.argv[1]]\n"
         "before = set(sys.modules); import loomopt.scenes\n"
-        "print(len(set(sys.modules) - before), [name for name in sys.argv[2:] if name in sys.modules])"
+        "new = set(sys.modules) - before; print(len(new), [name for name in sys.argv[2:] if name in new])"
     )
     heavy = ["numpy", "pint", "scipy", "pandas", "sympy", "matplotlib", "casadi", "importlib.metadata"]
     command = [sys.executable, "-c", code, str(Path(packaged.__file__).parent), *heavy]
