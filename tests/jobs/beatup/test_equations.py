@@ -2,17 +2,18 @@ import itertools
 import math
 import re
 
-import numpy as np
 import pytest
 import sympy as sp
 
-from loomopt import balance, cycle
-from loomopt.effects import BEATUP
+from loomopt import balance
+from loomopt.cycle import Node
+from loomopt.effects import found as declared
 from loomopt.jobs.beatup import equations as beatup_equations
-from loomopt.jobs.beatup.model import Beatup
+from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths import FLOAT
-from loomopt.schema import Load
 
+BEATUP = declared.of("loomopt.effects.beatup")
 SPEED = 62.83185307179586
 NUMBERS = {"l1": 0.031, "l2": 0.066, "l3": 0.155, "l4": 0.167, "today.l2": 0.065, "speed": SPEED, "M0": 745.0}
 NUMBERS |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}
@@ -38,10 +39,8 @@ SYMBOLS = {
 
 
 def model(*names, rod="exact"):
-    effects = [BEATUP[name] for name in names]
-    loads = tuple(effect for effect in effects if isinstance(effect, Load))
     options = (("rod_inertia", "model", rod),) if "rod_inertia" in names else ()
-    return Beatup(loads, tuple(e for e in effects if not isinstance(e, Load)), options, frozenset(NUMBERS))
+    return beatup.model(tuple(BEATUP[name] for name in names), options, frozenset(NUMBERS), RESISTED)
 
 
 def words(found):
@@ -71,11 +70,10 @@ def value(expression, named):
 def setting(found, phi):
     """Return the scene's numbers, the pose and the switches at a crank angle, by plain floats."""
     values = NUMBERS | {f"{name}.{key}": number for name, own in OWN.items() for key, number in own.items()}
-    given = found.given(FLOAT, {k: v for k, v in values.items() if "." not in k or k.split(".")[0] in (*OWN, "today")})
-    split = cycle.split(found.loads, found.corners(FLOAT, given))
-    turned = split.starts[0] + (phi - split.starts[0]) % cycle.TURN
-    switches = split.switches[np.searchsorted(split.starts, turned, side="right") - 1]
-    return given, found.pose(FLOAT, given, phi), switches
+    given = found.given(FLOAT, values)
+    split = found.split(FLOAT, given)
+    switches = split.switch(split.place(phi)[0])
+    return given, found.kinematics.pose(FLOAT, given, Node(phi, switches)), switches
 
 
 @pytest.mark.parametrize("rod", ["lumped", "exact"])
