@@ -12,6 +12,130 @@ NO_MASS = 1e-9
 BALANCED = 1e-8
 """|M3| at front dead centre below this share of the peak torque is called zero (words of the beat-up only)."""
 
+# Sampling and reading
+#
+# Rows are relative to their own largest magnitude; u is the share of a piece, 0 to 1.
+
+SAMPLES, LEAST_SHARE = 720, 8
+"""Samples of one turn from which extremes are refined at the usual accuracy, and the part of them that the narrowest
+piece gets. `loomopt accuracy` (refined points) is exact from 180 on today's machines; fourfold for sharper peaks."""
+
+SAMPLED = ((1e-3, 180), (1e-6, 360))
+"""Samples that are enough for a coarser accuracy: what refining misses at so many is far below it (same study)."""
+
+CLOSER = 1 / 8
+"""Step, in samples, of the five points that refine a sampled extreme: their quartic errs by the step's 6th power, 4e-6
+of what the samples' own would, and values a step apart still differ by far more than rounding."""
+
+GAUSS_NODES = 32
+"""Nodes of a mean on each piece: of an analytic formula the error falls by a constant factor a node, and is rounding
+before the 20th on every packaged piece (benchmarks/tolerances.py)."""
+
+SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90
+"""Crank angle, rad, within which a spike beside a singular position is sought: five samples; its halvings, to rounding
+of an angle of 2π (0.02/2^44 = 1e-15); golden sections of what brackets it: 0.618^90 = 1e-19."""
+
+ROOT_OF_ROUNDING = 1e-8
+"""What a maximum's place is right to where its value is right to 1e-16."""
+
+SPARSE_STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
+"""Equal steps of one turn that curves of few rows begin with, by accuracy; no stretch between corners gets fewer than
+LEAST_SHARE of them. Half the samples that are enough: rows are added around what they show."""
+
+SPARSE_ROUNDS, SPARSE_MOST_ROWS = 40, 20_000
+"""Rounds in which rows are added, each of which narrows a top's neighbourhood threefold (3^40 is past rounding), and
+rows beyond which a curve is as dense as any plot."""
+
+SPARSE_NEARLY, SPARSE_LEVEL = 0.8, 2e-13
+"""Share of a column's largest magnitude above which another top may turn out higher: a top between 90 rows stands less
+than a fifth above them. Share by which rows on a level may differ: a thousand roundings of the terms they sum."""
+
+SAME_ROW = 1e-9
+"""rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
+
+# NLP
+#
+# Variables, rows and objectives in their natural sizes. Experiments: benchmarks/tolerances.py solves every target of
+# the packaged scenes with one number at a time a tenth and ten times as large (counts: half and double).
+
+IPOPT_TOLERANCE, IPOPT_SLOPE, IPOPT_ITERATIONS = 1e-11, 1e-9, 300
+"""Where IPOPT stops: rows and complementarity three decades below the usual accuracy, slopes three below STATIONARY;
+and where it gives up: no packaged scene needs a hundred iterations."""
+
+WARM_BARRIER, WARM_PUSH = 1e-8, 1e-10
+"""Barrier that a warm start begins with, which leaves what binds a root of it, 1e-4, from its bound, and how far it is
+pushed inside: less than what IPOPT itself left."""
+
+PENALTY = 1000.0
+"""Weight of each earlier objective against the next, first try: more than twice the multiplier of any level that the
+packaged scenes hold; where it is not, the search raises it (STRONGER)."""
+
+CHECKED, MOST_CHECKED = 1.6384, 65536
+"""Points of one turn on which refined values are checked again, times √accuracy: what is missed between points falls
+with their square. 16384 for the usual accuracy, where a curve that bends by its size over a radian errs by 2e-8."""
+
+NEAR, ROUNDING = 1e-8, 1e-12
+"""Largest excess between nodes that ends the exchange whatever the accuracy: Newton's method must start near. And the
+smallest that is asked: a sum of rounded terms cannot be told closer."""
+
+BINDING = 1e-6
+"""Multiplier above which a row binds where a solve ends: IPOPT leaves TOLERANCE/distance, so what is farther than 1e-5
+from its bound is below it. A row wrongly held is told by the certificate."""
+
+FIRST_SLOTS, LEADING = 6, 4
+"""Nodes that a built NLP has room for (doubled when they are used up), and those of a start: its largest extremes."""
+
+FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
+"""Factor and room by which a first epigraph variable stands above its rows: inside, so that IPOPT need not move it."""
+
+ELASTIC_SHARE = 1e-3
+"""Share of a positive lower bound below which no relaxation goes: lengths stay positive."""
+
+EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
+"""Rounds of the exchange, each with an NLP solve. It converges quadratically where extremes are isolated, five rounds
+at most on packaged scenes; least relaxations are flat, and creep."""
+
+STANDS = 1e-7
+"""Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
+
+DRAWS = 200
+"""Random starts drawn for each that is wanted: one in 200 assembles even in the widest bounds of tests."""
+
+TOUCHING, SETTLED = 1e-8, 1e-8
+"""Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
+ROOT_OF_ROUNDING both, for a maximum's place is known no better."""
+
+POLISH_STEPS, POLISH_FARTHEST, POLISH_RANK = 3, 1e-6, 1e-10
+"""Newton steps of polishing (1e-6 squared twice is past rounding), the farthest they may lead, a thousand times what
+IPOPT leaves, and the singular value below which rows depend."""
+
+POLISH_MET, POLISH_DONE = 1e-12, 1e-13
+"""Excess of a polished row that is rounding of its terms, and the step after which there is none left to take."""
+
+FOLLOW_FARTHEST, FOLLOW_ROUNDS = 0.2, 24
+"""Farthest that a neighbour's answer is followed: farther the cycle is another; rounds, two of which IPOPT outweighs."""
+
+FOLLOW_PROGRESS, FOLLOW_PATIENCE = 0.9, 5
+"""Share to which the extremes' moves must shrink, and the rounds in a row in which they may fail to."""
+
+SAME_NODE = 1e-3
+"""Nodes of one piece this close in u stand for one extreme: less than a sample apart, they are no two maxima."""
+
+PIVOTS, PIVOT_NEWTON_STEPS, PIVOT_STEP = 20, 8, 1e-9
+"""Limits exchanged before the solver must choose, Newton steps to where they meet, and the step that ends them: what
+is left is its square."""
+
+PIVOT_MET, PIVOT_STATIONARY = 1e-12, 1e-9
+"""Excess and slope of a KKT point reached by pivots: IPOPT's own, met by Newton's method at once."""
+
+PIVOT_DEPENDENT, PIVOT_CURVED = 1e-7, 1e-6
+"""Part of a slope outside the span of others below which it depends on them, and curvature below which a direction is
+flat: both the size of what second derivatives change over a move of ROOT_OF_ROUNDING to 1e-7. Ten times more or less
+changes no answer (tests/nlp/test_pivot.py holds them to a thousand)."""
+
+PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10
+"""Rise toward a limit along a way, and relative singular value, that are no more than rounding of slopes."""
+
 # Certificate and search
 #
 # Sizes are natural sizes: a row, a variable or an objective divided by its own `scale`. Rows are read to 1e-15 of them

@@ -12,8 +12,7 @@ from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import Transcription, transcribe
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
-
-FIRST_SLOTS = 6
+from loomopt.tolerances import ELASTIC_SHARE, FIRST_ROOM, FIRST_SHARE, FIRST_SLOTS
 
 
 class Calls:
@@ -31,7 +30,7 @@ class Calls:
         return sampler_at(self.program, x, self.settings.sampled)
 
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
-        """Return the local extremes of each family's quantity."""
+        """Return the local extremes of each family's quantity, largest first."""
         return [sampler.extremes(family.row, family.where) for family in self.families]
 
     def transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
@@ -54,17 +53,10 @@ class Calls:
         nodes: Sequence[Sequence[Extreme]],
     ) -> dict[str, Any]:
         """Return what the NLP is called with: start, parameters and bounds, all scaled."""
-        variables = self.program.variables
-        lower = np.array([v.lower / v.scale for v in variables])
-        upper = np.array([v.upper / v.scale for v in variables])
-        if self.elastic:
-            sides = [(limit.row, limit.sign) for limit in self.program.limits if limit.family == "variable"]
-            down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
-            lower = np.where([v.name in down for v in variables], np.where(lower >= 0.0, 1e-3 * lower, -np.inf), lower)
-            upper = np.where([v.name in up for v in variables], np.inf, upper)
+        lower, upper = self._bounds()
         static = [self.program.limits[k].sign == 0 for k in nlp.structure.static]
         equal = static + [False] * (nlp.rows - len(static))
-        scaled = np.array([x[v.name] / v.scale for v in variables])
+        scaled = np.array([x[v.name] / v.scale for v in self.program.variables])
         return {
             "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
             "p": nlp.structure.vector(self.program, sampler, self.weights, nodes),
@@ -74,23 +66,39 @@ class Calls:
             "ubg": np.where(self.idle_rows(nlp, nodes), 1.0, 0.0),
         }
 
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """Return the variables' bounds, scaled; limits that may give way are none, but what is positive stays so."""
+        variables = self.program.variables
+        lower = np.array([v.lower / v.scale for v in variables])
+        upper = np.array([v.upper / v.scale for v in variables])
+        if not self.elastic:
+            return lower, upper
+        sides = [(limit.row, limit.sign) for limit in self.program.limits if limit.family == "variable"]
+        down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
+        least = np.where(lower >= 0.0, ELASTIC_SHARE * lower, -np.inf)
+        return (
+            np.where([v.name in down for v in variables], least, lower),
+            np.where([v.name in up for v in variables], np.inf, upper),
+        )
+
     def overdetermined(self, arguments: Mapping[str, Any]) -> bool:
         """Say whether more equalities than free variables leave nothing to solve for."""
         return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
 
     def design(self, flat: Floats) -> dict[str, float]:
         """Return the variables, SI, of the NLP's scaled vector."""
-        found = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, flat, strict=False)}
+        x = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, flat, strict=False)}
         if self.elastic:
-            return found
-        return {v.name: min(max(found[v.name], v.lower), v.upper) for v in self.program.variables}
+            return x
+        return {v.name: min(max(x[v.name], v.lower), v.upper) for v in self.program.variables}
 
     def first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> Floats:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.elastic:
             return np.ones(nlp.structure.extras)
         first = np.array([self._worst(k, sampler, peaks) for k in range(len(self.epigraphs))])
-        return np.asarray(np.where(first < 0.0, 0.99, 1.01) * first + 0.01)
+        share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
+        return np.asarray(share * first + FIRST_ROOM)
 
     def _worst(self, place: int, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> float:
         """Return what an epigraph variable stands above, in the objective's natural size."""
@@ -120,3 +128,8 @@ class Calls:
         bound = limit.bound / limit.scale
         bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
         return float(extreme.height / limit.scale - bound)
+
+    def violation(self, peaks: Sequence[Sequence[Extreme]], extra: Floats) -> float:
+        """Return the largest excess of an extreme, relative to its row's size; 0 where there is none."""
+        pairs = zip(self.families, peaks, strict=True)
+        return max((self.excess(family, e, extra) for family, of in pairs for e in of), default=0.0)

@@ -1,160 +1,121 @@
-"""Newton's method on what binds, with each whole-cycle row standing on its own extreme as that moves."""
+"""The answer near a solved neighbour, by pivots alone: each whole-cycle row stands on its own extreme as that moves.
+
+A fixed-point iteration: put nodes on the extremes, pivot to the KKT point, find the extremes there. It is the reduction
+method for semi-infinite programs with a fixed number of nodes [Hettich and Kortanek, SIAM Review 35 (1993), section 7].
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.nlp.calls import FIRST_SLOTS, Calls
-from loomopt.nlp.pivot import bound_by, reach
+from loomopt.nlp.calls import Calls
+from loomopt.nlp.pivot import active_by, reach
 from loomopt.nlp.point import Point
-from loomopt.nlp.polish import BINDING, binding, met
 from loomopt.program.sampling import Extreme, Sampler
-
-TOUCHING, SETTLED, POLISHES, POLISH = 1e-8, 1e-8, 3, 1e-6
-"""Rows this close to their bound are polished onto it, in steps up to POLISH; below SETTLED no extreme moves."""
-FOLLOW, FOLLOW_ROUNDS, PATIENCE = 0.2, 24, 5
-"""Farthest that a neighbour's answer is followed, in the variables' own scales; rounds in all, and the rounds in a
-row that may leave the extremes moving as far as ever."""
-ALIKE = 1e-3
-"""Nodes of one piece this close in u stand for one extreme."""
+from loomopt.tolerances import (
+    BINDING,
+    FIRST_SLOTS,
+    FOLLOW_FARTHEST,
+    FOLLOW_PATIENCE,
+    FOLLOW_PROGRESS,
+    FOLLOW_ROUNDS,
+    SAME_NODE,
+    SETTLED,
+)
 
 Nodes = Sequence[Sequence[Extreme]]
+"""Nodes of each family."""
 
 
-def polish(
-    calls: Calls, x: dict[str, float], extra: Floats, point: Point, peaks: Nodes
-) -> tuple[dict[str, float], Nodes]:
-    """Return x (SI) put exactly on what binds, and the extremes that do; x itself where that is no small, clear step.
+@dataclass(frozen=True)
+class _Change:
+    """What binding nodes did in a round: where each stood on its piece, and how far the extreme has moved from it."""
 
-    extra: the epigraph variables; point: the solver's answer with its multipliers; peaks: the extremes at x.
-    """
-    touching: Nodes = ()
-    for _ in range(POLISHES):
-        sampler = calls.sampler(x)
-        if sampler is None:
-            return x, touching
-        touching = [
-            [e for e in found if calls.excess(family, e, extra) >= -TOUCHING]
-            for family, found in zip(calls.families, peaks, strict=True)
-        ]
-        reached = _newton(calls, sampler, x, extra, point, touching, POLISHES, POLISH)
-        if reached is None:
-            return x, touching
-        flat, step = reached
-        x, extra = calls.design(flat), flat[len(calls.program.variables) :]
-        moved = calls.sampler(x)
-        if moved is None or step <= SETTLED:
-            return x, touching
-        peaks = calls.peaks(moved)
-    return x, touching
+    u: Floats
+    move: Floats
+
+    @property
+    def largest(self) -> float:
+        """The farthest move."""
+        return float(np.abs(self.move).max(initial=0.0))
 
 
 def follow(calls: Calls, warm: Point) -> Point | None:
-    """Return the answer near a solved neighbour by pivots alone, each whole-cycle row on its own extreme.
-
-    None where they lead nowhere: then the solver must choose what binds.
-    """
-    point: Point | None = warm
-    found: Nodes = warm.nodes
+    """Return the answer near a solved neighbour; None where pivots lead nowhere: the solver must choose what binds."""
     sampler = calls.sampler(warm.x)
-    order = sampler.cycle.order if sampler else ()
+    if sampler is None:
+        return None
+    order, point, nodes = sampler.cycle.order, warm, warm.nodes
     nearest, idle, last = math.inf, 0, None
     for _ in range(FOLLOW_ROUNDS):
-        point = _pivoted(calls, sampler, point, found) if sampler and point else None
-        sampler = calls.sampler(point.x) if point else None
-        if sampler is None or point is None or sampler.cycle.order != order:
+        pivoted = _pivoted(calls, sampler, point, nodes)
+        sampler = calls.sampler(pivoted.x) if pivoted else None
+        if pivoted is None or sampler is None or sampler.cycle.order != order:
             return None
-        found = tuple(map(tuple, calls.peaks(sampler)))
-        pairs = [(node, _same(of, node)) for of, old in zip(found, point.binding, strict=True) for node in old]
-        families = zip(calls.families, found, strict=True)
-        worst = max((calls.excess(family, e, point.raw["extra"]) for family, of in families for e in of), default=0.0)
-        moved = max((abs(node.u - now.u) for node, now in pairs), default=0.0)
-        if worst <= calls.settings.excess and moved <= SETTLED:
-            return replace(point, iterations=0, violation=worst, built=calls.built)
-        found, last = _hastened(found, pairs, last)
-        idle = 0 if moved < 0.9 * nearest else idle + 1
-        nearest = min(nearest, moved)
-        if idle == PATIENCE:
+        point, extremes = pivoted, calls.peaks(sampler)
+        violation = calls.violation(extremes, point.raw["extra"])
+        become = [(old, _nearest(of, old)) for of, own in zip(extremes, point.binding, strict=True) for old in own]
+        change = _Change(np.array([old.u for old, _ in become]), np.array([now.u - old.u for old, now in become]))
+        if violation <= calls.settings.excess and change.largest <= SETTLED:
+            return replace(point, iterations=0, violation=violation, built=calls.built)
+        nodes = _aimed(extremes, [now for _, now in become], change, last)
+        idle = 0 if change.largest < FOLLOW_PROGRESS * nearest else idle + 1
+        if idle == FOLLOW_PATIENCE:
             return None
+        nearest, last = min(nearest, change.largest), change
     return None
 
 
-def _hastened(
-    found: Nodes, pairs: Sequence[tuple[Extreme, Extreme]], last: tuple[Floats, Floats] | None
-) -> tuple[Nodes, tuple[Floats, Floats]]:
-    """Return the extremes with those that bind moved to where the last two rounds point, and this round's (u, move).
+def _aimed(
+    extremes: Nodes, binding: Sequence[Extreme], change: _Change, last: _Change | None
+) -> tuple[tuple[Extreme, ...], ...]:
+    """Return the extremes with those that bind moved to where the last two rounds point.
 
     Where the objective is nearly flat, extremes and design chase each other in circles: the secant through two rounds
-    (Anderson's mixing) ends that.
+    ends that [Anderson's mixing of depth 1: Walker and Ni, SIAM J. Numer. Anal. 49 (2011)].
     """
-    u = np.array([node.u for node, _ in pairs])
-    move = np.array([now.u - node.u for node, now in pairs])
-    if last is None or last[0].shape != u.shape or not np.any(move != last[1]):
-        return found, (u, move)
-    turned = move - last[1]
-    share = float(turned @ move / (turned @ turned))
-    goal = u + move - share * (u - last[0] + turned)
-    aims = {id(now): min(max(float(to), 0.0), 1.0) for (_, now), to in zip(pairs, goal, strict=True)}
-    return [[replace(e, u=aims.get(id(e), e.u)) for e in of] for of in found], (u, move)
+    aims: dict[int, float] = {}
+    if last is not None and last.u.shape == change.u.shape and np.any(change.move != last.move):
+        turned = change.move - last.move
+        share = float(turned @ change.move / (turned @ turned))
+        goals = change.u + change.move - share * (change.u - last.u + turned)
+        aims = {id(now): min(max(float(to), 0.0), 1.0) for now, to in zip(binding, goals, strict=True)}
+    return tuple(tuple(replace(e, u=aims.get(id(e), e.u)) for e in of) for of in extremes)
 
 
-def _pivoted(calls: Calls, sampler: Sampler, point: Point, found: Nodes) -> Point | None:
-    """Return the point that pivots lead to from another, with nodes on the extremes `found`; None without one."""
+def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:
+    """Return the point that pivots lead to from another, with nodes on the extremes; None without one."""
     variables = len(calls.program.variables)
-    nodes = [_chosen(of, old) for of, old in zip(found, point.binding, strict=True)]
+    nodes = [_chosen(of, old) for of, old in zip(extremes, point.binding, strict=True)]
     nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
     arguments = calls.arguments(nlp, sampler, point.x, np.asarray(point.raw["extra"]), nodes)
-    first = len(arguments["ubg"]) - len(calls.families) * nlp.slots
-    bound = [k < len(old) for old in point.binding for k in range(nlp.slots)]
-    lam_g = np.concatenate([point.raw["lam_g"][:first], np.array(bound, dtype=float)])
-    reached = reach(nlp, arguments, bound_by(point.raw["lam_x"], lam_g, BINDING), FOLLOW)
+    first = nlp.rows - len(calls.families) * nlp.slots
+    # Binding nodes come first in their family.
+    binds = [k < len(old) for old in point.binding for k in range(nlp.slots)]
+    prices = np.concatenate([point.raw["lam_g"][:first], np.array(binds, dtype=float)])
+    reached = reach(nlp, arguments, active_by(point.raw["lam_x"], prices, BINDING), FOLLOW_FARTHEST)
     if reached is None:
         return None
-    rows, above, below = np.split(reached.multipliers, [len(lam_g), len(lam_g) + len(reached.x)])
+    rows, above, below = np.split(reached.multipliers, [nlp.rows, nlp.rows + len(reached.x)])
     raw = {"lam_x": above - below, "lam_g": rows, "extra": reached.x[variables:]}
-    flags = reached.bound[first : len(lam_g)].reshape(len(nodes), nlp.slots)
+    active = reached.active[first : nlp.rows].reshape(len(nodes), nlp.slots)
     binding = tuple(
-        tuple(e for e, binds in zip(of, on, strict=False) if binds) for of, on in zip(nodes, flags, strict=True)
+        tuple(e for e, on in zip(of, flags, strict=False) if on) for of, flags in zip(nodes, active, strict=True)
     )
     return replace(point, x=calls.design(reached.x), nodes=tuple(map(tuple, nodes)), raw=raw, binding=binding)
 
 
-def _chosen(found: Sequence[Extreme], binding: Sequence[Extreme]) -> list[Extreme]:
+def _chosen(extremes: Sequence[Extreme], binding: Sequence[Extreme]) -> list[Extreme]:
     """Return the extremes that the binding ones have become, then others, as many as there is room for."""
-    first = [_same(found, node) for node in binding]
-    others = [e for e in found if not any(e.piece == f.piece and abs(e.u - f.u) <= ALIKE for f in first)]
+    first = [_nearest(extremes, node) for node in binding]
+    others = [e for e in extremes if not any(e.piece == f.piece and abs(e.u - f.u) <= SAME_NODE for f in first)]
     return first + others[: max(0, FIRST_SLOTS - len(first))]
 
 
-def _newton(
-    calls: Calls,
-    sampler: Sampler,
-    x: dict[str, float],
-    extra: Floats,
-    point: Point,
-    nodes: Nodes,
-    steps: int,
-    largest: float,
-) -> tuple[Floats, float] | None:
-    """Return the scaled point where the binding rows and the nodes' rows are met, and the step there.
-
-    None where there is no such point nearby.
-    """
-    nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
-    arguments = calls.arguments(nlp, sampler, x, extra, nodes)
-    rows = len(arguments["ubg"]) - len(calls.families) * nlp.slots
-    used = ~np.array(calls.idle_rows(nlp, nodes)[rows:], dtype=bool)
-    bound = binding(point.raw["lam_x"], np.concatenate([point.raw["lam_g"][:rows], used.astype(float)]))
-    flat = met(nlp.jacobian, arguments, arguments["x0"], bound, steps=steps, largest=largest)
-    if flat is None:
-        return None
-    return flat, float(np.abs(flat - arguments["x0"]).max())
-
-
-def _same(found: Sequence[Extreme], node: Extreme) -> Extreme:
+def _nearest(extremes: Sequence[Extreme], node: Extreme) -> Extreme:
     """Return the extreme a node has become: the nearest of its sign on its piece, itself where there is none."""
-    alike = [e for e in found if e.piece == node.piece and e.sign == node.sign]
+    alike = [e for e in extremes if e.piece == node.piece and e.sign == node.sign]
     return min(alike, key=lambda extreme: abs(extreme.u - node.u), default=node)

@@ -3,15 +3,16 @@
 from typing import Any
 
 from loomopt.nlp.point import Settings
+from loomopt.tolerances import IPOPT_ITERATIONS, IPOPT_SLOPE, IPOPT_TOLERANCE, WARM_BARRIER, WARM_PUSH
 
 IPOPT = {
-    "tol": 1e-11,
-    "dual_inf_tol": 1e-9,
-    "constr_viol_tol": 1e-11,
-    "compl_inf_tol": 1e-11,
+    "tol": IPOPT_TOLERANCE,
+    "dual_inf_tol": IPOPT_SLOPE,
+    "constr_viol_tol": IPOPT_TOLERANCE,
+    "compl_inf_tol": IPOPT_TOLERANCE,
     "bound_relax_factor": 0.0,
     "acceptable_iter": 0,
-    "max_iter": 300,
+    "max_iter": IPOPT_ITERATIONS,
     "mu_strategy": "adaptive",
     "nlp_scaling_method": "none",
     "mumps_permuting_scaling": 0,
@@ -21,20 +22,20 @@ IPOPT = {
 }
 WARM = {
     "warm_start_init_point": "yes",
-    "mu_init": 1e-8,
-    "warm_start_bound_push": 1e-10,
-    "warm_start_bound_frac": 1e-10,
-    "warm_start_slack_bound_push": 1e-10,
-    "warm_start_slack_bound_frac": 1e-10,
-    "warm_start_mult_bound_push": 1e-10,
+    "mu_init": WARM_BARRIER,
+    "warm_start_bound_push": WARM_PUSH,
+    "warm_start_bound_frac": WARM_PUSH,
+    "warm_start_slack_bound_push": WARM_PUSH,
+    "warm_start_slack_bound_frac": WARM_PUSH,
+    "warm_start_mult_bound_push": WARM_PUSH,
 }
 
 
 def ipopt_options(settings: Settings, warm: bool) -> dict[str, Any]:
     """Return IPOPT's options, with those that a study of methods changes; warm: from a solution nearby."""
-    found: dict[str, Any] = IPOPT | (WARM if warm else {})
+    options: dict[str, Any] = IPOPT | (WARM if warm else {})
     if settings.tolerance:
-        found |= dict.fromkeys(("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol"), settings.tolerance)
+        options |= dict.fromkeys(("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol"), settings.tolerance)
     if settings.hessian != "exact":
-        found["hessian_approximation"] = settings.hessian
-    return found
+        options["hessian_approximation"] = settings.hessian
+    return options

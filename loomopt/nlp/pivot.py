@@ -1,166 +1,235 @@
-"""Which limits bind after a change of the numbers: Newton's method on what binds, with pivots where that fails.
+"""Which limits bind after a change of the numbers: an active-set method [Nocedal and Wright, chapter 16].
 
-Limits are an NLP's rows, then the upper and the lower bounds of its variables, each as excess ≤ 0. Where the binding
-limits meet outside another, that one binds instead of the first whose multiplier it brings to zero; a limit with a
-negative multiplier lets go, as far as the curvature wants or the first limit in the way. At a vertex (as many limits
-bind as there are directions) this is the simplex method on curved rows. Flat directions stay put: steps are the least
-that do.
+Limits are an NLP's rows, then the upper and the lower bounds of its variables, each as excess ≤ 0; rows may be curved.
+Newton's method meets the active ones; then one is exchanged: where they meet outside another, that one becomes active
+instead of the first whose multiplier it brings to zero (the dual simplex method's ratio test); one with a negative
+multiplier lets go, as far as the curvature wants or the first limit in the way (the primal one's). Flat directions stay
+put: steps are the least that do.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.cycle import Floats
-from loomopt.nlp.transcribe import Transcription
-
-PIVOTS, STEPS = 20, 8
-CONVERGED = 1e-9
-"""Newton's method ends with a step this short: what is left is its square."""
-TIDY, STATIONARY = 1e-12, 1e-9
-DEPENDENT, CURVED = 1e-7, 1e-6
-"""Below them a slope is a combination of others', and a direction is flat."""
-SLOPE, RANK = 1e-9, 1e-10
+from loomopt.tolerances import (
+    PIVOT_CURVED,
+    PIVOT_DEPENDENT,
+    PIVOT_MET,
+    PIVOT_NEWTON_STEPS,
+    PIVOT_RANK,
+    PIVOT_SLOPE,
+    PIVOT_STATIONARY,
+    PIVOT_STEP,
+    PIVOTS,
+)
 
 Flags = NDArray[np.bool_]
 
 
+class Derivatives(Protocol):
+    """What is asked of an NLP: functions of x, scaled, and its parameters, as CasADi calls them."""
+
+    @property
+    def jacobian(self) -> Any:
+        """(x, p) → rows and their first derivatives."""
+
+    @property
+    def gradient(self) -> Any:
+        """(x, p) → the objective and its first derivatives."""
+
+    @property
+    def curvature(self) -> Any:
+        """(x, p, weight of the objective, multipliers of rows) → the Lagrangian's second derivatives, upper half."""
+
+
 @dataclass(frozen=True)
 class Reached:
-    """A KKT point: x scaled; which limits bind, and the multipliers of all, 0 for those that do not."""
+    """A KKT point: x scaled; which limits are active, and the multipliers of all, 0 for those that are not."""
 
     x: Floats
-    bound: Flags
+    active: Flags
     multipliers: Floats
 
 
-def bound_by(lam_x: Floats, lam_g: Floats, threshold: float) -> Flags:
-    """Return which limits bind, from a solver's multipliers."""
+@dataclass(frozen=True)
+class _Problem:
+    """An NLP with its numbers; firm: limits that are active whatever their multiplier: equalities, held variables."""
+
+    nlp: Derivatives
+    arguments: Mapping[str, Any]
+    firm: Flags
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """Where the active limits meet: all limits' excess and slopes there."""
+
+    x: Floats
+    active: Flags
+    excess: Floats
+    slopes: Floats
+
+    @property
+    def held(self) -> NDArray[np.intp]:
+        """The places of the active limits."""
+        return np.flatnonzero(self.active)
+
+
+@dataclass(frozen=True)
+class _Priced:
+    """A meeting with the multipliers of its active limits, and what slope of the objective they leave."""
+
+    at: _Meeting
+    prices: Floats
+    left: Floats
+
+    @property
+    def multipliers(self) -> Floats:
+        """The multipliers of all limits."""
+        found = np.zeros(len(self.at.active))
+        found[self.at.held] = self.prices
+        return found
+
+
+class _Step(NamedTuple):
+    """Where to look next, and with which limits active."""
+
+    x: Floats
+    active: Flags
+
+
+def active_by(lam_x: Floats, lam_g: Floats, threshold: float) -> Flags:
+    """Return which limits are active, from a solver's multipliers."""
     return np.concatenate([np.abs(lam_g), lam_x, -lam_x]) > threshold
 
 
-def reach(nlp: Transcription, arguments: Mapping[str, Any], bound: Flags, farthest: float) -> Reached | None:
-    """Return the KKT point that pivots lead to from arguments["x0"] and the limits that bound there.
+def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthest: float) -> Reached | None:
+    """Return the KKT point that pivots lead to from arguments["x0"] and the limits that were active there.
 
     None where there is none within `farthest`, scaled.
     """
-    walk = _Walk(nlp, arguments, bound)
+    fixed = arguments["lbx"] == arguments["ubx"]
+    firm = np.concatenate([arguments["lbg"] == 0.0, fixed, np.zeros(len(fixed), dtype=bool)])
+    problem = _Problem(nlp, arguments, firm)
+    # A held variable is active once, at its upper bound.
+    below = np.concatenate([np.zeros(len(firm) - len(fixed), dtype=bool), fixed])
+    step: _Step | None = _Step(arguments["x0"], (active | firm) & ~below)
     for _ in range(PIVOTS):
-        if not walk.meet() or np.abs(walk.x - arguments["x0"]).max() > farthest:
+        meeting = _met(problem, step) if step else None
+        if meeting is None or np.abs(meeting.x - arguments["x0"]).max() > farthest:
             return None
-        done = walk.slide() if walk.slope() > STATIONARY else walk.pivot()
-        if done is not None:
-            return walk.reached() if done else None
+        here = _priced(problem, meeting)
+        if np.abs(here.left).max() > PIVOT_STATIONARY:
+            step = _slid(problem, here)
+        elif meeting.excess[_worst(meeting)] > PIVOT_MET:
+            step = _entered(problem, here)
+        elif _dual_feasible(problem, here):
+            return Reached(np.clip(meeting.x, arguments["lbx"], arguments["ubx"]), meeting.active, here.multipliers)
+        else:
+            step = _left(problem, here)
     return None
 
 
-class _Walk:
-    """Where the pivots stand: x, the limits that bind, and what is known there."""
+def _met(problem: _Problem, step: _Step) -> _Meeting | None:
+    """Return where the active limits meet, by Newton's method with the least change; None where they do not."""
+    arguments, (x, active) = problem.arguments, step
+    unit = np.eye(len(x))
+    for _ in range(PIVOT_NEWTON_STEPS):
+        rows, jacobian = problem.nlp.jacobian(x, arguments["p"])
+        bounds = x - arguments["ubx"], arguments["lbx"] - x
+        excess = np.concatenate([np.asarray(rows).ravel() - arguments["ubg"], *bounds])
+        slopes = np.concatenate([np.asarray(jacobian), unit, -unit])
+        if not np.all(np.isfinite(slopes)):
+            return None
+        change = _least(slopes[active], -excess[active])
+        x, excess = x + change, excess + slopes @ change
+        if np.abs(change).max() <= PIVOT_STEP:
+            met = np.abs(excess[active]).max(initial=0.0) <= PIVOT_MET
+            return _Meeting(x, active, excess, slopes) if met else None
+    return None
 
-    def __init__(self, nlp: Transcription, arguments: Mapping[str, Any], bound: Flags) -> None:
-        self.nlp, self.arguments = nlp, arguments
-        self.x: Floats = arguments["x0"]
-        self.size = len(self.x)
-        fixed = arguments["lbx"] == arguments["ubx"]
-        self.firm = np.concatenate([arguments["lbg"] == 0.0, fixed, np.zeros(self.size, dtype=bool)])
-        self.bound = bound | self.firm
-        self.bound[-self.size :] &= ~fixed
 
-    def meet(self) -> bool:
-        """Move to where the binding limits meet, by the least change; says whether they do."""
-        arguments, unit = self.arguments, np.eye(self.size)
-        for _ in range(STEPS):
-            rows, jacobian = self.nlp.jacobian(self.x, arguments["p"])
-            bounds = self.x - arguments["ubx"], arguments["lbx"] - self.x
-            excess = np.concatenate([np.asarray(rows).ravel() - arguments["ubg"], *bounds])
-            self.slopes = np.concatenate([np.asarray(jacobian), unit, -unit])
-            if not np.all(np.isfinite(self.slopes)):
-                return False
-            step = _least(self.slopes[self.bound], -excess[self.bound])
-            self.x, self.excess = self.x + step, excess + self.slopes @ step
-            if np.abs(step).max() <= CONVERGED:
-                return bool(np.abs(self.excess[self.bound]).max(initial=0.0) <= TIDY)
-        return False
+def _priced(problem: _Problem, at: _Meeting) -> _Priced:
+    """Return a meeting with the least-squares multipliers of what is active."""
+    gradient = np.asarray(problem.nlp.gradient(at.x, problem.arguments["p"])[1]).ravel()
+    prices = _least(at.slopes[at.held].T, -gradient)
+    return _Priced(at, prices, gradient + prices @ at.slopes[at.held])
 
-    def slope(self) -> float:
-        """Find the multipliers; returns the largest slope of the objective that they leave."""
-        gradient = np.asarray(self.nlp.gradient(self.x, self.arguments["p"])[1]).ravel()
-        self.held = np.flatnonzero(self.bound)
-        self.prices = _least(self.slopes[self.held].T, -gradient)
-        self.left = gradient + self.prices @ self.slopes[self.held]
-        return float(np.abs(self.left).max())
 
-    def slide(self) -> bool | None:
-        """Go along the binding limits to where the slope vanishes, or to the first limit in the way; False: cannot."""
-        _, sizes, basis = np.linalg.svd(self.slopes[self.held])
-        flat = basis[int(np.sum(sizes > RANK * sizes.max(initial=1.0))) :].T
-        bends, ways = np.linalg.eigh(flat.T @ self._curvature() @ flat)
-        ways, bends = flat @ ways[:, np.abs(bends) > CURVED], bends[np.abs(bends) > CURVED]
-        rest = self.left - ways @ (ways.T @ self.left)
-        if np.any(bends < 0) or np.abs(rest).max() > STATIONARY:
-            return False
-        self._go(-ways @ ((ways.T @ self.left) / bends), 1.0)
+def _worst(at: _Meeting) -> int:
+    """Return the limit that is broken most of those that are not active."""
+    return int(np.argmax(np.where(at.active, -np.inf, at.excess)))
+
+
+def _dual_feasible(problem: _Problem, here: _Priced) -> bool:
+    """Say whether no active limit that may let go has a negative multiplier."""
+    return bool(here.prices[~problem.firm[here.at.held]].min(initial=0.0) >= -PIVOT_STATIONARY)
+
+
+def _slid(problem: _Problem, here: _Priced) -> _Step | None:
+    """Return the step along the active limits to where the slope vanishes, or to the first limit in the way."""
+    _, sizes, basis = np.linalg.svd(here.at.slopes[here.at.held])
+    open_ways = basis[int(np.sum(sizes > PIVOT_RANK * sizes.max(initial=1.0))) :].T
+    bends, ways = np.linalg.eigh(open_ways.T @ _curvature(problem, here) @ open_ways)
+    curved = np.abs(bends) > PIVOT_CURVED
+    bends, ways = bends[curved], open_ways @ ways[:, curved]
+    rest = here.left - ways @ (ways.T @ here.left)
+    if np.any(bends < 0) or np.abs(rest).max() > PIVOT_STATIONARY:
         return None
+    return _moved(here.at, here.at.active, -ways @ ((ways.T @ here.left) / bends), 1.0)
 
-    def pivot(self) -> bool | None:
-        """Exchange one binding limit; True where there is nothing left to gain, False where none can give way."""
-        slack = ~self.firm[self.held]
-        worst = int(np.argmax(np.where(self.bound, -np.inf, self.excess)))
-        if self.excess[worst] > TIDY:
-            return self._enter(worst, slack)
-        if not slack.any() or self.prices[slack].min() >= -STATIONARY:
-            return True
-        loosest = int(np.argmin(np.where(slack, self.prices, np.inf)))
-        way = _least(self.slopes[self.held], -1.0 * (np.arange(len(self.held)) == loosest))
-        bend = way @ self._curvature() @ way
-        self.bound[self.held[loosest]] = False
-        return None if self._go(way, -self.prices[loosest] / bend if bend > CURVED else np.inf) else False
 
-    def reached(self) -> Reached:
-        """Return where the walk has ended."""
-        multipliers = np.zeros(len(self.bound))
-        multipliers[self.held] = self.prices
-        return Reached(np.clip(self.x, self.arguments["lbx"], self.arguments["ubx"]), self.bound, multipliers)
+def _entered(problem: _Problem, here: _Priced) -> _Step | None:
+    """Return the active set with the worst broken limit in it, in place of the one it brings to zero first."""
+    at, worst, active = here.at, _worst(here.at), here.at.active.copy()
+    slopes = at.slopes[at.held]
+    shares = _least(slopes.T, at.slopes[worst])
+    if np.abs(at.slopes[worst] - shares @ slopes).max() <= PIVOT_DEPENDENT:
+        givers = ~problem.firm[at.held] & (shares > PIVOT_SLOPE)
+        if not givers.any():
+            return None
+        ratios = np.maximum(here.prices, 0.0) / np.where(givers, shares, 1.0)
+        active[at.held[np.argmin(np.where(givers, ratios, np.inf))]] = False
+    active[worst] = True
+    return _Step(at.x, active)
 
-    def _enter(self, worst: int, slack: Flags) -> bool | None:
-        """Let a broken limit bind, in place of the one whose multiplier it brings to zero first."""
-        slopes = self.slopes[self.held]
-        shares = _least(slopes.T, self.slopes[worst])
-        if np.abs(self.slopes[worst] - shares @ slopes).max() <= DEPENDENT:
-            givers = slack & (shares > SLOPE)
-            if not givers.any():
-                return False
-            ratios = np.maximum(self.prices, 0.0) / np.where(givers, shares, 1.0)
-            self.bound[self.held[np.argmin(np.where(givers, ratios, np.inf))]] = False
-        self.bound[worst] = True
+
+def _left(problem: _Problem, here: _Priced) -> _Step | None:
+    """Return the step away from the active limit of the most negative multiplier; None where nothing ends it."""
+    at, active = here.at, here.at.active.copy()
+    loosest = int(np.argmin(np.where(problem.firm[at.held], np.inf, here.prices)))
+    way = _least(at.slopes[at.held], -1.0 * (np.arange(len(at.held)) == loosest))
+    bend = way @ _curvature(problem, here) @ way
+    active[at.held[loosest]] = False
+    return _moved(at, active, way, -here.prices[loosest] / bend if bend > PIVOT_CURVED else np.inf)
+
+
+def _moved(at: _Meeting, active: Flags, way: Floats, farthest: float) -> _Step | None:
+    """Return the step along a way, or to the first limit in it, which is active then; None where it has no end."""
+    rise = at.slopes @ way
+    rising = ~active & (rise > PIVOT_SLOPE)
+    room = np.where(rising, np.maximum(-at.excess, 0.0) / np.where(rising, rise, 1.0), np.inf)
+    first = int(np.argmin(room))
+    length = min(room[first], farthest)
+    if not np.isfinite(length):
         return None
+    if room[first] < farthest:
+        active = active | (np.arange(len(active)) == first)
+    return _Step(at.x + length * way, active)
 
-    def _go(self, way: Floats, farthest: float) -> bool:
-        """Go along a way, or to the first limit in it, which then binds; says whether there was an end to it."""
-        rise = self.slopes @ way
-        rising = ~self.bound & (rise > SLOPE)
-        room = np.where(rising, np.maximum(-self.excess, 0.0) / np.where(rising, rise, 1.0), np.inf)
-        stop = int(np.argmin(room))
-        if room[stop] < farthest:
-            self.bound[stop] = True
-        length = min(room[stop], farthest)
-        if np.isfinite(length):
-            self.x = self.x + length * way
-        return bool(np.isfinite(length))
 
-    def _curvature(self) -> Floats:
-        """Return the Lagrangian's second derivatives."""
-        multipliers = np.zeros(len(self.bound))
-        multipliers[self.held] = self.prices
-        rows = multipliers[: len(self.bound) - 2 * self.size]
-        upper = np.asarray(self.nlp.curvature(self.x, self.arguments["p"], 1.0, rows))
-        full: Floats = upper + upper.T - np.diag(np.diag(upper))
-        return full
+def _curvature(problem: _Problem, here: _Priced) -> Floats:
+    """Return the Lagrangian's second derivatives."""
+    rows = here.multipliers[: len(here.at.active) - 2 * len(here.at.x)]
+    upper = np.asarray(problem.nlp.curvature(here.at.x, problem.arguments["p"], 1.0, rows))
+    full: Floats = upper + upper.T - np.diag(np.diag(upper))
+    return full
 
 
 def _least(matrix: Floats, target: Floats) -> Floats:
     """Return the shortest vector that matrix takes nearest to a target."""
-    return np.asarray(np.linalg.lstsq(matrix, target, rcond=RANK)[0], dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(matrix, target, rcond=PIVOT_RANK)[0], dtype=np.float64)

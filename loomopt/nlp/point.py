@@ -8,17 +8,9 @@ from typing import Any
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
-from loomopt.program.sampling import SAMPLES, Extreme, Sampler
+from loomopt.program.sampling import Extreme, Sampler
+from loomopt.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, ROUNDING, SAMPLED, SAMPLES
 
-PENALTY = 1000.0
-"""Weight of each earlier objective against the next; it must exceed twice the held objective's multiplier."""
-SAMPLED = ((1e-3, 180), (1e-6, 360))
-"""Samples of one turn that are enough for an accuracy."""
-CHECKED, MOST_CHECKED = 1.6384, 65536
-"""16384 points for the usual 1e-8."""
-NEAR = 1e-8
-ROUNDING = 1e-12
-"""A whole-cycle value cannot be told closer, relative to its size."""
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 
 

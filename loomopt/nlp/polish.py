@@ -4,26 +4,39 @@ IPOPT stops a hair inside its bounds. Where rows and bounds carry multipliers, N
 (least change, so that flat directions stay put) leaves them met to rounding, whatever path led there.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt.cycle import Floats
+from loomopt.nlp.calls import Calls
+from loomopt.nlp.point import Point
+from loomopt.program.sampling import Extreme, Sampler
+from loomopt.tolerances import (
+    BINDING,
+    POLISH_DONE,
+    POLISH_FARTHEST,
+    POLISH_MET,
+    POLISH_RANK,
+    POLISH_STEPS,
+    SETTLED,
+    TOUCHING,
+)
 
-BINDING = 1e-6
-"""Multipliers above this bind, in natural sizes."""
-TIDY, CONVERGED = 1e-12, 1e-13
+Nodes = Sequence[Sequence[Extreme]]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Binding:
     """Which rows and bounds bind, from multipliers: positive at an upper bound, negative at a lower one."""
 
-    rows: np.ndarray
-    at_lower: np.ndarray
-    at_upper: np.ndarray
+    rows: Flags
+    at_lower: Flags
+    at_upper: Flags
 
 
 def binding(lam_x: Floats, lam_g: Floats) -> Binding:
@@ -31,10 +44,52 @@ def binding(lam_x: Floats, lam_g: Floats) -> Binding:
     return Binding(np.abs(lam_g) > BINDING, lam_x < -BINDING, lam_x > BINDING)
 
 
-def met(
-    jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding, *, steps: int, largest: float
-) -> Floats | None:
-    """Return x (scaled) on its binding rows and bounds, or None where that is not a clear step within `largest`.
+def polish(
+    calls: Calls, x: dict[str, float], extra: Floats, point: Point, peaks: Nodes
+) -> tuple[dict[str, float], Nodes]:
+    """Return x (SI) put exactly on what binds, and the extremes that do; x itself where that is no small, clear step.
+
+    extra: the epigraph variables; point: the solver's answer with its multipliers; peaks: the extremes at x.
+    """
+    touching: Nodes = ()
+    for _ in range(POLISH_STEPS):
+        sampler = calls.sampler(x)
+        if sampler is None:
+            return x, touching
+        touching = [
+            [e for e in of if calls.excess(family, e, extra) >= -TOUCHING]
+            for family, of in zip(calls.families, peaks, strict=True)
+        ]
+        met_at = _newton(calls, sampler, x, extra, point, touching)
+        if met_at is None:
+            return x, touching
+        flat, step = met_at
+        x, extra = calls.design(flat), flat[len(calls.program.variables) :]
+        moved = calls.sampler(x)
+        if moved is None or step <= SETTLED:
+            return x, touching
+        peaks = calls.peaks(moved)
+    return x, touching
+
+
+def _newton(
+    calls: Calls, sampler: Sampler, x: dict[str, float], extra: Floats, point: Point, nodes: Nodes
+) -> tuple[Floats, float] | None:
+    """Return the scaled point where the binding rows and the nodes' rows are met, and the step there.
+
+    None where there is no such point nearby.
+    """
+    nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
+    arguments = calls.arguments(nlp, sampler, x, extra, nodes)
+    first = nlp.rows - len(calls.families) * nlp.slots
+    used = ~np.array(calls.idle_rows(nlp, nodes)[first:], dtype=bool)
+    bound = binding(point.raw["lam_x"], np.concatenate([point.raw["lam_g"][:first], used.astype(float)]))
+    flat = met(nlp.jacobian, arguments, arguments["x0"], bound)
+    return None if flat is None else (flat, float(np.abs(flat - arguments["x0"]).max()))
+
+
+def met(jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding) -> Floats | None:
+    """Return x (scaled) on its binding rows and bounds, or None where that is not a clear, small step.
 
     jacobian: CasADi function (x, p) → (g, dg/dx); arguments: the solver's bounds lbx, ubx, lbg, ubg and parameters p.
     """
@@ -44,17 +99,17 @@ def met(
     free = ~(bound.at_lower | bound.at_upper) & (lower < upper)
     if not np.all(np.isfinite(trial)):
         return None
-    for _ in range(steps):
+    for _ in range(POLISH_STEPS):
         values, slopes = jacobian(trial, arguments["p"])
         residual = np.asarray(values).ravel()[rows]
         if not residual.size or not free.any() or not np.all(np.isfinite(residual)):
             break
-        step = np.linalg.lstsq(np.asarray(slopes)[np.ix_(rows, free)], -residual, rcond=1e-10)[0]
+        step = np.linalg.lstsq(np.asarray(slopes)[np.ix_(rows, free)], -residual, rcond=POLISH_RANK)[0]
         trial[free] += step
-        if np.abs(step).max() <= CONVERGED:
+        if np.abs(step).max() <= POLISH_DONE:
             break
     values = np.asarray(jacobian(trial, arguments["p"])[0]).ravel()
-    small = np.abs(trial - x).max() <= largest
-    inside = np.all(trial >= lower - TIDY) and np.all(trial <= upper + TIDY)
-    held = np.all(values <= arguments["ubg"] + TIDY) and np.all(values >= arguments["lbg"] - TIDY)
+    small = np.abs(trial - x).max() <= POLISH_FARTHEST
+    inside = np.all(trial >= lower - POLISH_MET) and np.all(trial <= upper + POLISH_MET)
+    held = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
     return np.clip(trial, lower, upper) if small and inside and held else None

@@ -9,10 +9,9 @@ from loomopt import maths
 from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
+from loomopt.tolerances import SAME_ROW
 
 STEPS = 720
-SAME_ROW = 1e-9
-"""rad; an even row this close to a corner stands for it."""
 ANGLE = "phi [rad]"
 
 

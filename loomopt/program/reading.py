@@ -11,9 +11,8 @@ from loomopt.maths import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit
 from loomopt.schema import Values
+from loomopt.tolerances import GAUSS_NODES
 
-GAUSS_NODES = 32
-"""Nodes of a mean on each piece: right to rounding for one smooth formula."""
 DATUM = "datum"
 """The switch that hands a quantity the number that an integral has at each of its own angles."""
 

@@ -14,13 +14,10 @@ from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
+from loomopt.tolerances import CLOSER, LEAST_SHARE, SAMPLES
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
-SAMPLES = 720
-"""Samples of one turn from which extremes are refined; no piece gets fewer than an eighth of them."""
-CLOSER = 1 / 8
-"""Step of the five points that refine a sampled extreme, in samples: its value is then right to rounding."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +159,7 @@ class Sampler:
     def _counts(self, samples: int) -> tuple[int, ...]:
         """Return how many nodes each piece has."""
         widths = np.diff(self.cycle.starts).tolist()
-        return tuple(max(samples // 8, math.ceil(samples * width / TURN)) + 1 for width in widths)
+        return tuple(max(samples // LEAST_SHARE, math.ceil(samples * width / TURN)) + 1 for width in widths)
 
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.

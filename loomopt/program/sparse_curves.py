@@ -8,15 +8,15 @@ from loomopt.cycle import SAME_ANGLE, TURN, Floats
 from loomopt.program import spikes
 from loomopt.program.curves import ANGLE
 from loomopt.program.sampling import Sampler
+from loomopt.tolerances import (
+    ROUNDED,
+    SPARSE_LEVEL,
+    SPARSE_MOST_ROWS,
+    SPARSE_NEARLY,
+    SPARSE_ROUNDS,
+    SPARSE_STEPS,
+)
 
-STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
-"""Equal steps of one turn that are begun with, by accuracy; no stretch between corners gets fewer than an eighth."""
-ROUNDS, ROUNDING = 40, 1e-15
-NEARLY = 0.8
-"""Share of a column's largest magnitude above which another top may turn out higher."""
-LEVEL = 2e-13
-"""Share of a top by which rows beside it may differ on a level."""
-MOST_ROWS = 20_000
 Rows = Callable[[int, Sequence[float]], dict[str, Floats]]
 """rows(steps, also): the curves at equal steps of one turn and at other crank angles, rad."""
 
@@ -27,16 +27,16 @@ def curves(sampler: Sampler, rows: Rows, accuracy: float) -> tuple[dict[str, Flo
     Around every top rows are added between it and its neighbours, in thirds and at the vertex of their parabola, until
     what the top may still rise (no more than it stands above them) is small enough.
     """
-    steps = next(count for least, count in STEPS if accuracy >= least)
+    steps = next(count for least, count in SPARSE_STEPS if accuracy >= least)
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
     also += [spikes.graded(centre) for centre in sampler.singular]
-    for _ in range(ROUNDS):
+    for _ in range(SPARSE_ROUNDS):
         found = rows(steps, np.concatenate(also).tolist())
         added, left = _around_tops(found, accuracy / 10)
-        if not added or len(found[ANGLE]) > MOST_ROWS:
+        if not added or len(found[ANGLE]) > SPARSE_MOST_ROWS:
             break
         also.append(np.array(added))
-    return found, max(left, ROUNDING)
+    return found, max(left, ROUNDED)
 
 
 def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[float], float]:
@@ -54,12 +54,12 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
             continue
         top = float(np.nanmax(sizes))
         with np.errstate(invalid="ignore"):
-            inner = (sizes >= sizes[left]) & (sizes >= sizes[right]) & (sizes >= NEARLY * top)
+            inner = (sizes >= sizes[left]) & (sizes >= sizes[right]) & (sizes >= SPARSE_NEARLY * top)
         tops = [k for k in np.flatnonzero(inner) if 0 < k < len(phi) - 1]
         for k in tops:
             rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
             worst = max(worst, rise)
-            if rise > max(least, ROUNDING):
+            if rise > max(least, ROUNDED):
                 found |= set(_between(phi, sizes, int(k)))
     return sorted(found), worst
 
@@ -71,7 +71,7 @@ def _rise(phi: Floats, sizes: Floats, k: int) -> float:
     stands above its neighbours.
     """
     sides = [side for side in (-1, 1) if phi[k + side] != phi[k] and np.isfinite(sizes[k + side])]
-    same = LEVEL * sizes[k]
+    same = SPARSE_LEVEL * sizes[k]
     for side in sides:
         beyond = k + 2 * side
         if 0 <= beyond < len(sizes) and max(abs(sizes[k] - sizes[k + side]), abs(sizes[k] - sizes[beyond])) <= same:

@@ -5,15 +5,14 @@ from collections.abc import Callable
 import numpy as np
 
 from loomopt.cycle import Floats
+from loomopt.tolerances import SPIKE_HALVINGS, SPIKE_SECTIONS, SPIKE_WIDEST
 
-WIDEST, HALVINGS = 0.02, 44
-"""rad from the singular position, and how often that is halved."""
-GOLDEN, SECTIONS = (5**0.5 - 1) / 2, 90
+GOLDEN = (5**0.5 - 1) / 2
 
 
 def graded(centre: float) -> Floats:
     """Return angles, rad, in order, graded toward a centre from both sides."""
-    offsets = WIDEST * 0.5 ** np.arange(HALVINGS)
+    offsets = SPIKE_WIDEST * 0.5 ** np.arange(SPIKE_HALVINGS)
     return np.concatenate([centre - offsets, [centre], centre + offsets[::-1]])
 
 
@@ -29,7 +28,7 @@ def peaks(heights: Callable[[Floats], Floats], centre: float) -> list[float]:
 
 def sectioned(heights: Callable[[Floats], Floats], low: float, high: float) -> float:
     """Return where a function with one maximum between low and high is highest, by golden sections."""
-    for _ in range(SECTIONS):
+    for _ in range(SPIKE_SECTIONS):
         left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         if not low < left < right < high:
             break

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
-from loomopt.nlp.point import ROUNDING, Point, Settings, sampler_at
+from loomopt.nlp.point import Point, Settings, sampler_at
 from loomopt.program.program import Program
 from loomopt.solving.certificate import certify
 from loomopt.solving.settle import settle
@@ -20,6 +20,7 @@ from loomopt.tolerances import (
     MORE_STARTS,
     MOST_ALIKE,
     PRECISE,
+    ROUNDING,
     SAME_OBJECTIVE,
     STATIONARY,
     STRONGER,

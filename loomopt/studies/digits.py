@@ -12,10 +12,10 @@ from loomopt import maths
 from loomopt.cycle import Floats
 from loomopt.maths import Maths, Number
 from loomopt.nlp.point import Point
-from loomopt.nlp.polish import BINDING
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.tolerances import BINDING
 
 DIGITS = 40
 STEP, SLOPE_STEP = 12, 20

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.nlp.pivot import bound_by, reach
+from loomopt.nlp.pivot import active_by, reach
 
 WIDE = 10.0
 
@@ -29,7 +29,7 @@ def call(start, lower=-WIDE, upper=WIDE, rows=0):
 def bound(rows, upper=(), lower=()):
     """Return which limits bind: rows by flag, bounds by variable."""
     lam_x = np.array([(k in upper) - 1.0 * (k in lower) for k in range(2)])
-    return bound_by(lam_x, np.array(rows, float), 0.5)
+    return active_by(lam_x, np.array(rows, float), 0.5)
 
 
 @pytest.mark.parametrize(
