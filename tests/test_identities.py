@@ -15,12 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt import balance, maths
-from loomopt.effects import BEATUP
-from loomopt.jobs.beatup.model import Beatup
-from loomopt.jobs.beatup.poses import ReedPose
+from loomopt.effects import found as declared
+from loomopt.effects.kinds import Load
+from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup.model import ReedPose
+from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.mechanisms import crank_rocker
-from loomopt.schema import Load
 
+BEATUP = declared.of("loomopt.effects.beatup")
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=30)
 MP = mpmath.MPContext()
 MP.dps = 60
@@ -59,7 +61,7 @@ angles = st.floats(0, TURN)
 
 def model(names, rod="exact"):
     options = (("rod_inertia", "model", rod),) if "rod_inertia" in names else ()
-    return Beatup(tuple(BEATUP[name] for name in names), (), options, frozenset(NUMBERS))
+    return beatup.model(tuple(BEATUP[name] for name in names), options, frozenset(NUMBERS), RESISTED)
 
 
 def sized(lengths):
@@ -71,8 +73,9 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=maths.FLOAT
     found = model(names, rod)
     given_ = found.given(system, {name: system.number(value) for name, value in numbers.items()})
     plain = found.given(maths.FLOAT, numbers)
-    corners = found.corners(maths.FLOAT, plain)
-    switches = [load.switch(phi, tuple(c)) for load, c in zip(found.loads, corners, strict=True)]
+    cornered = {load.name: load for load in found.loads if load.corners}
+    corners = {name: load.corners(maths.FLOAT, plain.values, plain.own[name]) for name, load in cornered.items()}
+    switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
     lengths = given_.values["lengths"]
     pose = ReedPose(angle, given_.values["speed"], crank_rocker.Pose(system, lengths, angle), omega_dot)

@@ -14,13 +14,14 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.rapier import curves as rapier_curves
-from loomopt.jobs.rapier.design import figures, sampler
-from loomopt.mechanisms import crank_rocker, rapier_drive
+from loomopt.cycle import Node
+from loomopt.jobs import registry
+from loomopt.mechanisms import crank_rocker_synthesis, rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 
 ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "hong17.csv").open())}
 RAPIER = lo.load("rapier")
+JOB = registry.of(RAPIER)
 DRAWN = 3e-3
 """Relative error of what the paper draws."""
 PRINTED = Dimensions(
@@ -55,7 +56,7 @@ def sley():
     low, high = math.radians(40), math.radians(80)
     for _ in range(60):
         middle = (low + high) / 2
-        found = crank_rocker.synthesise(-theta(), middle, SWING, PRINTED.l71)
+        found = crank_rocker_synthesis.synthesise(-theta(), middle, SWING, PRINTED.l71)
         low, high = (middle, high) if found.l3 < PRINTED.l3 else (low, middle)
     return found
 
@@ -73,17 +74,17 @@ def built():
 
 
 def figure(name):
-    return figures(RAPIER, built())[name]
+    return JOB.figures(RAPIER, built())[name]
 
 
 def rear_dead_centre():
-    return math.degrees(rapier_curves.marks(RAPIER, built())["rear dead centre"])
+    return math.degrees(JOB.views.marks(RAPIER, built())["rear dead centre"])
 
 
 def link_5_at_180():
     """Return by what angle, deg, link 5 is past the second crank's direction at 180°."""
-    sampled = sampler(RAPIER, built())
-    pose = sampled.model.pose(maths.FLOAT, sampled.given, math.pi).joints
+    sampled = JOB.sampler(RAPIER, built())
+    pose = sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(math.pi, {})).joints
     turned = rapier_drive.between(pose.second_crank, pose.dyad.link1)
     return math.degrees(math.atan2(turned.y, turned.x))
 
@@ -177,7 +178,7 @@ def test_both_printed_dwells_together_fix_what_counts_as_standing_still():
     """Rounded to whole degrees both are 36 for s_dwell from 5.72 to 5.88 mm; at 6 mm the one before is 37."""
 
     def dwells(mm):
-        found = figures(RAPIER.set("operation.s_dwell", f"{mm} mm"), built())
+        found = JOB.figures(RAPIER.set("operation.s_dwell", f"{mm} mm"), built())
         return [round(math.degrees(found[name])) for name in ("dwell_after", "dwell_before")]
 
     assert [dwells(mm) for mm in (5.71, 5.73, 5.88, 5.89)] == [[35, 36], [36, 36], [36, 36], [36, 37]]

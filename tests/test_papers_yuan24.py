@@ -15,8 +15,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.beatup.design import sampler
-from loomopt.mechanisms import crank_rocker
+from loomopt.jobs import registry
+from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 
 ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "yuan24.csv").open())}
 BEATUP = lo.load("beatup")
@@ -37,7 +37,7 @@ def scene(J4=0.62, M0=600.0):
 
 def static(lengths, name, J4=0.62, M0=600.0):
     """Return a figure at one position, from the program's own formulas, SI."""
-    found = sampler(scene(J4, M0), design(lengths)).static
+    found = registry.of(BEATUP).sampler(scene(J4, M0), design(lengths)).static
     return min(found["mu_near"], found["mu_far"]) if name == "mu_min" else found[name]
 
 
@@ -49,7 +49,7 @@ def around(lengths):
 
 def by_angles(case, l4=0.167, swing=23.08):
     theta, beta = ANGLES[case] if isinstance(case, str) else case
-    found = crank_rocker.synthesise(math.radians(theta), math.radians(beta), math.radians(swing), l4)
+    found = crank_rocker_synthesis.synthesise(math.radians(theta), math.radians(beta), math.radians(swing), l4)
     return found.l1, found.l2, found.l3, found.l4
 
 
