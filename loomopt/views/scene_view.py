@@ -10,7 +10,7 @@ from loomopt.cycle import Floats
 from loomopt.designs import Design, flat
 from loomopt.jobs import registry
 from loomopt.owned import label, owned
-from loomopt.scenes import Scene
+from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
 from loomopt.views.layout import GAP, Grid
 
@@ -71,7 +71,7 @@ def listed(values: str | Sequence[float]) -> str:
 def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[float]]]:
     """Yield the dotted key of each number, word and list, what a designer calls it, and its SI value."""
     for table in ("operation", "mechanism"):
-        for name, value in getattr(scene, table).items():
+        for name, value in given(scene.tables[table]).items():
             yield f"{table}.{name}", name, value
     for effect in scene.active:
         for key, value in scene.effects[effect.name].model_dump().items():
