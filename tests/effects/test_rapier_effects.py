@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt import maths
 from loomopt.balance import Pose
+from loomopt.cycle import Node
 from loomopt.effects.rapier import head_inertia, tape_friction
-from loomopt.jobs.rapier.design import figures, sampler
+from loomopt.jobs import registry
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 RAPIER = lo.load("rapier")
+JOB = registry.of(RAPIER)
 FRICTION, INERTIA = RAPIER.with_effect("tape_friction"), RAPIER.with_effect("head_inertia")
 BOTH = INERTIA.with_effect("tape_friction")
 TURN = 2 * math.pi
@@ -61,7 +63,7 @@ def test_a_head_that_never_turns_has_no_friction_and_no_corner():
 def paths(sampled):
     """Return the way the head goes in a turn, m: all its travels between turning points."""
     turns = np.sort(np.mod(sampled.given.values["turns"], TURN))
-    places = [float(sampled.model.pose(maths.FLOAT, sampled.given, float(phi)).q) for phi in turns]
+    places = [float(sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(float(phi), {})).q) for phi in turns]
     return float(np.abs(np.diff([*places, places[0]])).sum())
 
 
@@ -78,24 +80,24 @@ def mean(sampled, name):
 @DESIGNS
 @pytest.mark.parametrize("scene", [FRICTION, BOTH], ids=["friction", "friction and inertia"])
 def test_the_mean_crank_torque_is_the_friction_work_of_a_turn(scene, design):
-    sampled = sampler(scene, design)
+    sampled = JOB.sampler(scene, design)
     work = 15.0 * paths(sampled)
     peak = sampled.peak("peak_torque")
-    assert paths(sampled) >= 2 * figures(scene, design)["stroke"]
+    assert paths(sampled) >= 2 * JOB.figures(scene, design)["stroke"]
     assert mean(sampled, "peak_torque") == pytest.approx(work / TURN, rel=0, abs=1e-12 * peak)
 
 
 @DESIGNS
 def test_without_friction_a_turn_takes_no_work(design):
-    sampled = sampler(INERTIA, design)
+    sampled = JOB.sampler(INERTIA, design)
     assert abs(mean(sampled, "peak_torque")) <= 1e-12 * sampled.peak("peak_torque")
 
 
 def test_the_packaged_head_draws_back_a_little_on_both_sides_of_front_dead_centre():
     """It turns four times, at S = 0, −0.2206, 849.2312 and −0.3219 mm: each way it goes their sum."""
-    sampled = sampler(FRICTION, {})
+    sampled = JOB.sampler(FRICTION, {})
     phi = np.linspace(0, TURN, 400_001)
-    S = sampled.model.pose(maths.numpy(), sampled.given, phi).q
+    S = sampled.model.kinematics.pose(maths.numpy(), sampled.given, Node(phi, {})).q
     after, before = S[phi < 1].min(), S[phi > 5].min()
     assert (after, before) == (pytest.approx(-0.00022065, abs=2e-8), pytest.approx(-0.00032193, abs=2e-8))
     assert len(sampled.given.values["turns"]) == 4
@@ -117,7 +119,7 @@ def test_the_curves_are_the_formulas(design):
 
 @DESIGNS
 def test_the_figures_are_the_peaks_of_the_curves(design):
-    found = figures(BOTH, design)
+    found = JOB.figures(BOTH, design)
     curves = lo.simulate(BOTH, design)
     for name, column in (("tape_force", "Q [N]"), ("peak_torque", "Md [N*m]")):
         sampled = np.abs(curves[column]).max()
@@ -125,20 +127,20 @@ def test_the_figures_are_the_peaks_of_the_curves(design):
 
 
 def test_inertia_alone_pulls_the_tape_with_the_peak_acceleration():
-    found = figures(INERTIA, {})
+    found = JOB.figures(INERTIA, {})
     assert found["tape_force"] == pytest.approx(0.35 * found["peak_acceleration"] * TURN**2, rel=1e-12)
 
 
 def test_twice_the_speed_is_four_times_the_inertia_and_the_same_friction():
-    slow, fast = (figures(scene, {}) for scene in (INERTIA, INERTIA.set("operation.speed", "120 rpm")))
+    slow, fast = (JOB.figures(scene, {}) for scene in (INERTIA, INERTIA.set("operation.speed", "120 rpm")))
     assert fast["tape_force"] == pytest.approx(4 * slow["tape_force"], rel=1e-12)
     assert fast["peak_torque"] == pytest.approx(4 * slow["peak_torque"], rel=1e-12)
-    rubbing = figures(FRICTION.set("operation.speed", "120 rpm"), {})
-    assert rubbing["peak_torque"] == pytest.approx(figures(FRICTION, {})["peak_torque"], rel=1e-12)
+    rubbing = JOB.figures(FRICTION.set("operation.speed", "120 rpm"), {})
+    assert rubbing["peak_torque"] == pytest.approx(JOB.figures(FRICTION, {})["peak_torque"], rel=1e-12)
 
 
 def test_friction_alone_pulls_the_tape_with_its_force():
-    found = figures(FRICTION, {})
+    found = JOB.figures(FRICTION, {})
     assert found["tape_force"] == 15.0
     greatest = np.abs(lo.simulate(RAPIER)["S_1 [m/rad]"]).max()
     assert found["peak_torque"] == pytest.approx(15.0 * greatest, rel=1e-4)

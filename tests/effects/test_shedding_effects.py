@@ -1,6 +1,5 @@
 """The heald frame's effects: one by one, in every combination, and all in the one sign convention of [Qiu21, eq 4]."""
 
-import itertools
 import math
 from types import SimpleNamespace
 
@@ -13,21 +12,19 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import balance, maths
-from loomopt.effects import SHEDDING
+from loomopt.effects import found as declared
 from loomopt.effects.shedding import damping as frame_damping
 from loomopt.effects.shedding import dry_friction, warp_tension, weight
 from loomopt.effects.shedding import inertia as frame_inertia
-from loomopt.jobs.shedding import pose as shedding_pose
-from loomopt.jobs.shedding.curves import curves
-from loomopt.jobs.shedding.design import figures, sampler
-from loomopt.jobs.shedding.program import model, numbers
+from loomopt.jobs import registry
+from loomopt.jobs.shedding.model import spring_force
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
+SHEDDING = declared.of("loomopt.effects.shedding")
 MOVING = lo.load("shedding")
+JOB = registry.of(MOVING)
 FULL = MOVING.with_effect("damping").with_effect("dry_friction")
 LOADS = ("weight", "warp_tension", "inertia", "damping", "dry_friction")
-COMBINATIONS = [names for n in range(len(LOADS) + 1) for names in itertools.combinations(LOADS, n)]
-OWN = {"weight.G", "warp_tension.T1", "warp_tension.T2", "inertia.M", "damping.C", "dry_friction.F"}
 H, M, G, T1, T2, C, F = 0.0656, 37.68361265059934, 369.55, 124.545, 83.03, 35.0, 20.0
 K1, X0, OMEGA = 8029.14, 0.08, 20 * math.pi
 BETA = math.radians(120)
@@ -88,7 +85,7 @@ def test_weight_relieves_the_cam_and_a_negative_one_presses(value):
 @given(st.floats(0, 1e6), st.floats(0, 1), st.floats(0, 1))
 @REPEATABLE
 def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness, lowered, preload):
-    found = shedding_pose.spring_force(maths.FLOAT, pose(q=lowered), {"K1": stiffness, "X0": preload}, {}, 0)
+    found = spring_force(maths.FLOAT, pose(q=lowered), {"K1": stiffness, "X0": preload}, {}, 0)
     assert found == pytest.approx(stiffness * (lowered + preload), rel=1e-15)
 
 
@@ -106,7 +103,7 @@ def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u,
 def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle(up, down, lowered):
     own = {"T1": up, "T2": down, "shape": "linear"}
     below = lowered > 0.5
-    found = warp_tension.force(maths.FLOAT, pose(lowered=lowered, below=below), {}, own, 0)
+    found = warp_tension.force(maths.FLOAT, pose(lowered=lowered), {}, own, float(below))
     pull = -down * (2 * lowered - 1) if below else up * (1 - 2 * lowered)
     assert abs(found + pull) <= 1e-14 * max(up, down)
 
@@ -149,16 +146,14 @@ def test_every_effect_gives_the_same_number_in_every_system(system):
     def wrap(value):
         return wrapped(system, value)
 
-    at = pose(lowered=wrap(0.37), u=wrap(0.41), q=wrap(0.024), below=0, segment=2, worst=-1)
+    at = pose(lowered=wrap(0.37), u=wrap(0.41), q=wrap(0.024), segment=2, worst=-1)
     at.velocity, at.acceleration = wrap(-0.9), wrap(31.0)
     own = {"G": wrap(G), "T1": wrap(T1), "T2": wrap(T2), "M": wrap(M), "C": wrap(C), "F": wrap(F)}
     given_ = {"K1": wrap(K1), "X0": wrap(X0)}
     found = {name: plain(SHEDDING[name].force(system, at, given_, own | {"shape": "linear"}, 0)) for name in LOADS}
-    found["spring"] = plain(shedding_pose.spring_force(system, at, given_, {}, 0))
+    found["spring"] = plain(spring_force(system, at, given_, {}, 0))
     found["step"] = plain(warp_tension.force(system, at, given_, own | {"shape": "step"}, 0))
-    found["below"] = plain(
-        warp_tension.force(system, pose(lowered=wrap(0.8), below=1), {}, own | {"shape": "linear"}, 0)
-    )
+    found["below"] = plain(warp_tension.force(system, pose(lowered=wrap(0.8)), {}, own | {"shape": "linear"}, 1))
     expected = {"weight": -G, "warp_tension": -T1 * 0.26, "inertia": M * 31, "damping": -C * 0.9, "dry_friction": -F}
     expected |= {"spring": K1 * 0.104, "step": (T1 + T2) * 0.41**2 * 2.18 - T1, "below": T2 * 0.6}
     assert found == {name: pytest.approx(value, rel=1e-12) for name, value in expected.items()}
@@ -194,59 +189,25 @@ def test_the_cam_force_balances_the_heald_frame_in_one_sign_convention(degrees):
 )
 def test_what_pulls_the_frame_down_relieves_the_cam(names, pull):
     """By free-body diagram, the frame at rest at the top: the spring pulls up, weight, warp and worst friction down."""
-    assert figures(scene_of(names), {})["contact_min"] == pytest.approx(K1 * X0 - pull, rel=1e-13)
-
-
-@pytest.mark.parametrize("names", COMBINATIONS, ids=lambda names: "+".join(names) or "none")
-def test_what_is_off_is_nowhere(names):
-    scene = scene_of(names)
-    found, offered = model(scene), numbers(FULL)
-    columns = curves(scene, {})
-    terms = [column for column in columns if column.removesuffix(" [N]") in (*LOADS, "return_spring")]
-    assert terms == [f"{name} [N]" for name in ("return_spring", *LOADS) if name in (*names, "return_spring")]
-    total = sum(columns[name] for name in terms)
-    assert np.max(np.abs(columns["N [N]"] - total)) <= 1e-13 * np.max(np.abs(total)) * len(terms)
-    symbols = {name: ca.SX.sym(name) for name in offered}
-    given_ = found.given(maths.casadi(), symbols)
-    switches = [0.0, 0.0, 0.0, *[0.0] * len(found.loads)]
-    graph = found.quantity(maths.casadi(), given_, "lift", ca.SX.sym("phi"), switches)
-    read = {symbol.name() for symbol in ca.symvar(ca.SX(graph))}
-    assert read & OWN == {name for name in OWN if name.split(".")[0] in names and name != "warp_tension.T2"}, (
-        "above the middle of the shed T2 takes no part"
-    )
-    assert ("speed" in read) == bool({"inertia", "damping"} & set(names))
-    assert read >= {"K1", "X0", "travel", "phi"}
-
-
-@pytest.mark.parametrize("names", COMBINATIONS, ids=lambda names: "+".join(names) or "none")
-def test_the_cam_force_is_the_sum_of_what_each_effect_brings(names):
-    angles = np.arange(1, 720, 2) * math.pi / 360
-
-    def force(*on):
-        columns = curves(scene_of(on), {})
-        return columns["N [N]"][np.searchsorted(columns["phi [rad]"], angles - 1e-9)]
-
-    spring = force()
-    total = spring + sum((force(name) - spring for name in names), np.zeros(len(angles)))
-    assert np.max(np.abs(force(*names) - total)) <= 1e-12 * 15000
+    assert JOB.figures(scene_of(names), {})["contact_min"] == pytest.approx(K1 * X0 - pull, rel=1e-13)
 
 
 def test_dry_friction_widens_the_range_of_the_cam_force_in_dwells_on_both_sides():
     """At rest everywhere but for the spring: least in the upper dwell with −F, largest at the bottom with +F."""
     scene = scene_of(("dry_friction",))
-    found = figures(scene, {})
+    found = JOB.figures(scene, {})
     assert found["contact_min"] == pytest.approx(K1 * X0 - F, rel=1e-14)
     assert found["contact_max"] == pytest.approx(K1 * (X0 + H) + F, rel=1e-14)
-    sampled = sampler(scene, {})
+    sampled = JOB.sampler(scene, {})
     low = [-sampled.at("lift", np.array([p]), np.array([0.5]))[0] for p in range(sampled.cycle.pieces)]
     high = [sampled.at("cam_force", np.array([p]), np.array([0.5]))[0] for p in range(sampled.cycle.pieces)]
-    dwells = np.isin(sampled.cycle.switches[:, 0], (FAR, NEAR))
+    dwells = np.isin(sampled.cycle.switch(slice(None))["segment"], (FAR, NEAR))
     assert np.array(high)[dwells] - np.array(low)[dwells] == pytest.approx(2 * F, rel=1e-11)
     assert np.array(high)[~dwells] == pytest.approx(np.array(low)[~dwells], rel=1e-15)
 
 
 def test_dry_friction_jumps_where_the_frame_starts_and_stops():
-    sampled = sampler(FULL, {})
+    sampled = JOB.sampler(FULL, {})
     starts = np.degrees(sampled.cycle.starts)
     pieces = range(sampled.cycle.pieces)
     N = [[-sampled.at("lift", np.array([p]), np.array([u]))[0] for u in (0.0, 1.0)] for p in pieces]
@@ -258,10 +219,10 @@ def test_dry_friction_jumps_where_the_frame_starts_and_stops():
 
 def test_linear_tension_bends_in_the_middle_of_the_shed_and_does_not_jump():
     """−dT/dX is 2 T1/h above, 2 T2/h below."""
-    sampled = sampler(MOVING, {})
+    sampled = JOB.sampler(MOVING, {})
     corner = int(np.argmin(np.abs(sampled.cycle.starts - math.radians(60))))
     assert math.degrees(sampled.cycle.starts[corner]) == pytest.approx(60, rel=1e-14)
-    columns = curves(MOVING, {})
+    columns = JOB.curves(MOVING, {})
     here = np.flatnonzero(np.abs(columns["phi [rad]"] - math.radians(60)) < 1e-12)
     assert len(here) == 2
     assert columns["warp_tension [N]"][here] == pytest.approx([0, 0], abs=1e-12)
