@@ -136,7 +136,7 @@ def check(
     from loomopt.views import layout
 
     if write:
-        remark(f"Wrote {len(study.write(write))} reference tables to {write}")
+        remark(f"Wrote {len(study.write(write, problems or ()))} reference tables to {write}")
         return
     outcomes: list[study.Outcome] = []
     try:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from loomopt import api, designs
+from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
@@ -42,7 +43,15 @@ def list_problems() -> None:
     """List the packaged problems and their targets."""
     from loomopt.views import layout, scene_view
 
-    layout.show(scene_view.listing([registry.load(name) for name in registry.problems()]))
+    scenes, faults = [], list(registry.brought()[1])
+    for name in registry.problems():
+        try:
+            scenes.append(registry.load(name))
+        except BadInput as error:
+            faults.append(error)
+    layout.show(scene_view.listing(scenes))
+    for fault in faults:
+        remark(f"loomopt: {fault}")
 
 
 def new(

@@ -14,11 +14,14 @@ def _folder(name: str) -> Path:
     return package / name if (package / name).is_dir() else package.parent / name
 
 
-def problems(folders: Iterable[Path] = ()) -> dict[str, Path]:
-    """Return the files of the packaged scenes by name, in alphabetical order, and of those in other folders."""
-    found = {path.stem: path for folder in folders for path in folder.glob("*.toml")}
-    found |= {path.stem: path for path in _folder("problems").glob("*.toml")}
-    return dict(sorted(found.items()))
+def scenes(folder: Path) -> dict[str, Path]:
+    """Return the files of the scenes in a folder by name, in alphabetical order; none where there is no such folder."""
+    return dict(sorted((path.stem, path) for path in folder.glob("*.toml")))
+
+
+def problems() -> dict[str, Path]:
+    """Return the files of the packaged scenes by name, in alphabetical order."""
+    return scenes(_folder("problems"))
 
 
 def problem_names() -> list[str]:
@@ -26,12 +29,15 @@ def problem_names() -> list[str]:
     return list(problems())
 
 
-def unknown_problem(name: str, known: Mapping[str, Path]) -> BadInput:
-    """Return the error, with the nearest name, for a scene that is not packaged."""
+def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadInput] = ()) -> BadInput:
+    """Return the error, with the nearest name, for a scene that is not packaged.
+
+    faults: of jobs that other distributions bring: one that cannot be imported may be what brings the scene.
+    """
     near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
     hint = f'perhaps "{near[0]}" is meant' if near else "see `loomopt list`"
     return BadInput(
-        "there is no packaged scene of this name",
+        "; ".join(["there is no packaged scene of this name", *(fault.problem for fault in faults)]),
         file=clean(name, 80),
         value=shown(name),
         allowed=", ".join(known),

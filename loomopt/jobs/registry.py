@@ -1,7 +1,7 @@
 """Jobs by name: a folder each, or another distribution's by entry point; only the one asked for is imported.
 
 Entry points `loomopt.jobs` (name = job) and `loomopt.effects` (name = "job.effect") are scanned only for a name that is
-not of this package, and where all are listed.
+not of this package, and where all are listed. What this package brings itself wins: its names cannot be taken.
 """
 
 import functools
@@ -45,31 +45,32 @@ def _distribution(point: EntryPoint) -> str:
     return point.dist.name if point.dist else point.value
 
 
-def _single(group: str, name: str, what: str, own: bool) -> EntryPoint | None:
+def _single(group: str, name: str, what: str) -> EntryPoint | None:
     """Return the one entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
     points = [point for point in _points(group) if point.name == name]
-    claims = [*(["loomopt"] if own else []), *map(_distribution, points)]
-    if points and len(claims) > 1:
-        raise BadInput(
-            f"{what} {name} is brought by more than one distribution",
-            key=name,
-            value=", ".join(claims),
-            remedy="Uninstall all of them but one",
-        )
+    if len(points) > 1:
+        problem = f"{what} {name} is brought by {' and by '.join(map(_distribution, points))}"
+        raise BadInput(problem, key=name, remedy="Uninstall all of them but one")
     return points[0] if points else None
 
 
-def _loaded(point: EntryPoint, what: str, kind: type) -> Any:
-    """Return what an entry point names. Raises BadInput, naming its distribution, where that fails."""
+def _loaded(point: EntryPoint, what: str, kind: type, name: str) -> Any:
+    """Return what an entry point names. Raises BadInput, naming its distribution, where that fails or is another."""
     try:
         found = point.load()
     except Exception as error:
-        problem = f"{what} {point.name} of {_distribution(point)} cannot be imported: {type(error).__name__}: {error}"
-        raise BadInput(" ".join(problem.split()), key=point.name, remedy="Mend or uninstall it") from error
+        told = f"{type(error).__name__}: {error}"
+        raise _useless(point, what, "cannot be imported: " + " ".join(told.split())) from error
     if not isinstance(found, kind):
-        problem = f"{what} {point.name} of {_distribution(point)} is no {kind.__name__.lower()}"
-        raise BadInput(problem, key=point.name, value=point.value, remedy="Mend or uninstall it")
+        raise _useless(point, what, f"is no {kind.__name__.lower()}")
+    if getattr(found, "name", "") != name:
+        raise _useless(point, what, f"calls itself {getattr(found, 'name', 'nothing')}")
     return found
+
+
+def _useless(point: EntryPoint, what: str, why: str) -> BadInput:
+    problem = f"{what} {point.name} of {_distribution(point)} {why}"
+    return BadInput(problem, key=point.name, value=point.value, remedy="Mend or uninstall it")
 
 
 def names() -> tuple[str, ...]:
@@ -83,10 +84,10 @@ def find(name: str) -> Job:
     if name in own_names():
         job: Job = importlib.import_module(f"loomopt.jobs.{name}.job").JOB
         return job
-    point = _single(JOBS, name, "job", own=False)
+    point = _single(JOBS, name, "job")
     if point is None:
         raise unknown("job", name, names(), "", "")
-    found: Job = _loaded(point, "job", Job)
+    found: Job = _loaded(point, "job", Job, name)
     return found
 
 
@@ -111,54 +112,66 @@ class _Registered:
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
         """Return what a scene of a job may hold; effects: those it names, which another distribution may bring."""
         schema = find(job).schema(document)
+        if schema.name != job:
+            raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
         others = [name for name in effects if name not in schema.effects]
         if not others:
             return schema
-        brought = [_brought(job, name) for name in others]
-        added = [effect for effect in brought if effect is not None]
+        added = [effect for name in others if (effect := _brought(job, name)) is not None]
         return replace(schema, effects=ranked([*schema.effects.values(), *added])) if added else schema
 
 
 def _brought(job: str, name: str) -> Effect | None:
     """Return another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
-    point = _single(EFFECTS, f"{job}.{name}", "effect", own=False)
+    point = _single(EFFECTS, f"{job}.{name}", "effect")
     if point is None:
         return None
-    effect: Effect = _loaded(point, "effect", Effect)
-    if effect.name != name:
-        problem = f"effect {point.name} of {_distribution(point)} calls itself {effect.name}"
-        raise BadInput(problem, key=point.name, remedy="Mend or uninstall it")
+    effect: Effect = _loaded(point, "effect", Effect, name)
     return effect
 
 
 REGISTERED = _Registered()
 
 
-def problems(others: bool = True) -> dict[str, Path]:
-    """Return the files of all packaged scenes by name; others: those of other distributions too."""
-    brought = [_folder(point.name, "problems") for point in _points(JOBS)] if others else []
-    return packaged.problems([folder for folder in brought if folder is not None])
+def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
+    """Return the files of other distributions' scenes by name, and what is wrong with their jobs."""
+    found: dict[str, Path] = {}
+    faults: list[BadInput] = []
+    for point in {point.name: point for point in _points(JOBS)}.values():
+        try:
+            if point.name in own_names():
+                raise _useless(point, "job", "is not looked at, for loomopt has one of that name")
+            files = packaged.scenes(_folder(point.name, "problems"))
+        except BadInput as error:
+            faults.append(error)
+            continue
+        twice = sorted(files.keys() & found.keys())
+        faults += [BadInput(f"scene {n} stands in {found[n]} too", file=str(files[n]), key=n) for n in twice]
+        found = files | found
+    return found, tuple(faults)
+
+
+def problems() -> dict[str, Path]:
+    """Return the files of all packaged scenes by name, those of other distributions too; loomopt's own win."""
+    return dict(sorted((brought()[0] | packaged.problems()).items()))
 
 
 def results(scene: Scene) -> Path:
     """Return the folder of the reference results of a scene's job."""
-    if scene.job in own_names():
-        return packaged.results_path()
-    return _folder(scene.job, "results") or packaged.results_path()
+    return packaged.results_path() if scene.job in own_names() else _folder(scene.job, "results")
 
 
-def _folder(job: str, name: str) -> Path | None:
-    """Return a folder that another distribution's job brings; None for one that brings none, or cannot be imported."""
-    try:
-        folder = Path(str(find(job).resources / name))
-    except BadInput:
-        return None
-    return folder if folder.is_dir() else None
+def _folder(job: str, name: str) -> Path:
+    """Return a folder of what a job brings. Raises BadInput where the job cannot be imported."""
+    return Path(str(find(job).resources / name))
 
 
 def template(name: str) -> str:
-    """Return the commented scene to start from. Raises BadInput for an unknown job."""
-    return (find(name).resources / "template.toml").read_text(encoding="utf-8")
+    """Return the commented scene to start from. Raises BadInput for an unknown job, and one without a template."""
+    place = find(name).resources / "template.toml"
+    if not place.is_file():
+        raise BadInput(f"job {name} brings no template", file=str(place), remedy="Start from one of its scenes")
+    return place.read_text(encoding="utf-8")
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Scene:
@@ -167,13 +180,13 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
     if packaged.is_path(name_or_path):
         path = Path(given)
         return build(read_document(path), REGISTERED, path.name if path.stem == given else given)
-    known = packaged.problems()
-    if given in known:
-        return build(read_document(known[given]), REGISTERED, known[given].name)
-    known = problems()
-    if given not in known:
-        raise packaged.unknown_problem(given, known)
-    return build(read_document(known[given]), REGISTERED, str(known[given]))
+    own = packaged.problems()
+    if given in own:
+        return build(read_document(own[given]), REGISTERED, own[given].name)
+    others, faults = brought()
+    if given in others:
+        return build(read_document(others[given]), REGISTERED, str(others[given]))
+    raise packaged.unknown_problem(given, own | others, faults)
 
 
 def scene(document: Mapping[str, Any]) -> Scene:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import tables
+from loomopt import packaged, tables
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
@@ -41,17 +41,25 @@ def check(problems: Iterable[str] = (), folder: Path | None = None) -> Iterable[
 
     Raises BadInput for a name that is not packaged.
     """
-    known = registry.problems()
-    names = list(problems) or list(known)
-    for name in names:
-        if name not in known:
-            raise BadInput(f"{name} is not a packaged scene", value=name, allowed=", ".join(known), remedy="Name one.")
-    for name in names:
+    for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
             found = engine.solve(scene, target)
             path = (folder or registry.results(scene)) / f"{name}.{target}.csv"
             yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
+
+
+def named(problems: Iterable[str]) -> list[str]:
+    """Return the names of packaged scenes, of all without one. Raises BadInput for a name that is not packaged."""
+    names, known, faults = list(problems), packaged.problems(), tuple[BadInput, ...]()
+    if not names or not known.keys() >= set(names):
+        others, faults = registry.brought()
+        known = others | known
+    for name in names:
+        if name not in known:
+            problem = "; ".join([f"{name} is not a packaged scene", *(fault.problem for fault in faults)])
+            raise BadInput(problem, value=name, allowed=", ".join(known), remedy="Name one.")
+    return names or sorted(known)
 
 
 def served(scene: Scene) -> list[str]:
@@ -92,12 +100,12 @@ def reference(found: Solution, scene: Scene) -> "pd.DataFrame":
     return frame
 
 
-def write(folder: Path) -> list[Path]:
-    """Write the reference table of every packaged scene and target; returns the files."""
+def write(folder: Path, problems: Iterable[str] = ()) -> list[Path]:
+    """Write the reference table of every target of the named scenes (all without a name); returns the files."""
     from loomopt.files import atomically
 
     written = []
-    for name in registry.problems():
+    for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
             text = tables.csv(reference(engine.solve(scene, target), scene))

@@ -1,0 +1,1 @@
+"""A slider-crank press for loomopt, in the files every job has."""

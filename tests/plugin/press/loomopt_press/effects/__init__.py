@@ -1,0 +1,1 @@
+"""Effects of the press: every file here is one."""

@@ -1,0 +1,63 @@
+"""What a press scene may hold."""
+
+from collections.abc import Mapping
+
+from loomopt.effects import found
+from loomopt.errors import BadInput
+from loomopt.quantities import PositiveLength, Speed
+from loomopt.scene_schema import SceneSchema
+from loomopt.scenes import Scene
+from loomopt.schema import Figure, Table, Target
+from loomopt_press.model import LONGER
+
+
+class Operation(Table):
+    """speed: of the crank, rad/s."""
+
+    speed: Speed | None = None
+
+
+class Mechanism(Table):
+    """crank, rod: m."""
+
+    crank: PositiveLength
+    rod: PositiveLength
+
+
+FIGURES = (
+    Figure("peak_torque", "torque", "peak crank torque over the cycle", sides=("max",)),
+    Figure("peak_acceleration", "travel acceleration", "peak |q''| of the slide", sides=("max",)),
+    Figure("stroke", "length", "stroke of the slide"),
+    Figure("reach", "length", "crank shaft to the slide at its lowest", sides=("max",)),
+    Figure("obliquity", "angle", "largest angle of the rod from the slide's line", sides=("max",)),
+)
+
+
+def fault(design: Mapping[str, float]) -> str:
+    """Say why a design cannot work; "" when it can."""
+    return "" if design["crank"] < design["rod"] else "the crank must be shorter than the rod"
+
+
+def check(scene: Scene) -> None:
+    """Raise BadInput when today's press cannot turn."""
+    reason = fault(scene.mechanism)
+    if reason:
+        raise BadInput(
+            f"today's press cannot turn: {reason}", file=scene.origin, key="mechanism.crank, rod", remedy="Mend it."
+        )
+
+
+SCHEMA = SceneSchema(
+    name="press",
+    title="slider-crank press: the least crank torque",
+    operation=Operation,
+    mechanism=Mechanism,
+    effects=found.of("loomopt_press.effects"),
+    variables={"crank": "length", "rod": "length"},
+    own_figures={figure.name: figure for figure in FIGURES},
+    targets={"torque": Target("torque", "the least peak crank torque", Table, needs_effects=("forming",))},
+    default_target="torque",
+    check=check,
+    fault=fault,
+    own_margins={LONGER: "length"},
+)

@@ -1,0 +1,179 @@
+"""A press, whose code is nowhere in loomopt, is served by every command as the jobs of loomopt are."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+OPTIMUM = {"crank": 0.1, "rod": 0.5}
+"""Stroke of 200 mm, reach of 600 mm: both bind."""
+
+
+def torque(crank, rod, force=500e3, height=0.006):
+    """Return the torque, N·m, where the slide meets the sheet, by the power of a force on a slider-crank."""
+    reach = crank + rod - height
+    before = math.acos((crank**2 + reach**2 - rod**2) / (2 * crank * reach))
+    lean = math.asin(crank * math.sin(before) / rod)
+    return force * crank * math.sin(before + lean) / math.cos(lean)
+
+
+def answer(loomopt, *words):
+    return json.loads(loomopt("solve", *words, "--json").stdout)
+
+
+def test_a_press_is_listed_and_shown(loomopt):
+    assert "job press; targets torque" in loomopt("list").stdout
+    shown = loomopt("show", "press").stdout
+    assert "slider-crank press" in shown
+    assert "loomopt_press" not in shown
+    written = loomopt("show", "press", "--with", "slide", "--equations").stdout
+    assert "Q = Q_forming + Q_slide" in written
+    assert "Q_forming = F while the sheet is formed, 0 elsewhere" in written
+    assert "Md = Q*q'" in written
+
+
+def test_a_new_press_solves_as_it_stands(loomopt, tmp_path):
+    loomopt("new", "press", "my.toml")
+    found = answer(loomopt, "my.toml")
+    assert (found["problem"], found["status"]) == ("my-press", "optimal")
+
+
+def test_its_optimum_is_certified_and_priced(loomopt):
+    found = answer(loomopt, "press", "--prove")
+    assert found["status"] == "optimal"
+    assert found["certificate"]["passed"]
+    assert found["design"] == pytest.approx(OPTIMUM, rel=1e-9)
+    assert found["figures"]["peak_torque"] == pytest.approx(torque(0.1, 0.5), rel=1e-9)
+    h = 1e-6
+    stroke, reach = (next(p for p in found["binding"] if p["limit"] == name) for name in ("stroke", "reach"))
+    # A longer stroke takes its half from the rod, for the reach is kept.
+    longer = (torque(0.1 + h / 2, 0.5 - h / 2) - torque(0.1 - h / 2, 0.5 + h / 2)) / (2 * h)
+    assert abs(stroke["worth"]["peak_torque"]) == pytest.approx(longer, rel=1e-4)
+    assert abs(reach["worth"]["peak_torque"]) == pytest.approx((torque(0.1, 0.5 - h) - torque(0.1, 0.5)) / h, rel=1e-4)
+
+
+def test_figures_of_a_design_are_told(loomopt, tmp_path):
+    (tmp_path / "design.json").write_text(json.dumps({"crank": 0.12, "rod": 0.4}))
+    found = json.loads(loomopt("evaluate", "press", "--design", "design.json", "--json").stdout)
+    expected = {"peak_torque": torque(0.12, 0.4), "stroke": 0.24, "reach": 0.52, "obliquity": math.asin(0.3)}
+    assert {name: found["figures"][name] for name in expected} == pytest.approx(expected, rel=1e-9)
+
+
+def test_curves_and_pictures_are_written(loomopt, tmp_path):
+    assert "bottom dead centre at 180.000 deg" in loomopt("simulate", "press").stdout
+    loomopt("simulate", "press", "--out", "curves.csv", "--out", "curves.png")
+    lines = [line for line in (tmp_path / "curves.csv").read_text().splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
+    assert list(rows[0]) == ["phi [rad]", "q [m]", "q_1 [m/rad]", "q_2 [m/rad^2]", "forming [N]", "Q [N]", "Md [N*m]"]
+    met = [row for row in rows if float(row["forming [N]"])]
+    assert float(met[0]["Md [N*m]"]) == pytest.approx(torque(0.105, 0.42), rel=1e-9)
+    for name in ("linkage.svg", "linkage.dxf", "joints.csv"):
+        loomopt("export", "press", "--out", name)
+    assert 'data-layer="bottom dead centre"' in (tmp_path / "linkage.svg").read_text()
+    assert "half way" in (tmp_path / "linkage.dxf").read_text()
+    assert (tmp_path / "joints.csv").read_text().startswith("joint,position,x [mm],y [mm]\nA,frame,0.0,0.0\n")
+    loomopt("show", "press", "--figure", "press.pdf")
+    loomopt("solve", "press", "--out", "answer")
+    assert {path.name for path in (tmp_path / "answer").iterdir()} > {"answer.json", "linkage.svg"}
+
+
+def test_its_limits_are_proven_and_a_broken_one_is_not(loomopt):
+    assert "every limit holds at every crank angle" in loomopt("prove", "press").stdout
+    assert "peak_torque" in loomopt("prove", "press", "--set", "limits.peak_torque.max=19 kN*m", status=1).stdout
+
+
+def test_its_accuracy_is_studied(loomopt):
+    found = json.loads(loomopt("accuracy", "press", "--json").stdout)
+    read = {row["quantity"] for row in found["rows"]}
+    assert {"peak_torque", "peak_acceleration", "q_2", "torque peak_torque", "torque design"} <= read
+    finest = [row for row in found["rows"] if (row["method"], row["setting"]) == ("exchange", 1e-11)]
+    assert all(row["error"] < 1e-10 for row in finest)
+
+
+def test_its_answer_is_compared_with_its_own_results(loomopt, installed, tmp_path):
+    assert "reproduces" in loomopt("check", "press").stdout
+    loomopt("check", "press", "--write", ".")
+    header, row = (tmp_path / "press.torque.csv").read_text().splitlines()[-2:]
+    kept = (installed / "loomopt_press" / "results" / "press.torque.csv").read_text().splitlines()[-2:]
+    assert header == kept[0]
+    names = header.split(",")
+    for name, new, old in zip(names, row.split(","), kept[1].split(","), strict=True):
+        assert float(new) == pytest.approx(float(old), rel=1e-9) if "[" in name else new == old
+
+
+def test_effects_come_by_entry_point_for_its_own_job_and_for_one_of_loomopt(loomopt, tmp_path):
+    heavy = answer(loomopt, "press", "--with", "slide")
+    assert (heavy["effects"], heavy["status"]) == (["forming", "slide"], "optimal")
+    words = ["--set", "effects.torsion_bar.k=150 N*m/rad", "--set", "effects.torsion_bar.rest=90 deg"]
+    found = answer(loomopt, "beatup", *words)
+    assert found["status"] == "optimal"
+    assert "torsion_bar" in found["effects"]
+    assert found["figures"]["peak_torque"] != pytest.approx(88.6894134918, rel=1e-3)
+    assert "M_torsion_bar" in loomopt("show", "beatup", *words, "--equations").stdout
+
+
+def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loomopt, distribution):
+    other = [distribution("other-press", {"press": "other_press:JOB"})]
+    for words in (("solve", "press"), ("new", "press", "x.toml"), ("check", "press")):
+        told = loomopt(*words, status=2, folders=other).stderr
+        assert "job press is brought by loomopt-press and by other-press" in told
+    assert json.loads(loomopt("solve", "beatup", "--json", folders=other).stdout)["status"] == "optimal"
+    listed = loomopt("list", folders=other)
+    assert "beatup-heavy" in listed.stdout
+    assert "job press is brought by loomopt-press and by other-press" in listed.stderr
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError: No module named"),
+        ("JOB = 1 / 0", "cannot be imported: ZeroDivisionError"),
+        ("", "cannot be imported: AttributeError"),
+        ("JOB = 7", "is no job"),
+        ("from loomopt_press.job import Press as JOB", "is no job"),
+        ("from loomopt_press.job import JOB", "calls itself press"),
+    ],
+)
+def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution, tmp_path, code, said):
+    broken = [distribution("broken-loom", {"knit": "broken_loom:JOB"}, code)]
+    (tmp_path / "knit.toml").write_text('[problem]\nname = "knit"\njob = "knit"\ntitle = "x"\n')
+    for words in (("show", "knit.toml"), ("solve", "knit"), ("new", "knit", "x.toml")):
+        told = loomopt(*words, status=2, folders=broken).stderr
+        assert f"job knit of broken-loom {said}" in told
+        assert len(told.strip().splitlines()) == 1
+    assert loomopt("evaluate", "press", folders=broken).stderr == ""
+    listed = loomopt("list", folders=broken)
+    assert "job press; targets torque" in listed.stdout
+    assert said in listed.stderr
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError"),
+        ("EFFECT = 7", "is no effect"),
+        ("from loomopt_press.slide import EFFECT", "calls itself slide"),
+    ],
+)
+def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribution, code, said):
+    broken = [distribution("broken-effect", {"beatup.wind": "broken_effect:EFFECT"}, code, "loomopt.effects")]
+    told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=broken).stderr
+    assert f"effect beatup.wind of broken-effect {said}" in told
+    assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
+
+
+def test_an_effect_of_two_distributions_is_refused(loomopt, distribution):
+    both = [distribution("other-bar", {"beatup.torsion_bar": "other_bar:EFFECT"}, group="loomopt.effects")]
+    told = loomopt("show", "beatup", "--set", "effects.torsion_bar.k=1 N*m/rad", status=2, folders=both).stderr
+    assert "effect beatup.torsion_bar is brought by loomopt-press and by other-bar" in told
+
+
+def test_a_name_of_loomopt_cannot_be_taken(loomopt, distribution):
+    thief = [distribution("thief", {"beatup": "thief:JOB"}, "raise SystemExit('imported')")]
+    assert json.loads(loomopt("solve", "beatup", "--json", folders=thief).stdout)["status"] == "optimal"
+    assert (
+        "job beatup of thief is not looked at, for loomopt has one of that name"
+        in loomopt("list", folders=thief).stderr
+    )
