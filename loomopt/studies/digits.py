@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt import maths
+from loomopt.balance import total
 from loomopt.cycle import Floats
 from loomopt.maths import Maths, Number
+from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.point import Point
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
@@ -106,10 +108,24 @@ class _Rows:
         magnitudes = [o for o in program.objectives if o.form == "magnitude"]
         pairs = np.abs(rows[len(static) : len(static) + 2 * len(magnitudes)]).reshape(-1, 2)
         self.zero = [o for o, pair in zip(magnitudes, pairs, strict=True) if pair.min() > BINDING]
-        self.peaks = [o for o in program.objectives if o.form == "peak"]
-        limits = [limit for limit in program.limits if limit.family == "cycle"]
-        self.families: list[tuple[str, float, float]] = [(o.row, 0.0, o.scale) for o in self.peaks]
-        self.families += [(limit.row, limit.bound, limit.scale) for limit in limits]
+        above = epigraphs(program)
+        self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].form == "peak"]
+        self.levels = [above[k].objective for k in self.tops]
+        self.families = families(program)
+        self.start += [self._top(above[k]) for k in self.tops]
+
+    def _top(self, epigraph: Epigraph) -> Number:
+        """Return where the peak that an epigraph stands for is in float64, in its natural size."""
+        scale = self.program.objectives[epigraph.objective].scale
+        return self.number(max(self.sampler.peak(row) for row in epigraph.rows) / scale)
+
+    def _bound(self, family: Family, tops: Sequence[Number]) -> tuple[Number, float]:
+        """Return what the rows of a family stay below, in their natural size, and that size, SI."""
+        if family.limit < 0:
+            place = self.tops.index(family.epigraph)
+            return tops[place], self.program.objectives[self.levels[place]].scale
+        limit = self.program.limits[family.limit]
+        return self.number(limit.bound) / self.number(limit.scale), limit.scale
 
     def variables(self, unknown: Sequence[Number]) -> dict[str, Number]:
         """Return every variable, SI."""
@@ -127,12 +143,19 @@ class _Rows:
         exact, number = self.design(unknown), self.number
         found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
         found += [exact.single(o.row) / number(o.scale) for o in self.zero]
-        tops = unknown[len(self.free) :]
-        for k, ((name, limit, scale), binding) in enumerate(zip(self.families, self.point.binding, strict=True)):
-            bound = tops[k] if k < len(self.peaks) else number(limit) / number(scale)
+        for family, binding in zip(self.families, self.point.binding, strict=True):
+            bound, scale = self._bound(family, unknown[len(self.free) :])
             for node in binding:
-                found.append(number(node.sign) * extreme(exact, name, node) / number(scale) - bound)
+                found.append(number(node.sign) * extreme(exact, family.row, node) / number(scale) - bound)
         return found
+
+    def level(self, place: int, unknown: Sequence[Number], exact: Reading | None = None) -> Number:
+        """Return an objective in its natural size: its peaks together, or its row."""
+        tops = zip(self.levels, unknown[len(self.free) :], strict=True)
+        peaks, level = [top for of, top in tops if of == place], self.program.objectives[place]
+        if peaks:
+            return total(peaks)
+        return (exact or self.design(unknown)).single(level.row) / self.number(level.scale)
 
     def slopes(self, unknown: Sequence[Number]) -> Floats:
         """Return (rows, unknowns): first derivatives by one-sided differences."""
@@ -145,10 +168,7 @@ class _Rows:
 
     def objective(self, unknown: Sequence[Number]) -> Number:
         """Return the last objective, to which the earlier ones leave what they do not decide."""
-        last = self.program.objectives[-1]
-        if last.form == "peak":
-            return unknown[-1]
-        return self.design(unknown).single(last.row) / self.number(last.scale)
+        return self.level(len(self.program.objectives) - 1, unknown)
 
     def gradient(self, unknown: Sequence[Number]) -> Floats:
         """Return the last objective's first derivatives."""
@@ -173,8 +193,7 @@ def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int 
     objective's own error is the square of what is left.
     """
     rows = _Rows(program, point, x, digits)
-    tops = [rows.sampler.peak(o.row) / o.scale for o in rows.peaks]
-    unknown, missed = _met(rows, [*rows.start, *map(rows.number, tops)])
+    unknown, missed = _met(rows, rows.start)
     step, curved, flat = 0.0, 0.0, 0
     for _ in range(TURNS):
         way, step, curved, flat = _open(rows, unknown)
@@ -182,10 +201,8 @@ def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int 
             break
         unknown, missed = _met(rows, rows.moved(unknown, way, rows.number(1.0)))
     exact = rows.design(unknown)
-    reached = iter(unknown[len(rows.free) :])
-    objectives = tuple(
-        next(reached) * rows.number(o.scale) if o.form == "peak" else exact.single(o.row) for o in program.objectives
-    )
+    levels = enumerate(program.objectives)
+    objectives = tuple(rows.level(k, unknown, exact) * rows.number(o.scale) for k, o in levels)
     return Optimum(rows.variables(unknown), objectives, missed + curved * step**2, missed + step, flat)
 
 

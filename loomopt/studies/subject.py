@@ -123,8 +123,9 @@ class Target:
 
     @functools.cached_property
     def optimum(self) -> digits.Optimum | None:
-        """The optimum in 40 digits; None where there is no certified answer."""
-        if self.answer.status != "optimal":
+        """The optimum in 40 digits; None without a certified answer, or of several rows that are no peaks."""
+        known = all(o.form == "peak" or not o.others for o in self.program.objectives)
+        if self.answer.status != "optimal" or not known:
             return None
         return digits.optimum(self.program, self.answer.point, self.variables(self.answer))
 
