@@ -7,6 +7,7 @@ import pytest
 from loomopt import packaged
 from loomopt.cli import run
 from loomopt.errors import BadInput
+from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.solving import engine
 from loomopt.studies import check as study
@@ -133,7 +134,7 @@ def test_an_infeasible_target_is_compared_by_what_would_help(copy):
 
 def test_the_command_names_a_difference_and_exits_1(copy, capsys, monkeypatch):
     edited(copy / BALANCE, valued("peak_torque", scaled(1e-5)))
-    monkeypatch.setattr(study, "results_path", lambda: copy)
+    monkeypatch.setattr(registry, "results", lambda scene: copy)
     assert run(["check", NAME]) == 1
     out, err = capsys.readouterr()
     line = next(line for line in out.splitlines() if line.startswith(f"{NAME}  balance"))
@@ -164,8 +165,7 @@ def test_an_unknown_name_is_refused_before_anything_is_solved(monkeypatch):
         next(iter(study.check([NAME, "nonsense"])))
 
 
-def test_written_references_are_reproduced_and_whole(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "problem_names", lambda: [NAME])
-    written = study.write(tmp_path)
+def test_written_references_are_reproduced_and_whole(tmp_path):
+    written = study.write(tmp_path, [NAME])
     assert sorted(written) == sorted(tmp_path.iterdir())
     assert differences(tmp_path) == []
