@@ -1,5 +1,4 @@
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,11 +7,11 @@ import sympy as sp
 from loomopt import maths
 from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs.rapier import equations as rapier_equations
+from loomopt.jobs.rapier import model as rapier
 from loomopt.maths import FLOAT
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 EFFECTS = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
-OWN = {"head_inertia": {"mass": 0.35}, "tape_friction": {"force": 12.0}}
 SPEED = 50.0
 BUILT = Dimensions(
     l1=0.0764, l2=0.2757, l3=0.684, l71=0.773, phi30=1.4046, l3p=0.18, alpha=0.5, l4=0.02, l5=0.49, l6=0.185,
@@ -23,10 +22,9 @@ ANGLES = (0.4, 1.9, 3.3, 5.1)
 RATES = ("phi2'", "phi3'", "phi5'", "phi6'", "phi2''", "phi3''", "phi5''", "phi6''")
 
 
-def scene(*effects):
-    """Return a scene with some effects on, as far as its equations read it."""
-    tables = {name: EFFECTS[name].own.model_construct(**OWN[name]) for name in effects}
-    return SimpleNamespace(job=SimpleNamespace(effects=EFFECTS), effects=tables)
+def model(*effects):
+    """Return the drive with some effects on."""
+    return rapier.model(tuple(EFFECTS[name] for name in effects), (), frozenset())
 
 
 def plain(name):
@@ -75,7 +73,7 @@ def shown(found, name):
 
 @pytest.fixture(scope="module")
 def geometry():
-    return rapier_equations.equations(scene())
+    return rapier_equations.equations(model())
 
 
 @pytest.mark.parametrize("phi1", ANGLES)
@@ -124,14 +122,14 @@ def test_printed_dead_centres_are_the_sleys(geometry):
 @pytest.mark.parametrize("phi1", ANGLES)
 def test_printed_head_inertia_is_the_effects(phi1):
     named = numbers(phi1) | {"omega": SPEED, "mass": 0.35}
-    (text,) = shown(rapier_equations.equations(scene("head_inertia")), "head_inertia")
+    (text,) = shown(rapier_equations.equations(model("head_inertia")), "head_inertia")
     left, right = text.split(" = ")
     assert left == "Q_head_inertia"
     assert value(right, named) == pytest.approx(0.35 * named["S''"] * SPEED**2, rel=1e-13)
 
 
 def test_friction_is_printed_for_both_ways_of_the_head():
-    (found,) = [e for e in rapier_equations.equations(scene("tape_friction")) if e.name == "tape_friction"]
+    (found,) = [e for e in rapier_equations.equations(model("tape_friction")) if e.name == "tape_friction"]
     assert found.text == "Q_tape_friction = force for S' > 0, -force for S' < 0"
     assert r"\begin{cases}" in found.latex
 
@@ -145,7 +143,7 @@ def test_friction_is_printed_for_both_ways_of_the_head():
     ],
 )
 def test_balance_and_crank_torque_list_what_is_on(effects, lines):
-    found = rapier_equations.equations(scene(*effects))
+    found = rapier_equations.equations(model(*effects))
     assert [e.text for e in found if e.name in ("balance", "crank torque")] == lines
     words = " ".join(e.text for e in found)
     assert ("mass" in words) == ("head_inertia" in effects)

@@ -10,15 +10,17 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.rapier import reading as rapier_reading
-from loomopt.jobs.rapier.design import sampler
-from loomopt.mechanisms import rapier_faults
+from loomopt.cycle import Node
+from loomopt.jobs import registry
+from loomopt.jobs.rapier import design as rapier_design
+from loomopt.mechanisms import rapier_faults, turning_points
 from loomopt.mechanisms.rapier_drive import Dimensions
 from loomopt.program.sampling import Sampler
 
 MP = mpmath.MPContext()
 MP.dps = 30
 SCENE = lo.load("rapier")
+JOB = registry.of(SCENE)
 NAMES = tuple(entry.name for entry in dataclasses.fields(Dimensions))
 TURN = 2 * math.pi
 DEGREE = math.pi / 180
@@ -117,7 +119,7 @@ def drive(which):
 
 def read(design, s_dwell=None):
     scene = SCENE if s_dwell is None else SCENE.set("operation.s_dwell", f"{s_dwell!r} m")
-    return rapier_reading.read(sampler(scene, design))
+    return rapier_design.read(JOB.sampler(scene, design))
 
 
 @pytest.mark.parametrize("which", designs())
@@ -133,8 +135,9 @@ def test_stroke_and_dwells_are_those_of_thirty_digits(which):
 
 @pytest.mark.parametrize("which", designs())
 def test_turning_points_are_those_of_thirty_digits_the_first_onto_its_way_out(which):
-    sampled = sampler(SCENE, design_of(which))
-    found = rapier_reading.turns(lambda phi: sampled.model.pose(maths.numpy(), sampled.given, phi))
+    sampled = JOB.sampler(SCENE, design_of(which))
+    drive_ = sampled.model.kinematics
+    found = turning_points.turns(lambda phi: drive_.pose(maths.numpy(), sampled.given, Node(phi, {})).q1)
     exact = drive(which)
     assert np.sort(np.mod(found, TURN)) == pytest.approx([float(phi) for phi in exact.turning], abs=1e-10)
     assert exact.slope(found[0] + 1e-4) > 0 > exact.slope(found[0] - 1e-4)
@@ -182,11 +185,11 @@ def test_an_s_dwell_beyond_the_stroke_is_a_dwell_of_the_whole_turn():
 
 
 def test_the_scene_without_s_dwell_has_a_stroke_and_no_dwell():
-    sampled = sampler(SCENE, {})
+    sampled = JOB.sampler(SCENE, {})
     values = {name: value for name, value in sampled.given.values.items() if isinstance(value, float)}
     del values["s_dwell"]
     model = dataclasses.replace(sampled.model, arcs=())
-    found = rapier_reading.read(Sampler(model, values))
+    found = rapier_design.read(Sampler(model, values))
     assert found.stroke == read({}).stroke
     assert math.isnan(found.dwell_after)
     assert math.isnan(found.dwell_before)
@@ -198,16 +201,16 @@ def test_a_drive_that_locks_has_no_stroke():
 
 
 def friction(design):
-    return sampler(SCENE.with_effect("tape_friction"), design)
+    return JOB.sampler(SCENE.with_effect("tape_friction"), design)
 
 
 @pytest.mark.parametrize("which", designs())
 def test_the_friction_switch_is_the_sign_of_the_heads_speed(which):
     sampled, exact = friction(design_of(which)), drive(which)
-    place = [load.name for load in sampled.model.switched].index("tape_friction")
     for piece in range(sampled.cycle.pieces):
         for u in (0.001, 0.3, 0.999):
             phi = float(sampled.cycle.angles(np.array([piece]), np.array([u]))[0])
             if min(abs(math.remainder(phi - float(turn), TURN)) for turn in exact.turning) > 1e-6:
-                assert sampled.cycle.switches[piece, place] == MP.sign(exact.slope(MP.mpf(phi)))
-    assert sampled.model.pose(maths.FLOAT, sampled.given, sampled.given.values["turns"][0] + 0.01).q1 > 0
+                assert sampled.cycle.switch(piece)["tape_friction"] == MP.sign(exact.slope(MP.mpf(phi)))
+    after = Node(sampled.given.values["turns"][0] + 0.01, {})
+    assert sampled.model.kinematics.pose(maths.FLOAT, sampled.given, after).q1 > 0
