@@ -8,13 +8,13 @@ import sympy as sp
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs.shedding import drawing as cam_curves
-from loomopt.jobs.shedding import design as shedding_design
+from loomopt.jobs import registry
+from loomopt.jobs.shedding import drawing
 from loomopt.maths import FLOAT
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like, spline
-from loomopt.views import job_views
+from loomopt.picture import cam_laws
 
 SCENE = lo.load("shedding")
 LOADS = ("weight", "warp_tension", "inertia", "damping", "dry_friction")
@@ -30,11 +30,11 @@ def with_effects(*names):
 
 
 def printed(scene, name):
-    return [equation.text for equation in job_views.view(scene).equations(scene) if equation.name == name]
+    return [equation.text for equation in registry.of(scene).views.equations(scene) if equation.name == name]
 
 
 def all_of(scene):
-    return {equation.text.split(" = ")[0]: equation.text for equation in job_views.view(scene).equations(scene)}
+    return {equation.text.split(" = ")[0]: equation.text for equation in registry.of(scene).views.equations(scene)}
 
 
 def plain(text):
@@ -126,7 +126,7 @@ def test_printed_motion_is_the_frames(theta):
 
     u = value(here("u"), **known)
     law = dict(zip(("s", "s_1", "s_2"), LAWS["cycloidal"].formula(FLOAT, u, 0)[:3], strict=True))
-    at = cam_curves.cam(scene, {}).at(np.array([theta]))
+    at = drawing.cam(scene, {}).at(np.array([theta]))
     frame = lo.simulate(scene)
     for name, column in (("X", "X [m]"), ("X'", "X_1 [m/rad]"), ("X''", "X_2 [m/rad^2]")):
         exact = np.interp(theta, frame["phi [rad]"][:-1], frame[column][:-1])
@@ -136,14 +136,14 @@ def test_printed_motion_is_the_frames(theta):
 
 def test_segments_that_are_not_there_are_not_printed():
     scene = SCENE.update({"mechanism.far_dwell": "0 deg", "mechanism.near_dwell": "120 deg"})
-    words = " ".join(equation.text for equation in job_views.view(scene).equations(scene))
+    words = " ".join(equation.text for equation in registry.of(scene).views.equations(scene))
     assert "near dwell" in words
     assert "far dwell" not in words
 
 
 @pytest.mark.parametrize("on", [(), ("weight",), ("warp_tension", "inertia"), LOADS, (*LOADS, "coil")])
 def test_an_effect_has_its_term_and_its_symbols_exactly_when_it_is_on(on):
-    found = job_views.view(SCENE).equations(with_effects(*on))
+    found = registry.of(SCENE).views.equations(with_effects(*on))
     names = [equation.name for equation in found]
     assert "return_spring" in names
     (balance,) = (equation.text for equation in found if equation.name == "balance")
@@ -212,16 +212,17 @@ def test_without_follower_nothing_of_it_is_printed():
     document = {table: dict(own) for table, own in SCENE.document.items()}
     del document["mechanism"]["arm"]
     scene = lo.scene(document)
-    names = {equation.name for equation in job_views.view(scene).equations(scene)}
+    names = {equation.name for equation in registry.of(scene).views.equations(scene)}
     assert not names & {"follower", "roller centre", "pressure angle", "profile"}
     assert "contact" in names
 
 
 def test_printed_rows_of_the_coil_are_its_figures_and_what_it_keeps():
     scene = lo.load("shedding-printed-travel").with_effect("coil")
-    design = shedding_design.today(scene)
-    figures = shedding_design.figures(scene, design)
-    known = {name.rpartition(".")[2]: number for name, number in shedding_design.values_of(scene, design).items()}
+    job = registry.of(scene)
+    design = job.today(scene)
+    figures = job.figures(scene, design)
+    known = {name.rpartition(".")[2]: number for name, number in job.numbers_of(scene, design).items()}
     known["omega"] = known.pop("speed")
     known["back"] = known.pop("return")
     texts = [text for text in printed(scene, "coil") if " = " in text]
@@ -246,7 +247,7 @@ def test_printed_rows_of_the_coil_are_its_figures_and_what_it_keeps():
 @pytest.mark.parametrize("name", ["shedding", "shedding-static"])
 def test_latex_is_balanced_and_has_the_papers_letters(name):
     scene = lo.load(name)
-    latex = " ".join(equation.latex for equation in job_views.view(scene).equations(scene))
+    latex = " ".join(equation.latex for equation in registry.of(scene).views.equations(scene))
     assert latex.count("{") == latex.count("}")
     assert latex.count(r"\begin{cases}") == latex.count(r"\end{cases}") > 4
     for symbol in (r"\phi_{0}", r"\theta", r"N \ge N_{\mathrm{min}}", r"K_{1}", r"\text{in the far dwell}"):
@@ -257,6 +258,6 @@ def test_an_expanded_formula_is_the_same_function():
     u = sp.Symbol("u", real=True)
     raw = LAWS["freudenstein_13"].formula(maths.sympy(), u, 0)
     for formula in raw[:3]:
-        short = cam_equations.expanded(formula, u)
+        short = cam_laws.expanded(formula, u)
         assert len(str(short)) < len(str(formula))
         assert sp.N((short - formula).subs(u, sp.Rational(2, 7)), 30) == pytest.approx(0, abs=1e-25)

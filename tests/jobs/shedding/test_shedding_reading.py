@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 import loomopt as lo
-from loomopt.jobs.shedding.design import figures
+from loomopt.jobs import registry
 
 with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    patch.syspath_prepend(str(Path(__file__).parents[3] / "benchmarks"))
     plain = importlib.import_module("plain_shedding")
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
+JOB = registry.of(FULL)
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 RPM = math.pi / 30
 
@@ -62,7 +63,7 @@ def turned(scene, *degrees):
 @pytest.mark.parametrize("name", CASES)
 def test_at_the_contact_speed_the_spring_is_the_least_one(name):
     reference, K1 = CASES[name]
-    found = figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM
+    found = JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] / RPM
     needed = [
         plain.least_stiffness(dataclasses.replace(reference, rpm=found * share))[0] for share in (0.999, 1, 1.001)
     ]
@@ -75,14 +76,14 @@ def test_the_contact_speed_is_the_root_in_thirty_digits(name):
     """144.508702549280 and 177.459266813963 rpm."""
     reference, K1 = CASES[name]
     expected = float(plain.contact_speed(reference, K1)) * RPM
-    assert figures(product(reference), {"K1": float(K1)})["contact_speed"] == pytest.approx(expected, rel=1e-11)
+    assert JOB.figures(product(reference), {"K1": float(K1)})["contact_speed"] == pytest.approx(expected, rel=1e-11)
 
 
 def test_the_contact_speed_does_not_depend_on_the_speed_it_is_asked_at():
-    found = [figures(FULL.set("operation.speed", f"{rpm} rpm"), {})["contact_speed"] for rpm in (1, 137, 600, 5000)]
+    found = [JOB.figures(FULL.set("operation.speed", f"{rpm} rpm"), {})["contact_speed"] for rpm in (1, 137, 600, 5000)]
     assert found == [pytest.approx(found[0], rel=1e-11)] * 4
 
 
 def test_without_contact_at_rest_there_is_no_speed_and_without_motion_no_limit():
-    assert figures(FULL, {"K1": 6000.0})["contact_speed"] == 0
-    assert figures(FULL.set("mechanism.travel", "0 mm"), {})["contact_speed"] is None
+    assert JOB.figures(FULL, {"K1": 6000.0})["contact_speed"] == 0
+    assert JOB.figures(FULL.set("mechanism.travel", "0 mm"), {})["contact_speed"] is None
