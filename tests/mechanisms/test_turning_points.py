@@ -1,0 +1,85 @@
+"""Newton's method that moves with its numbers, sign changes between samples, and crossings to rounding."""
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from loomopt import maths
+from loomopt.mechanisms import turning_points
+from loomopt.mechanisms.turning_points import crossing, newton, turns
+
+REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
+TURN = 2 * math.pi
+
+
+def cubic(a):
+    """Return x³ + x − a and its slope: the root moves with a as 1/(3x² + 1), and bends as −6x/(3x² + 1)³."""
+    return lambda x: (x**3 + x - a, 3 * x**2 + 1)
+
+
+@pytest.mark.parametrize("root", [0.3, 1.0, -2.0])
+def test_the_root_moves_with_its_numbers_right_to_second_order(root):
+    a = ca.SX.sym("a")
+    found = newton(cubic(a), root)
+    bend, slope = ca.hessian(found, a)
+    value, first, second = (float(x) for x in ca.Function("f", [a], [found, slope, bend])(root**3 + root))
+    rate = 3 * root**2 + 1
+    assert [value, first, second] == pytest.approx([root, 1 / rate, -6 * root / rate**3], rel=1e-13)
+
+
+def test_one_step_would_not_bend_with_them(monkeypatch):
+    monkeypatch.setattr(turning_points, "STEPS", 1)
+    a = ca.SX.sym("a")
+    bend, _ = ca.hessian(newton(cubic(a), 1.0), a)
+    assert float(ca.Function("f", [a], [bend])(2.0)) == 0.0
+
+
+def test_a_hint_right_in_floats_gives_the_root_in_many_digits():
+    """2 steps of quadratic convergence: 16 digits become 32, then 64 of 50."""
+    many = maths.mpmath(50)
+    assert abs(newton(lambda x: (x**2 - 2, 2 * x), many.number(math.sqrt(2))) - many.sqrt(many.number(2))) < 1e-48
+
+
+@given(st.lists(st.floats(0, TURN), min_size=2, max_size=6, unique=True).filter(lambda zeros: len(zeros) % 2 == 0))
+@REPEATABLE
+def test_turns_are_where_the_slope_changes_its_sign_the_first_from_minus_to_plus(zeros):
+    """A product of half-angle sines changes its sign at each of its zeros."""
+    ordered = np.sort(zeros)
+    around = np.diff([*ordered, ordered[0] + TURN])
+    if np.min(around) < 0.02 or ordered[0] < 1e-6 or ordered[-1] > TURN - 1e-6:
+        return
+    found = turns(lambda phi: np.prod([np.sin((phi - zero) / 2) for zero in ordered], axis=0))
+    assert np.sort(found) == pytest.approx(ordered, abs=1e-14 * TURN)
+    assert np.prod(np.sin((found[0] + 1e-3 - ordered) / 2)) > 0 > np.prod(np.sin((found[0] - 1e-3 - ordered) / 2))
+    assert np.count_nonzero(np.diff([*found, found[0]]) < 0) == 1, "in the order of the turn"
+
+
+def test_a_motion_that_never_turns_or_is_not_real_somewhere_has_none():
+    assert turns(lambda phi: 2 + np.cos(phi)) == []
+    assert turns(lambda phi: -1 - 0 * phi) == []
+    assert turns(lambda phi: np.sqrt(np.cos(phi))) == []
+
+
+@given(st.floats(-2, 2), st.sampled_from([1, 3, 9]), st.floats(1e-6, 1e6))
+@REPEATABLE
+def test_a_crossing_is_right_to_rounding_however_flat_or_steep(root, power, scale):
+    found = crossing(lambda x: scale * (x - root) ** power, root - 1.0, root + 1.7)
+    assert abs(found - root) <= 1e-15 * max(1.0, abs(root))
+
+
+def test_a_crossing_is_never_past_the_zero():
+    for root in (0.1, 1 / 3, math.pi):
+        found = crossing(lambda x, root=root: math.expm1(x - root), 0.0, 4.0)
+        assert math.expm1(found - root) <= 0.0 < math.expm1(found + 1e-15 * 4 - root)
+
+
+def test_a_crossing_of_what_jumps_is_where_it_jumps():
+    assert crossing(lambda x: 1.0 if x > 0.7 else -1.0, 0.0, 2.0) == pytest.approx(0.7, abs=1e-15)
+
+
+def test_a_level_stretch_at_zero_is_left_at_its_beginning():
+    assert crossing(lambda x: 0.0, 0.25, 0.75) == 0.25
