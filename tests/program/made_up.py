@@ -1,0 +1,96 @@
+"""A mechanism that nobody builds, right at sight: a Scotch yoke with a mass, a spring and a cloth."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from loomopt import balance
+from loomopt.balance import Given
+from loomopt.cycle import Node
+from loomopt.effects.kinds import Load
+from loomopt.maths import Maths, Number
+from loomopt.program.kinematics import Arcs, Group
+from loomopt.schema import Table, Values
+
+FRONT, REAR = "front", "rear"
+
+
+@dataclass(frozen=True)
+class Yoke:
+    """q = r (1 − cos φ); front at φ = π, rear at 0."""
+
+    structure: str = "yoke"
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    arcs: tuple[Arcs, ...] = ()
+    breaks: frozenset[str] = frozenset()
+
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Values:
+        return {"stroke": 2 * values["r"]}
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        return {}
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> balance.Pose:
+        r, phi = given.values["r"], node.phi
+        return balance.Pose(
+            phi, given.values["speed"], r * (1 - maths.cos(phi)), r * maths.sin(phi), r * maths.cos(phi)
+        )
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> balance.Pose:
+        r = given.values["r"]
+        q, q2 = {FRONT: (2 * r, -r), REAR: (0 * r, r)}[event]
+        return balance.Pose(self.events(maths, given)[event], given.values["speed"], q, 0, q2)
+
+    def events(self, maths: Maths, given: Given) -> Values:
+        return {FRONT: maths.pi, REAR: 0 * maths.pi}
+
+
+class MassTable(Table):
+    m: float
+
+
+class SpringTable(Table):
+    k: float
+    p: float
+
+
+class ClothTable(Table):
+    F: float
+    width: float
+
+
+def inertia(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
+    return own["m"] * pose.acceleration
+
+
+def spring(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
+    return own["k"] * (pose.q - own["p"])
+
+
+def cloth(maths: Maths, pose: balance.Pose, given: Values, own: Values, switch: Number) -> Number:
+    """Return F, faded in from where the cloth is met to the front, where it is let go."""
+    met = -maths.cos(own["width"])
+    return switch * own["F"] * (-maths.cos(pose.phi) + met) / (1 + met)
+
+
+def pressed(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+    """Return where the cloth is met and left, rad: it leaves at the front."""
+    return (maths.pi - own["width"], maths.pi)
+
+
+def presses(angle: float, corners: tuple[float, ...]) -> float:
+    begin, end = corners
+    return 1.0 if (angle - begin) % 6.283185307179586 < end - begin else 0.0
+
+
+INERTIA = Load(name="inertia", summary="", own=MassTable, acts="output", force=inertia)
+SPRING = Load(name="spring", summary="", own=SpringTable, acts="output", force=spring)
+CLOTH = Load(name="cloth", summary="", own=ClothTable, acts="output", force=cloth, corners=pressed, switch=presses)
+NUMBERS = {
+    "r": 0.05,
+    "speed": 60.0,
+    "inertia.m": 2.0,
+    "spring.k": 3000.0,
+    "spring.p": 0.04,
+    "cloth.F": 1500.0,
+    "cloth.width": 0.9,
+}
