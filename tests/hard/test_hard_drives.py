@@ -13,7 +13,7 @@ from hard_digits import MP, TIME_STEP, angle, centres, exact, worst_ulps
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.mechanisms import crank_rocker, rapier_faults, sley_synthesis
+from loomopt.mechanisms import crank_rocker_synthesis, rapier_faults, sley_synthesis
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 # Synthesis: θ → 0, K → 1 -----------------------------------------------------------------------------------------
@@ -34,7 +34,7 @@ def test_synthesis_as_the_time_ratio_goes_to_1(theta):
     random = np.random.default_rng(11)
     for _ in range(4):
         data = theta, random.uniform(0.6, 1.4), random.uniform(0.1, 0.8)
-        assert worst_ulps(crank_rocker.synthesis(maths.FLOAT, *data), four_bar, data) <= 2
+        assert worst_ulps(crank_rocker_synthesis.synthesis(maths.FLOAT, *data), four_bar, data) <= 2
 
 
 def seen_under(l1, l2, l3, l71):

@@ -25,7 +25,7 @@ from machines import (
 )
 
 from loomopt import maths
-from loomopt.mechanisms import cam_spline, crank_rocker, sley_synthesis
+from loomopt.mechanisms import cam_spline, crank_rocker, crank_rocker_synthesis, sley_synthesis
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
 from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
@@ -116,7 +116,7 @@ def test_lengths_of_a_crank_rocker_from_its_angles(lengths):
     stands = dead_centres(maths.FLOAT, Lengths(*sides_of(lengths)))
 
     def formulas(system, *numbers):
-        return dict(zip(("l1", "l2", "l3"), crank_rocker.synthesis(system, *numbers), strict=True))
+        return dict(zip(("l1", "l2", "l3"), crank_rocker_synthesis.synthesis(system, *numbers), strict=True))
 
     assert_right(formulas, (stands.theta, stands.beta, stands.swing), MOST)
 
