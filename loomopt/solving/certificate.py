@@ -18,7 +18,7 @@ from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.prices import priced
-from loomopt.solving.rows import ActiveSet, active_set
+from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Curvature, Local
 from loomopt.solving.verdict import Binding, Certificate, Level
 from loomopt.tolerances import (
@@ -81,17 +81,10 @@ def _judged_level(local: Local, place: int, earlier: Sequence[Multipliers]) -> J
     """Solve one level's KKT system and judge its curvature."""
     system = kkt.system(local.active, place, earlier)
     first = kkt.solved(local.gradients, system)
-    if _is_zero(local, place) or not first.residual <= SLOPING:
+    if local.active.zero[place] or not first.residual <= SLOPING:
         return JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     multipliers, curvature = _best(local, place, system, first)
     return JudgedLevel(_residuals(local, place, system, multipliers, first.residual), multipliers, curvature)
-
-
-def _is_zero(local: Local, place: int) -> bool:
-    """Say whether an objective of magnitudes is 0, less than which there is none: there is no curvature to judge."""
-    objective, groups = local.program.objectives[place], local.active.levels[place]
-    pairs = zip(groups, objective.groups, strict=True)
-    return objective.form == "magnitude" and all(len(pieces) == 2 * len(rows) for pieces, rows in pairs)
 
 
 def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple[Multipliers, Curvature]:
@@ -112,16 +105,11 @@ def _residuals(local: Local, place: int, system: System, multipliers: Multiplier
     """Return one level's residuals, and the limit with the largest multiplier."""
     rows, of = local.active.rows, multipliers.of
     slack = max((abs(of[k] * rows[k].excess) for k in system.limits), default=0.0)
-    held = float(sum(_held(local.active, level, multipliers) for level in range(place)))
+    held = float(sum(abs(of[k]) for level in range(place) for k in local.active.pieces(level)))
     dearest = max(system.limits, key=lambda k: abs(of[k]), default=None)
     price, name = (0.0, "") if dearest is None else (float(abs(of[dearest])), rows[dearest].name)
     figure = local.program.objectives[place].figure
     return Level(figure, residual, float(slack), held, price, name)
-
-
-def _held(active: ActiveSet, level: int, multipliers: Multipliers) -> float:
-    """Return the size of the multiplier by which an earlier level is held."""
-    return float(sum(abs(multipliers.of[k]) for k in active.pieces(level)) / len(active.levels[level]))
 
 
 def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accuracy: float) -> Certificate:

@@ -4,7 +4,7 @@ import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.solving.nnls import nnls
-from loomopt.tolerances import CONE_OPEN, CONE_SEEDS, CONE_STEPS, CONE_TIP
+from loomopt.tolerances import CONE_OPEN, CONE_STEPS, CONE_TIP
 
 TINY = 1e-300
 """Keeps the step of a matrix of zeros a number."""
@@ -13,15 +13,14 @@ TINY = 1e-300
 def least_on_cone(hessian: Floats, slopes: Floats) -> float:
     """Return the least d'Hd over unit directions d with slopes d ≤ 0 that was found; infinite without any.
 
-    hessian: (n, n), symmetric; slopes: (m, n). Projected gradients from eigenvectors and from a few fixed seeds: a
-    heuristic, for the problem is NP-hard [Murty and Kabadi, Mathematical Programming 39 (1987), 117-129]. What it
-    returns is reached by a direction of the cone; that there is nothing less is not proven.
+    hessian: (n, n), symmetric; slopes: (m, n). Projected gradients from the eigenvectors: a heuristic, for the
+    problem is NP-hard [Murty and Kabadi, Mathematical Programming 39 (1987), 117-129]. What it returns is reached by
+    a direction of the cone; that there is nothing less is not proven.
     """
     values, vectors = np.linalg.eigh(hessian)
     if not len(slopes):
         return float(values[0])
     seeds = [sign * vector for vector in vectors.T for sign in (1.0, -1.0)]
-    seeds += list(np.random.default_rng(0).normal(size=(CONE_SEEDS, len(hessian))))
     pace, least = 1.0 / max(float(np.abs(hessian).sum(axis=0).max()), TINY), np.inf
     for seed in seeds:
         direction = onto_cone(seed, slopes)

@@ -56,6 +56,13 @@ class Multipliers:
         """Rows that bind."""
         return set(np.flatnonzero(np.abs(self.of) > POSITIVE).tolist())
 
+    def subgradient(self, gradients: Floats, system: System) -> Floats:
+        """Return the slope that is left, with the multipliers of each group's pieces made to sum to 1 exactly."""
+        weights = self.of.copy()
+        for group in map(list, system.groups):
+            weights[group] /= weights[group].sum() or 1.0
+        return np.asarray(weights @ gradients)
+
 
 def system(active: ActiveSet, level: int, earlier: Sequence[Multipliers]) -> System:
     """Return one level's system; earlier: the multipliers of the levels before it."""
@@ -63,16 +70,19 @@ def system(active: ActiveSet, level: int, earlier: Sequence[Multipliers]) -> Sys
     limits = [row.limit for row in active.rows[: active.limits]]
     equal = tuple(k for k, limit in enumerate(limits) if limit and (limit.sign == 0 or k in bound))
     unequal = tuple(k for k in range(active.limits) if k not in equal)
-    held = [sums for groups in active.levels[:level] for sums in _held(active, groups, bound)]
+    held = [sums for place in range(level) for sums in _held(active, place, bound)]
     return System(active.levels[level], unequal, equal, np.array(held).reshape(-1, len(active.rows)))
 
 
-def _held(active: ActiveSet, groups: Groups, bound: set[int]) -> list[Floats]:
+def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
     """Return what an earlier objective keeps: where it is one group each piece that binds, else the groups' sum.
 
-    Within each of several groups the pieces that bind stay equal, while one group may rise as another falls.
+    Within each of several groups the pieces that bind stay equal, while one group may rise as another falls. Where all
+    is zero, all stays so.
     """
-    unit = np.eye(len(active.rows))
+    unit, groups = np.eye(len(active.rows)), active.levels[level]
+    if active.zero[level]:
+        return [unit[k] for k in active.pieces(level)]
     binding = [[k for k in group if k in bound] for group in groups]
     if len(groups) == 1:
         return [unit[k] for k in binding[0]]

@@ -36,13 +36,15 @@ class Row:
 class ActiveSet:
     """Rows of a program at one design: those of limits first, then the pieces of each objective.
 
-    limits: how many rows limits have; levels: groups of pieces of each objective; excess: of every limit of the
-    program, in its natural size, of an equality the magnitude.
+    limits: how many rows limits have; levels: groups of pieces of each objective; zero: whether an objective is one of
+    magnitudes that all vanish, less than which there is none; excess: of every limit of the program, in its natural
+    size, of an equality the magnitude.
     """
 
     rows: tuple[Row, ...]
     limits: int
     levels: tuple[Groups, ...]
+    zero: tuple[bool, ...]
     excess: tuple[float, ...]
 
     def pieces(self, level: int) -> list[int]:
@@ -55,7 +57,7 @@ def active_set(program: Program, sampler: Sampler) -> ActiveSet:
     signed = [sampler.excess(limit) for limit in program.limits]
     excess = tuple(abs(e) if limit.sign == 0 else e for e, limit in zip(signed, program.limits, strict=True))
     rows = [row for k, limit in enumerate(program.limits) for row in _limit_rows(sampler, k, limit, signed[k])]
-    count, levels = len(rows), []
+    count, levels, zero = len(rows), [], []
     for place, objective in enumerate(program.objectives):
         groups = []
         for group in objective.groups:
@@ -63,7 +65,9 @@ def active_set(program: Program, sampler: Sampler) -> ActiveSet:
             groups.append(tuple(range(len(rows), len(rows) + len(pieces))))
             rows += pieces
         levels.append(tuple(groups))
-    return ActiveSet(tuple(rows), count, tuple(levels), excess)
+        magnitudes = objective.form == "magnitude"
+        zero.append(magnitudes and sum(map(len, groups)) == 2 * len(objective.rows))
+    return ActiveSet(tuple(rows), count, tuple(levels), tuple(zero), excess)
 
 
 def _limit_rows(sampler: Sampler, place: int, limit: Limit, excess: float) -> list[Row]:

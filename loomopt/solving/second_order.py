@@ -6,7 +6,7 @@ is g_xx − g_xφ g_φx / g_φφ [Hettich and Kortanek, SIAM Review 35 (1993), 3
 ones without a multiplier bound the cone.
 
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
-decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from a few seeds
+decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
 (`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
 Lagrangian is read at a few steps along the line (`lagrangian`: what falls along a curve only is not looked for).
 """
@@ -88,11 +88,12 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     apart = [unit[k] - unit[of[0]] for of in shared for k in of[1:]]
     sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
     jacobian = sums @ local.gradients
-    _, sizes, rows = np.linalg.svd(jacobian)
-    basis = rows[int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0)))) :].T
+    left, sizes, rows = np.linalg.svd(jacobian)
+    rank = int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0))))
+    basis = rows[rank:].T
     excess = np.array([row.excess for row in active.rows])
     missed = sums @ np.where(np.isfinite(excess), excess, 0.0)
-    back = -np.linalg.lstsq(jacobian, missed, rcond=RANK)[0]
+    back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
     slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
     return Critical(basis, back, slopes[np.abs(slopes).max(axis=1, initial=0.0) > FLAT])
 
@@ -100,13 +101,14 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
     """Return what second order says of one level with one set of multipliers."""
     cone = critical(local, system, multipliers)
+    slope = multipliers.subgradient(local.gradients, system)
     if cone.basis.shape[1] == 0:
-        step = _newton(local, cone, np.zeros((0, 0)), np.zeros(0), multipliers)
+        step = _newton(cone, np.zeros((0, 0)), np.zeros(0), slope)
         return Curvature(settled=True, step=step)
     hessian = np.tensordot(multipliers.of, local.exact.curvatures(cone.basis), axes=1)
     values, vectors = np.linalg.eigh(hessian)
     curved = values > NEWTON_CURVED
-    step = _newton(local, cone, vectors[:, curved], values[curved], multipliers)
+    step = _newton(cone, vectors[:, curved], values[curved], slope)
     settled = bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian)
     if values.min() < -FLAT and least_on_cone(hessian, cone.slopes) < -FLAT:
         return Curvature(minimum=False, unique=False, settled=settled, step=step)
@@ -119,13 +121,13 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
     return Curvature(unique=unique, falls=falls, settled=settled, step=step)
 
 
-def _newton(local: Local, cone: Critical, vectors: Floats, bends: Floats, multipliers: Multipliers) -> Floats:
+def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Floats:
     """Return Newton's step: back onto the binding rows, and along curved directions down the slope.
 
-    vectors: (k, curved) in the cone's basis; bends: their curvatures.
+    vectors: (k, curved) in the cone's basis; bends: their curvatures; slope: what the multipliers leave.
     """
     directions = cone.basis @ vectors
-    pull = directions.T @ (multipliers.of @ local.gradients)
+    pull = directions.T @ slope
     if max(np.abs(pull).max(initial=0.0), np.abs(cone.back).max(initial=0.0)) <= NEWTON_DONE:
         return np.zeros(0)
     return np.asarray(cone.back - directions @ (pull / bends))

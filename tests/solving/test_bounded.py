@@ -2,7 +2,6 @@
 
 import importlib
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -228,9 +227,10 @@ def test_the_balls_of_a_box_contain_the_values_at_its_points(name, data):
     half = data.draw(st.floats(1e-6, 0.25)) * (end - start)
     centre = start + half + data.draw(share) * (end - start - 2 * half)
     switch = {name: float(value) for name, value in sampled.cycle.switch(piece).items()}
+    nothing = maths.ball_series(0, 0) * 0
     for row in ROWS:
         wide, narrow = (
-            physics.quantity(system, exact, row, Node(maths.ball_series(centre, r), switch)) + maths.ball_series(0, 0) * 0
+            physics.quantity(system, exact, row, Node(maths.ball_series(centre, r), switch)) + nothing
             for r in (half, 0.0)
         )
         for place in (-1.0, 1.0, *(2 * data.draw(share) - 1 for _ in range(3))):

@@ -1,11 +1,14 @@
 """The balance of the source's loom: best-known optima, checked by physics written out a second time."""
 
+from dataclasses import replace
+
 import pytest
 from plain_beatup import DESIGN, Machine
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
+from loomopt.program.program import Objective
 
 BEST = {600: (-76.9811021, 82.3371385326), 745: (0.0, 88.6894134918), 800: (0.0, 96.8757999181)}
 BEST[900] = (28.4966062, 122.3346355196)
@@ -128,3 +131,34 @@ def test_accuracy_asked_for_is_accuracy_given(accuracy):
     assert answer.status == "optimal"
     assert answer.certificate.violation <= accuracy
     assert answer.figures["peak_torque"] == pytest.approx(BEST[745][1], rel=max(1e-9, accuracy))
+
+
+# A limit that settles all but the radius of a counterweight of no mass --------------------------------------------
+
+
+@pytest.mark.parametrize("pulse", [295, 300, 302.5, 305, 310, 315, 318, 320])
+def test_a_pulse_that_settles_the_first_level_is_certified(pulse):
+    scene = lo.load("beatup").set("limits.pulse_rms.max", f"{pulse} N*m")
+    answer = lo.solve(scene)
+    assert answer.status == "optimal", answer.message
+    assert answer.figures["pulse_rms"] == pytest.approx(pulse, rel=1e-9)
+    assert Machine(scene).excess(answer.design) <= 1e-9
+    price = next(price for price in answer.binding if price.limit == "pulse_rms")
+    looser = lo.solve(scene.set("limits.pulse_rms.max", f"{pulse + 0.01} N*m"))
+    gained = abs(answer.figures["M3_fdc"]) - abs(looser.figures["M3_fdc"])
+    assert gained / 0.01 == pytest.approx(price.worth["M3_fdc"], rel=1e-3)
+
+
+def test_a_variable_of_the_task_may_come_first(monkeypatch):
+    """The least m4e r4e² that keeps the reed torque: no table of the scene knows s."""
+    scene = lo.load("beatup").set("operation.M0", "800 N*m")
+    job = registry.find("beatup")
+    program = job.program(scene, "torque")
+    size = next(v.scale for v in program.variables if v.name == "s")
+    changed = replace(program, objectives=(Objective("s", "s", "value", size), *program.objectives))
+    monkeypatch.setattr(type(job), "program", lambda *_: changed)
+    answer = lo.solve(scene, "torque")
+    assert answer.status == "optimal", answer.message
+    assert answer.figures["M3_fdc"] == pytest.approx(8.0, rel=1e-9)
+    assert answer.design["m4e"] * answer.design["r4e"] ** 2 < 0.02
+    assert "Limits that stop s: " in answer.message

@@ -10,7 +10,6 @@ from loomopt.program.program import Move, Wish
 from loomopt.solving.settle import settle
 
 
-
 def slide(goal, low=-100.0, high=100.0):
     """Return the move of y alone that wants it at goal."""
     return Move("slide", ("y",), "axis", (Wish("today", "tidier"),), {"y": goal}, {"y": (low, high)})

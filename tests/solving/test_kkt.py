@@ -1,0 +1,110 @@
+"""KKT systems whose multipliers are plain to see."""
+
+import numpy as np
+import pytest
+import toy
+
+from loomopt.program.sampling import Sampler
+from loomopt.solving import kkt
+from loomopt.solving.exact import Exact
+from loomopt.solving.kkt import Multipliers
+from loomopt.solving.rows import active_set
+
+
+def at(program, x):
+    """Return the active set at x and its slopes."""
+    sampler = Sampler(program.model, x)
+    active = active_set(program, sampler)
+    return active, Exact(program, x, sampler, active.rows).gradients()
+
+
+def level(program, x, place=0, earlier=()):
+    active, gradients = at(program, x)
+    system = kkt.system(active, place, earlier)
+    return active, system, kkt.solved(gradients, system)
+
+
+XY = {"x": 0.0, "y": 0.0}
+LEAN = {"f": lambda v: 3 * v["x"] + 2 * v["y"]}
+
+
+def test_limits_share_a_slope_by_their_own():
+    program = toy.program("xy", LEAN, limits=(("x", -1, 0.0), ("y", -1, 0.0), ("y", 1, 0.0)))
+    _, system, found = level(program, XY)
+    assert system.inequalities == (0, 1, 2)
+    assert system.equalities == ()
+    assert found.of == pytest.approx([3.0, 2.0, 0.0, 1.0])
+    assert found.residual < 1e-14
+    assert found.positive == {0, 1, 3}
+    without = system.without(1)
+    assert (without.inequalities, without.groups) == ((0, 2), system.groups)
+    assert kkt.solved(at(program, XY)[1], without).residual > 0.5
+
+
+def test_an_equality_may_pull_either_way_and_a_limit_may_not():
+    for value in (3.0, -3.0):
+        rows = {"f": lambda v, value=value: value * v["x"] + v["y"] ** 2}
+        _, _, found = level(toy.program("xy", rows, limits=(("x", 0, 0.0),)), XY)
+        assert found.of == pytest.approx([-value, 1.0])
+    _, _, found = level(toy.program("xy", LEAN, limits=(("x", 1, 0.0), ("y", -1, 0.0))), XY)
+    assert found.residual > 0.5
+    assert found.of[0] == 0.0
+
+
+def test_pieces_of_one_group_share_a_multiplier_of_one():
+    """max(x, −2 x + y, −y) at 0: weights 2/4, 1/4, 1/4."""
+    rows = {"p": lambda v: v["x"], "q": lambda v: -2 * v["x"] + v["y"], "r": lambda v: -v["y"]}
+    _, system, found = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
+    assert system.groups == ((0, 1, 2),)
+    assert found.of == pytest.approx([0.5, 0.25, 0.25])
+    assert found.residual < 1e-14
+
+
+def test_the_pieces_of_each_group_of_a_sum_share_a_multiplier_of_one():
+    """|x| + |x − 2 y + 1| − like: at x = 0, y = 0 the first has its kink, the second a slope that y must balance."""
+    rows = {"p": lambda v: 4 * v["x"], "q": lambda v: v["x"] + 2}
+    _, system, found = level(toy.program("xy", rows, objectives=("|p + q|",)), XY)
+    assert system.groups == ((0, 1), (2,))
+    assert found.of == pytest.approx([0.375, 0.625, 1.0]), "4 (0.375 − 0.625) + 1 = 0"
+    assert found.residual < 1e-14
+    steep = {"p": lambda v: v["x"], "q": lambda v: 2 * v["x"] + 2}
+    assert level(toy.program("xy", steep, objectives=("|p + q|",)), XY)[2].residual > 0.1
+
+
+def multipliers(*of):
+    return Multipliers(np.array(of, dtype=float), 0.0)
+
+
+TWO = {"a": lambda v: 2 * v["x"], "b": lambda v: v["x"] + v["y"] ** 2, "c": lambda v: v["x"] - v["y"]}
+
+
+def test_what_binds_at_one_level_is_an_equality_at_the_next():
+    program = toy.program("xy", TWO, limits=(("x", -1, 0.0), ("y", -1, 0.0)), objectives=("a", "c"))
+    active, _ = at(program, XY)
+    system = kkt.system(active, 1, [multipliers(2.0, 0.0, 1.0, 0.0)])
+    assert (system.equalities, system.inequalities) == ((0,), (1,))
+    assert system.held.tolist() == [[0, 0, 1, 0]]
+    assert system.limits == (1, 0)
+    faint = kkt.system(active, 1, [multipliers(0.9e-8, 0.0, 1.0, 0.0)])
+    assert faint.equalities == ()
+
+
+def test_a_peak_of_several_pieces_is_held_piece_by_piece():
+    program = toy.program("xy", TWO, objectives=("a, b", "c"))
+    active, _ = at(program, XY)
+    held = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).held
+    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
+    assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held.tolist() == [[1, 0, 0]]
+
+
+def test_of_a_sum_only_the_sum_is_held():
+    """a may rise as b falls: what is held is their sum, and that pieces of one group stay equal."""
+    program = toy.program("xy", TWO, objectives=("a + b", "c"))
+    active, _ = at(program, XY)
+    assert kkt.system(active, 1, [multipliers(1.0, 1.0, 0.0)]).held.tolist() == [[1, 1, 0]]
+    both = toy.program("xy", TWO, objectives=("|a + b|", "c"))
+    one = at(both, {"x": 0.0, "y": 0.5})[0]
+    held = kkt.system(one, 1, [multipliers(0.5, 0.5, 1.0, 0.0)]).held
+    assert held.tolist() == [[-1, 1, 0, 0], [1, 0, 1, 0]]
+    assert kkt.system(at(both, XY)[0], 1, [multipliers(0.5, 0.5, 1.0, 0.0, 0.0)]).held.tolist() == np.eye(5)[:4].tolist()
+    assert kkt.system(active, 1, [multipliers(0.0, 0.0, 0.0)]).held.shape == (0, 3)

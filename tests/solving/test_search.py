@@ -1,0 +1,280 @@
+"""The search as steps on records: candidates in order, corrections, weights between levels, points that are alike."""
+
+import math
+from dataclasses import replace
+
+import pytest
+import toy
+
+from loomopt.nlp.point import Point, Settings
+from loomopt.solving import search as searching
+from loomopt.solving.search import Candidate, Search, compared, judged, objectives, searched
+from loomopt.solving.verdict import Certificate, Level
+from loomopt.tolerances import MORE_STARTS, MOST_ALIKE, SAME_OBJECTIVE
+
+PROGRAM = toy.program("xy", {"f": lambda v: v["x"] ** 2, "g": lambda v: v["y"]}, objectives=("f", "g"))
+LEVELS = (Level("f", 0.0, 0.0, 0.0), Level("g", 0.0, 0.0, 0.0))
+GOOD = Certificate(True, (), LEVELS, 0.0, 0.0, True, True)
+BAD = replace(GOOD, passed=False, reasons=("no",))
+
+
+def candidate(*values, x=0.0, reached=True):
+    point = Point({"x": x, "y": 0.0}, "Solve_Succeeded", reached)
+    return Candidate(point, tuple(map(float, values)))
+
+
+def empty(**more):
+    return Search(toy.ToyJob(PROGRAM), PROGRAM, Settings(), **more)
+
+
+@pytest.fixture
+def certified(monkeypatch):
+    """Return what is put before the certificate, and a way to say what it answers: by x, or for all."""
+    seen, answers = [], {}
+
+    def certify(program, x, accuracy):
+        seen.append(x["x"])
+        answer = answers.get(x["x"], answers.get("all", GOOD))
+        return answer(len(seen)) if callable(answer) else answer
+
+    monkeypatch.setattr(searching, "certify", certify)
+    return seen, answers
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Return the calls of the exchange, and the points it answers in order."""
+    calls, points = [], []
+
+    def solve(program, start, settings, warm=None):
+        calls.append((dict(start), settings.penalty, warm))
+        return points.pop(0)
+
+    monkeypatch.setattr(searching.exchange, "solve", solve)
+    return calls, points
+
+
+# Order ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "order"),
+    [
+        ((1, 5), (2, 0), -1),
+        ((2, 0), (1, 5), 1),
+        ((1, 5), (1 + 0.9 * SAME_OBJECTIVE, 4), 1),
+        ((1, 5), (1 + 1.1 * SAME_OBJECTIVE, 4), -1),
+        ((1, 5), (1, 5 - 0.9 * SAME_OBJECTIVE), 0),
+        ((1, math.inf), (1, math.inf), 0),
+    ],
+)
+def test_candidates_are_ordered_level_by_level(one, other, order):
+    assert compared(candidate(*one), candidate(*other)) == order
+
+
+def test_two_objectives_agree_to_a_ten_millionth():
+    assert SAME_OBJECTIVE == 1e-7
+
+
+def test_objectives_are_in_natural_sizes_and_true_over_the_cycle():
+    waves = {"w": lambda m, v, phi: v["x"] * m.cos(phi) + 1}
+    program = toy.program("x", {"p": lambda v: -3 * v["x"]}, waves, objectives=("peak w", "|p|"), sizes={"p": 2.0})
+    assert objectives(program, {"x": 2.0}) == pytest.approx((3.0, 3.0))
+    root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
+    assert objectives(root, {"x": -1.0}) == (math.inf,)
+
+
+# Which candidate is judged ----------------------------------------------------------------------------------------
+
+
+def test_the_best_that_was_reached_is_judged(certified):
+    seen, _ = certified
+    points = candidate(0, x=3.0, reached=False), candidate(2, x=1.0), candidate(1, x=2.0)
+    found = judged(empty(candidates=points))
+    assert seen == [2.0]
+    assert (found.best.candidate, found.passed) == (points[2], True)
+    assert found.ranked == [points[2], points[1]]
+    assert found.reached == [points[1], points[2]]
+
+
+def test_what_was_judged_is_not_judged_again(certified):
+    seen, _ = certified
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert judged(found).best is found.best
+    more = replace(found, candidates=(*found.candidates, candidate(0.5, x=2.0)))
+    assert judged(more).best.candidate.objectives == (0.5,)
+    assert seen == [1.0, 2.0]
+
+
+def test_nothing_reached_is_nothing_judged(certified):
+    found = judged(empty(candidates=(candidate(0, reached=False),)))
+    assert (found.best, found.passed, certified[0]) == (None, False, [])
+
+
+def test_where_the_best_does_not_pass_others_with_its_objectives_may(certified):
+    seen, answers = certified
+    answers |= {1.0: BAD, 2.0: BAD}
+    points = tuple(candidate(1, x=float(k)) for k in (1, 2, 3, 4))
+    found = judged(empty(candidates=points))
+    assert seen == [1.0, 2.0, 3.0]
+    assert (found.passed, found.best.candidate) == (True, points[2])
+
+
+def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
+    seen, answers = certified
+    answers["all"] = BAD
+    points = tuple(candidate(1, x=float(k)) for k in range(1, 10))
+    found = judged(empty(candidates=points))
+    assert MOST_ALIKE == 4
+    assert seen == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert (found.passed, found.best.candidate) == (False, points[0])
+
+
+def test_worse_candidates_do_not_stand_for_the_best(certified):
+    seen, answers = certified
+    answers[1.0] = BAD
+    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(1 + 1e-6, x=2.0))))
+    assert (seen, found.passed) == ([1.0], False)
+
+
+# Weight between levels --------------------------------------------------------------------------------------------
+
+
+def gave_way(stationarity=0.0, held=0.0):
+    levels = Level("f", stationarity, 0.0, 0.0), Level("g", 0.0, 0.0, held)
+    return replace(BAD, levels=levels)
+
+
+@pytest.mark.parametrize(
+    ("certificate", "again"),
+    [
+        (gave_way(stationarity=2e-6), True),
+        (gave_way(stationarity=1e-6), False),
+        (gave_way(held=501.0), True),
+        (gave_way(held=499.0), False),
+        (replace(GOOD, levels=(Level("f", 0.0, 0.0, 0.0), Level("g", 2e-6, 0.0, 0.0))), False),
+    ],
+)
+def test_a_level_that_gave_way_is_solved_again_with_a_stronger_weight(certified, solved, certificate, again):
+    answers = certified[1]
+    calls, points = solved
+    answers[1.0] = certificate
+    points.append(Point({"x": 0.0, "y": -1.0}, "Solve_Succeeded", True))
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert calls == ([({"x": 1.0, "y": 0.0}, 100_000.0, None)] if again else [])
+    if again:
+        assert (found.passed, found.settings.penalty) == (True, 1e5)
+        assert [each.point.x["x"] for each in found.candidates] == [0.0], "in place of the one that gave way"
+        assert found.best.candidate.objectives == (0.0, -1.0)
+
+
+def test_the_weight_grows_to_an_end(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    answers["all"] = gave_way(stationarity=1.0)
+    points += [Point({"x": 1.0, "y": -float(k)}, "Solve_Succeeded", True) for k in (1, 2, 3)]
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert [weight for _, weight, _ in calls] == [1e5, 1e7]
+    assert not found.passed
+
+
+def test_a_stronger_weight_that_leads_nowhere_leaves_the_best_as_it_was(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    answers["all"] = gave_way(stationarity=1.0)
+    points.append(Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False))
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    assert len(calls) == 1
+    assert found.best.x == {"x": 1.0, "y": 0.0}
+    assert len(found.candidates) == 2
+
+
+# Newton's corrections ---------------------------------------------------------------------------------------------
+
+
+def sloping(residual, step, feasibility=0.0):
+    levels = Level("f", 0.0, 0.0, 0.0), Level("g", residual, 0.0, 0.0)
+    correction = {"x": step, "y": 0.0} if step else {}
+    return Certificate(True, (), levels, feasibility, 0.0, True, True, correction=correction, step=abs(step))
+
+
+def followed(certified, *certificates):
+    """Return where the search ends from x = 1, and what was certified on the way."""
+    seen, answers = certified
+    answers["all"] = lambda count: certificates[count - 1]
+    found = judged(empty(candidates=(candidate(1, x=1.0),)))
+    return found.best, seen
+
+
+def test_a_slope_is_followed_to_its_end(certified):
+    best, seen = followed(certified, sloping(1e-5, -0.25), sloping(1e-8, 0.125), sloping(1e-12, 1e-9))
+    assert seen == [1.0, 0.75, 0.875]
+    assert (best.x["x"], best.certificate.residual) == (0.875, 1e-12)
+
+
+def test_a_step_that_leaves_more_slope_is_taken_back(certified):
+    best, seen = followed(certified, sloping(1e-5, -0.25), sloping(1e-5, 0.125))
+    assert (seen, best.x["x"]) == ([1.0, 0.75], 1.0)
+
+
+def test_a_step_out_of_the_limits_is_taken_back(certified):
+    best, _ = followed(certified, sloping(1e-5, -0.25), sloping(1e-8, 0.0, feasibility=2e-9))
+    assert best.x["x"] == 1.0
+    certified[0].clear()
+    best, _ = followed(certified, sloping(1e-5, -0.25), sloping(1e-8, 0.0, feasibility=1e-9))
+    assert best.x["x"] == 0.75
+
+
+def test_what_is_close_is_left_alone(certified):
+    assert followed(certified, sloping(1e-9, 1e-8))[1] == [1.0]
+    certified[0].clear()
+    assert followed(certified, sloping(1.1e-9, 1e-8), sloping(1e-10, 1e-9))[1] == [1.0, 1 + 1e-8]
+    certified[0].clear()
+    assert followed(certified, sloping(1e-9, 2e-8), sloping(1e-10, 1e-9))[1] == [1.0, 1 + 2e-8]
+
+
+def test_steps_end_after_four_and_stay_within_bounds(certified):
+    steps = [sloping(10.0 ** -(k + 1), 0.5) for k in range(9)]
+    _, seen = followed(certified, *steps)
+    assert seen == [1.0, 1.5, 2.0, 2.5, 3.0]
+    bound = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (0.0, 1.25)}, objectives=("f", "f"))
+    certified[0].clear()
+    judged(Search(toy.ToyJob(bound), bound, Settings(), (candidate(1, 1, x=1.0),)))
+    assert certified[0][:2] == [1.0, 1.25]
+
+
+# Starts -----------------------------------------------------------------------------------------------------------
+
+
+def test_more_starts_are_tried_where_none_is_certified(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    answers["all"] = BAD
+    points += [Point({"x": float(k), "y": 0.0}, "Solve_Succeeded", True) for k in range(MORE_STARTS)]
+    told = []
+    found = searched(empty(), 2, 0, None, lambda number, count: told.append((number, count)))
+    assert told == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
+    assert (len(calls), len(found.candidates)) == (8, 8)
+    assert len({tuple(start.items()) for start, _, _ in calls}) == 8
+
+
+def test_one_certified_start_is_enough(certified, solved):
+    calls, points = solved
+    points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.25))
+    found = searched(empty(), 1, 0, None, None)
+    assert (len(calls), found.passed, found.built) == (1, True, 0.25)
+    assert found.solved >= 0.0
+    assert found.certified > 0.0
+
+
+def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    near = Point({"x": 7.0, "y": 1.0}, "Solve_Succeeded", True)
+    points.append(near)
+    assert searched(empty(), 3, 0, near, None).passed
+    assert calls == [({"x": 7.0, "y": 1.0}, 1000.0, near)]
+    answers[7.0] = BAD
+    points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
+    found = searched(empty(), 1, 0, near, None)
+    assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)

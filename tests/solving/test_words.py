@@ -1,0 +1,115 @@
+"""Limits, prices and relaxations in the designer's own words and units."""
+
+import math
+
+import pytest
+
+import loomopt as lo
+from loomopt.program.program import Limit, Objective
+from loomopt.solving.verdict import Binding
+from loomopt.solving.words import Words, outward
+
+
+@pytest.mark.parametrize(
+    ("value", "side", "expected"),
+    [
+        (1.2345671, 1, 1.23457),
+        (1.2345671, -1, 1.23456),
+        (-1.2345671, 1, -1.23456),
+        (-1.2345671, -1, -1.23457),
+        (123456.1, 1, 123457.0),
+        (123456.1, 0, 123456.0),
+        (1.5, 1, 1.5),
+        (0.0, 1, 0.0),
+        (9.999999e-7, 1, 1e-6),
+    ],
+)
+def test_a_value_is_rounded_to_the_side_that_gives_no_less_room(value, side, expected):
+    assert outward(value, side) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.fixture
+def words():
+    return Words(lo.load("beatup"))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "unit"),
+    [
+        ("l1", "length", "mm"),
+        ("m4e", "mass", "kg"),
+        ("theta", "angle", "deg"),
+        ("peak_torque", "torque", "N*m"),
+        ("M0", "torque", "N*m"),
+        ("speed", "angular speed", "rpm"),
+        ("s", "number", "1"),
+        ("no such name", "number", "1"),
+    ],
+)
+def test_every_name_has_a_kind_and_a_unit(words, name, kind, unit):
+    assert (words.kind(name), words.unit(name)) == (kind, unit)
+
+
+def test_a_number_of_an_effect_is_known_by_its_label():
+    words = Words(lo.load("shedding").with_effect("coil"))
+    assert words.kind("wire") == "length"
+    assert words.kind("initial_tension") == "force"
+    assert words.kind("law") == "number"
+
+
+def test_values_are_shown_as_the_scene_writes_them():
+    words = Words(lo.load("beatup").set("mechanism.l1", "3.15 cm"))
+    assert words.shown("l1", 0.0305) == "3.05 cm"
+    assert words.shown("theta", math.radians(2.2)) == "2.2 deg"
+    assert words.shown("peak_torque", 88.68941349, 3) == "88.7 N*m"
+    assert words.si("theta") == "rad"
+
+
+def limit(name="l1", sign=-1, value=0.03, scale=1.0):
+    return Limit(name, sign, name, value, scale, "variable")
+
+
+@pytest.mark.parametrize(("sign", "text"), [(-1, "l1 >= 30 mm"), (0, "l1 = 30 mm"), (1, "l1 <= 30 mm")])
+def test_a_limit_is_a_phrase(words, sign, text):
+    assert words.limit(limit(sign=sign)) == text
+
+
+def test_a_margin_is_its_own_phrase(words):
+    name = next(iter(words.scene.schema.margins))
+    assert words.limit(limit(name)) == name
+
+
+def test_a_price_is_what_all_rows_of_a_limit_are_worth_together(words):
+    torque = Objective("peak_torque", "peak_torque", "peak", 1.0)
+    other = Objective("M3_fdc", "M3_fdc", "magnitude", 1.0)
+    bindings = [Binding(limit(), -1, torque, 3000.0), Binding(limit(), -1, torque, 1160.0)]
+    price = words.price([*bindings, Binding(limit(), -1, other, 7.0)])
+    assert (price.limit, price.side, price.value, price.text) == ("l1", "min", 0.03, "l1 >= 30 mm")
+    assert price.worth == {"peak_torque": pytest.approx(4160.0)}
+    assert price.unit == {"peak_torque": "N*m/m"}
+    assert price.reading == "4.16 N*m per mm"
+    angle = words.price([Binding(limit("theta", 1, 0.04), 1, torque, 180 / math.pi)])
+    assert (angle.side, angle.reading, angle.unit) == ("max", "1 N*m per deg", {"peak_torque": "N*m/rad"})
+
+
+def test_a_compound_unit_stands_in_brackets_after_the_stroke():
+    words = Words(lo.load("shedding"))
+    stiffness = Objective("K1", "K1", "value", 1.0)
+    price = words.price([Binding(limit("K1", 1, 9e4), 1, stiffness, 1.0)])
+    assert price.unit == {"K1": "N/m/(N/m)"}
+
+
+@pytest.mark.parametrize(
+    ("sign", "need", "side", "needed", "text"),
+    [
+        (-1, 0.0012345678, "min", 0.0287654322, "l1 >= 30 mm -> 28.7654 mm (by 1.23 mm)"),
+        (1, 0.0012345678, "max", 0.0312345678, "l1 <= 30 mm -> 31.2346 mm (by 1.23 mm)"),
+        (0, 0.0012345678, "max", 0.0312345678, "l1 = 30 mm -> 31.2346 mm (by 1.23 mm)"),
+        (0, -0.0012345678, "min", 0.0287654322, "l1 = 30 mm -> 28.7654 mm (by 1.23 mm)"),
+    ],
+)
+def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side, needed, text):
+    found = words.relaxation(limit(sign=sign), need, alone=True)
+    assert (found.limit, found.value, found.alone, found.text) == ("l1", 0.03, True, text)
+    assert found.needed == pytest.approx(needed, rel=1e-12)
+    assert found.side == ("equal" if sign == 0 else side) or found.side == side
