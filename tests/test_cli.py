@@ -14,12 +14,12 @@ import pytest
 
 from loomopt import api, shell
 from loomopt.cli import run
-from loomopt.effects import BEATUP
+from loomopt.effects import found
+from loomopt.jobs import registry
 from loomopt.jobs.registry import load
-from loomopt.jobs.template import BEATUP_TEMPLATE
 from loomopt.packaged import problem_names
 from loomopt.quantities import read
-from loomopt.solving import engine
+from loomopt.solving import search
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "design", "figures", "units", "limits"]
 KEYS += ["binding", "certificate", "solver", "time"]
@@ -57,7 +57,7 @@ def check_contract(data):
     """Check keys, types and units of an answer."""
     assert list(data)[: len(KEYS)] == KEYS
     assert all(isinstance(data[key], str) for key in KEYS[:5])
-    assert all(name in BEATUP for name in data["effects"])
+    assert all(name in found.of("loomopt.effects.beatup") for name in data["effects"])
     assert list(data["design"]) == ["l1", "l2", "l3", "l4", "m4e", "r4e"]
     assert all(is_number(value) for value in data["design"].values())
     assert set(FIGURES) <= set(data["figures"])
@@ -112,12 +112,12 @@ def test_an_infeasible_target_exits_3_with_the_json_object_and_the_least_relaxat
 
 
 def test_an_answer_that_is_not_certified_exits_4_and_says_why(cli, monkeypatch):
-    genuine = engine.certify
+    genuine = search.certify
 
     def failing(*arguments, **options):
         return dataclasses.replace(genuine(*arguments, **options), passed=False, reasons=("the moon is wrong",))
 
-    monkeypatch.setattr(engine, "certify", failing)
+    monkeypatch.setattr(search, "certify", failing)
     data = answered(cli, "beatup", status=4)
     check_contract(data)
     assert data["status"] == "uncertified"
@@ -169,7 +169,7 @@ def test_nothing_is_wrapped_in_a_pipe(capsys, monkeypatch):
 def test_every_target_reaches_what_the_scene_expects(cli, target):
     figures = answered(cli, "beatup", "--target", target)["figures"]
     expected = load("beatup").targets[target].expected
-    kinds = {name: figure.kind for name, figure in load("beatup").job.figures.items()}
+    kinds = {name: figure.kind for name, figure in load("beatup").schema.figures.items()}
     for name, value in expected.items():
         assert figures[name] == pytest.approx(read(value, kinds[name]), rel=1e-6, abs=1e-6)
 
@@ -204,7 +204,7 @@ def test_a_limit_may_be_set_on_a_figure_of_an_effect_put_on(cli):
 
 def test_an_effect_without_values_is_put_on_by_setting_them(cli, tmp_path):
     path = tmp_path / "mine.toml"
-    path.write_text(BEATUP_TEMPLATE, encoding="utf-8")
+    path.write_text(registry.template("beatup"), encoding="utf-8")
     tilt = "effects.gravity.tilt=-67 deg", "effects.gravity.offset=0 deg"
     data = answered(cli, str(path), "--with", "gravity", "--set", tilt[0], "--set", tilt[1])
     assert "gravity" in data["effects"]

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
+from loomopt import packaged
 from loomopt.cli import run
-from loomopt.packaged import problem_path
 from loomopt.views import layout, scene_view, terminal
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
@@ -41,7 +41,7 @@ def answer():
 @pytest.fixture
 def no_follower(tmp_path):
     """Return a scene's file that gives no follower."""
-    lines = problem_path("shedding").read_text(encoding="utf-8").splitlines()
+    lines = packaged.problems()["shedding"].read_text(encoding="utf-8").splitlines()
     kept = [line for line in lines if line.split(" = ")[0] not in FOLLOWER]
     assert len(kept) == len(lines) - len(FOLLOWER)
     path = tmp_path / "bare.toml"

@@ -8,12 +8,12 @@ import pytest
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.jobs.shedding import limit_law
+from loomopt.jobs.shedding import design as limit_law
 from loomopt.studies import accuracy, digits, optima, readings
 from loomopt.studies.ladders import FLOOR, Ladder, Outcome, Reference, Row, climbed, grouped, knee, order
 from loomopt.studies.subject import Target
 
-SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-10), (8, 16, 32))
+SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))
 LINEAR_PROGRAMMES = {
     8: 75219.70679752559,
     16: 59955.4638624003,
@@ -157,7 +157,6 @@ def test_many_digits_leave_float64_far_behind(ladders):
         plain, _, many = ladders[name][f"{motion}, numbers"]
         assert FLOOR > plain.error > 1e-18
         assert many.error < 1e-35
-        assert many.seconds > 2 * plain.seconds
 
 
 # References
