@@ -13,7 +13,7 @@ import sympy as sp
 
 import loomopt
 from loomopt import maths
-from loomopt.mechanisms import crank_rocker
+from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 from loomopt.mechanisms.crank_rocker import Lengths
 
 SYSTEMS = (maths.FLOAT, maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy())
@@ -38,7 +38,7 @@ def linkage_figures(m, lengths, phi):
     found = {name: getattr(centres, name) for name in names}
     found["near"] = crank_rocker.transmission_angle_near(m, lengths)
     found["far"] = crank_rocker.transmission_angle_far(m, lengths)
-    ratios = crank_rocker.synthesis(m, phi / 50, 1 + phi / 20, 1 - phi / 10)
+    ratios = crank_rocker_synthesis.synthesis(m, phi / 50, 1 + phi / 20, 1 - phi / 10)
     return found | dict(zip(("l1/l4", "l2/l4", "l3/l4"), ratios, strict=True))
 
 
