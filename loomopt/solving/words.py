@@ -69,7 +69,7 @@ class Words:
         """Return a limit's price: what all its rows together are worth."""
         first = bindings[0]
         limit, figure = first.limit, first.objective.figure
-        worth = sum(binding.worth for binding in bindings if binding.objective is first.objective)
+        worth = sum(binding.worth for binding in bindings if binding.objective == first.objective)
         figure_unit, limit_unit = self.unit(figure), self.unit(limit.name)
         amount = worth * factor(limit_unit) / factor(figure_unit)
         per = limit_unit if limit_unit != "1" else "unit"
