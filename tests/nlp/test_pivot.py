@@ -107,6 +107,124 @@ def test_pivots_say_when_they_lead_nowhere(nlp, arguments, first, farthest):
     assert reach(nlp, arguments, first, farthest) is None
 
 
+def curved(gradient, hessian, rows, limits):
+    """Return min gradient·x + x'hessian x/2 subject to rows x ≤ limits."""
+    gradient, hessian, rows = np.array(gradient, float), np.array(hessian, float), np.array(rows, float).reshape(-1, 2)
+    return SimpleNamespace(
+        jacobian=lambda x, p: (rows @ x - limits, rows),
+        gradient=lambda x, p: (0.0, gradient + hessian @ x),
+        curvature=lambda x, p, weight, prices: np.triu(hessian),
+    )
+
+
+def equal(arguments, *places):
+    """Return a call whose rows at these places are equalities."""
+    lbg = arguments["lbg"].copy()
+    lbg[list(places)] = 0.0
+    return {**arguments, "lbg": lbg}
+
+
+def test_a_slope_a_hair_outside_the_others_is_one_of_its_own():
+    """x = 1 and x + 1e-5 y ≤ 1 − 1e-6 meet at y = −0.1: nothing can give way, and nothing need."""
+    nlp = programme([0, 0], 0, [[1, 0], [1, 1e-5]], [1, 1 - 1e-6])
+    found = reach(nlp, equal(call([1, 0], rows=2), 0), bound([1, 0]), 5.0)
+    assert found.x == pytest.approx([1, -0.1], abs=1e-9)
+
+
+def test_a_slope_within_rounding_of_the_others_depends_on_them():
+    nlp = programme([0, 0], 0, [[1, 0], [1, 1e-8]], [1, 1 - 1e-9])
+    assert reach(nlp, equal(call([1, 0], rows=2), 0), bound([1, 0]), 5.0) is None
+
+
+def test_a_slight_curvature_says_how_far_to_slide():
+    """1e-4 y²/2 − 1e-5 y is least at y = 0.1."""
+    found = reach(curved([0, -1e-5], [[1, 0], [0, 1e-4]], [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
+    assert found.x == pytest.approx([0, 0.1], abs=1e-6)
+
+
+def test_a_slight_curvature_says_how_far_a_limit_lets_go():
+    nlp = curved([-1, -1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
+    found = reach(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
+    assert found.x == pytest.approx([1, 0], abs=1e-12), "it pulls upward: the limit holds"
+    nlp = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
+    found = reach(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
+    assert found.x == pytest.approx([1, -0.1], abs=1e-6)
+    assert list(found.active[:2]) == [True, False]
+
+
+@pytest.mark.parametrize("slope", [1e-8, -1e-8])
+def test_no_curvature_says_nothing(slope):
+    nlp = curved([0, slope], [[1, 0], [0, 1e-8]], [[1, 0]], [0.0])
+    assert reach(nlp, call([0, 0], rows=1), bound([1]), 5.0) is None
+
+
+def test_a_slope_of_a_ten_millionth_is_followed_and_a_negative_multiplier_of_that_size_lets_go():
+    found = reach(curved([0, -1e-7], np.eye(2), [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
+    assert found.x == pytest.approx([0, 1e-7], abs=1e-13)
+    found = reach(
+        curved([-1, 1e-7], np.eye(2), [[1, 0], [0, 1]], [0.5, 0.0]), call([0.5, 0], rows=2), bound([1, 1]), 5.0
+    )
+    assert found.x == pytest.approx([0.5, -1e-7], abs=1e-13)
+
+
+def test_a_row_broken_by_a_ten_billionth_is_seen():
+    nlp = programme([-2, -1], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 2 - 1e-10])
+    found = reach(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
+    assert found.x == pytest.approx([1, 1 - 1e-10], abs=1e-14)
+    assert list(found.active[:3]) == [True, False, True]
+
+
+def polygon(sides):
+    """Return the greatest x + 2 y on a regular polygon, as an NLP, and the start on its lowest side."""
+    angles = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    rows = np.column_stack([np.cos(angles), np.sin(angles)])
+    return programme([-1, -2], 0, rows, np.ones(sides)), rows
+
+
+@pytest.mark.parametrize("sides", [12, 24, 36])
+def test_corner_after_corner_is_taken_to_the_best(sides):
+    nlp, rows = polygon(sides)
+    lowest = int(np.argmin(rows @ [1, 2]))
+    flags = np.zeros(sides)
+    flags[[lowest, (lowest + 1) % sides]] = 1
+    start = np.linalg.solve(rows[flags == 1], np.ones(2))
+    found = reach(nlp, call(start, rows=sides), bound(flags), 5.0)
+    best = max(
+        (np.linalg.solve(rows[[k, (k + 1) % sides]], np.ones(2)) for k in range(sides)), key=lambda x: x @ [1, 2]
+    )
+    assert found.x == pytest.approx(best, abs=1e-12)
+    assert found.multipliers[:sides] @ rows == pytest.approx([1, 2], abs=1e-12)
+    assert np.count_nonzero(found.multipliers) == 2
+
+
+def test_rows_may_curve_and_prices_are_those_of_the_meeting():
+    """The farthest along x + y inside a circle, with y ≤ 0.6."""
+
+    def jacobian(x, p):
+        return np.array([x @ x - 1.0, x[1] - 0.6]), np.array([2 * x, [0.0, 1.0]])
+
+    nlp = SimpleNamespace(
+        jacobian=jacobian,
+        gradient=lambda x, p: (0.0, np.array([-1.0, -1.0])),
+        curvature=lambda x, p, weight, prices: 2 * prices[0] * np.eye(2),
+    )
+    found = reach(nlp, call([0.7, 0.5], rows=2), bound([1, 1]), 5.0)
+    assert found.x == pytest.approx([0.8, 0.6], abs=1e-12)
+    assert found.multipliers[:2] == pytest.approx([1 / 1.6, 1 - 0.6 / 0.8], abs=1e-9)
+    loose = reach(nlp, call([0.7, 0.5], rows=2), bound([1, 0]), 5.0)
+    assert loose.x == pytest.approx([0.8, 0.6], abs=1e-12)
+
+
+def test_held_variables_stay_active_and_give_way_to_none():
+    nlp = programme([-2, -1], 0, [[1, 1]], [1.5])
+    arguments = call([1, 0.5], rows=1)
+    arguments["lbx"][0] = arguments["ubx"][0] = 1.25
+    found = reach(nlp, arguments, bound([1]), 5.0)
+    assert found.x == pytest.approx([1.25, 0.25], abs=1e-12)
+    assert list(found.active) == [True, True, False, False, False]
+    assert found.multipliers == pytest.approx([1, 1, 0, 0, 0], abs=1e-12)
+
+
 def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():
     near = lo.solve(lo.load("beatup").set("operation.M0", "640 N*m"))
     limits = set()
