@@ -169,6 +169,23 @@ class Check(Effect, Generic[Pose]):
         nothing_explained
     )
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for what no job could keep."""
+        sides = {figure.name: figure.sides for figure in self.figures}
+        faults = [f"quantity {name} is no figure" for name in self.quantities if name not in sides]
+        faults += [f"quantity {name} has no least" for name in self.quantities if "min" in sides.get(name, ())]
+        for demand in self.demands:
+            if demand.row in self.quantities and demand.sign <= 0:
+                faults.append(f"quantity {demand.row} has no least")
+            if demand.row not in {*self.quantities, *self.rows}:
+                faults.append(f"{demand.row} is neither a quantity nor a row")
+            if isinstance(demand.value, str) and demand.value not in self.own.model_fields:
+                faults.append(f"{demand.value} is no key of the table")
+        if self.least and self.least not in self.rows:
+            faults.append(f"{self.least} is no row")
+        if faults:
+            raise ValueError(f"effect {self.name}: {faults[0]}")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State(Effect, Generic[Pose]):

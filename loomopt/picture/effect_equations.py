@@ -44,7 +44,7 @@ def forces(
 ) -> list[Equation]:
     """Write each term, their balance and the crank torque, then what checks read and demand."""
     found = [term(load, pose, known, letter) for load in model.loads]
-    found += sums(model.loads, pose, symbol(total), letter)
+    found += sums(model.loads, pose, symbol(total), letter, torque)
     return found + [each for check in model.checks for each in check_equations(check, pose, known)]
 
 
@@ -77,7 +77,7 @@ def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
     whole_turn = 2 * maths.sympy().pi
     if not isinstance(load, Load) or load.corners is None:
         return [(force(load, pose, known, 0), (0, whole_turn))]
-    corners = load.corners(maths.sympy(), known.values, known.own[load.name])
+    corners = tuple(map(sympy().sympify, load.corners(maths.sympy(), known.values, known.own[load.name])))
     numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
     ends, number_ends = (*corners[1:], corners[0] + whole_turn), (*numbers[1:], numbers[0] + 2 * math.pi)
     middles = [(begin + end) / 2 for begin, end in zip(numbers, number_ends, strict=True)]

@@ -10,6 +10,7 @@ from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
 from loomopt.tolerances import SAME_ROW
+from loomopt.units import SI_UNIT
 
 STEPS = 720
 ANGLE = "phi [rad]"
@@ -20,8 +21,9 @@ class Columns:
     """What curves show.
 
     motion: column name with unit → formula. force: column of the output force, and the quantity (of which sign) that
-    it is; torque: likewise of the crank. unit: of loads' terms. checks: unit of each check's quantity. follower: what
-    stands after the torque. also: crank angles, rad, that are rows too. closed: whether the row at 2π is one.
+    it is; torque: likewise of the crank. unit: of the output's terms; the drive's are torques. checks: unit of each
+    check's quantity. after: what stands after the torque. also: crank angles, rad, that are rows too. closed: whether
+    the row at 2π is one.
     """
 
     motion: Mapping[str, Formula]
@@ -52,7 +54,8 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
         whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
         name = getattr(load, "symbol", "") or load.name
         partial = bool(getattr(load, "known_in", dict)(sampler.model.words_of(load.name)))
-        found[f"{name} [{columns.unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
+        unit = columns.unit if load.acts == "output" else SI_UNIT["torque"]
+        found[f"{name} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
     if columns.force and any(load.acts == "output" for load in loads):
         found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:

@@ -92,7 +92,7 @@ class Kinematics(Protocol):
 
     @property
     def breaks(self) -> frozenset[str]:
-        """Events that lie on corners of its own arcs."""
+        """Events that lie on corners of its own arcs; the value of such a name is their crank angles, rad."""
         return frozenset()
 
     def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Mapping[str, Number]:

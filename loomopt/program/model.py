@@ -6,7 +6,7 @@ Only this file groups effects, reads their switches, by name, and runs loads, st
 import functools
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt import balance, cycle
 from loomopt.balance import Acting, Given
@@ -220,28 +220,31 @@ class JobModel:
         arcs = {arc.name for arc in self.arcs}
         return frozenset(name for name in self.switches if self._cased.get(name, (name, 0))[0] not in arcs)
 
-    def _cornered(self, maths: Maths, given: Given) -> list[tuple[tuple[Number, ...], Callable[..., float], bool]]:
-        """Return of each switch its corner angles, rad, what reads it, and whether the corners are the cycle's own."""
-        found: list[tuple[tuple[Number, ...], Callable[..., float], bool]] = []
+    def _cornered(self, maths: Maths, given: Given) -> list["_Cornered"]:
+        """Return of each switch its corner angles, rad, what reads it, and which of them are corners of the cycle."""
+        found: list[_Cornered] = []
         for case in (given, *given.cases):
-            arcs = (*self.kinematics.arcs, *self.arcs)
-            found += [(arc.corners(maths, case), arc.switch, True) for arc in arcs]
+            for arc in (*self.kinematics.arcs, *self.arcs):
+                angles = arc.corners(maths, case)
+                found.append(_Cornered(angles, arc.switch, angles))
             for load in self.loads:
                 if isinstance(load, Load) and load.corners:
                     angles = load.corners(maths, case.values, case.own[load.name])
-                    found.append((angles, load.switch, not self.kinematics.breaks.intersection(load.reads)))
+                    # An event on a corner of the motion's own arcs would be that corner twice.
+                    events = self.kinematics.breaks.intersection(load.reads)
+                    there = {id(angle) for event in events for angle in case.values[event]}
+                    found.append(_Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
         return found
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         """Return the corner angles of the cycle, rad, as declared one after the other."""
-        return tuple(angle for angles, _, placed in self._cornered(maths, given) if placed for angle in angles)
+        return tuple(angle for each in self._cornered(maths, given) for angle in each.placed)
 
     def split(self, maths: Maths, given: Given) -> Cycle:
         """Return the pieces of the cycle; maths: of floats."""
         found = self._cornered(maths, given)
-        corners = [angle for angles, _, placed in found if placed for angle in angles]
-        readers = [(switch, angles) for angles, switch, _ in found]
-        return cycle.split(corners, self.switches, lambda angle: [switch(angle, angles) for switch, angles in readers])
+        corners = [angle for each in found for angle in each.placed]
+        return cycle.split(corners, self.switches, lambda angle: [each.switch(angle, each.angles) for each in found])
 
     def hints(self, given: Given) -> dict[str, float]:
         """Return where corners that no formula gives lie, by name of value: what `given` starts from."""
@@ -304,6 +307,14 @@ class JobModel:
         """Return the crank angle of an event, rad."""
         plain, k = self._cased.get(name, (name, -1))
         return self.kinematics.events(maths, given if k < 0 else given.cases[k])[plain]
+
+
+class _Cornered(NamedTuple):
+    """A switch: the angles, rad, of its corners, what reads it between them, and those that part the cycle."""
+
+    angles: tuple[Number, ...]
+    switch: Callable[[float, tuple[float, ...]], float]
+    placed: tuple[Number, ...]
 
 
 def cased(name: str, case: int) -> str:

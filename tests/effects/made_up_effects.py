@@ -1,0 +1,126 @@
+"""Effects nobody has: two loads and a check for every job, and loads that call an event in."""
+
+import math
+from importlib.metadata import EntryPoint
+
+from loomopt.effects.kinds import Check, Demand, Load
+from loomopt.quantities import Coordinate, PureNumber
+from loomopt.schema import Figure, Table
+
+BEGINS, ENDS = 1.1, 2.6
+"""Corners of the made-up loads, rad, which are no job's own."""
+
+
+class OutputTable(Table):
+    c: PureNumber
+    a: PureNumber
+
+
+class DriveTable(Table):
+    b: PureNumber
+
+
+class CheckTable(Table):
+    most: Coordinate
+    high: Coordinate
+
+
+class EventTable(Table):
+    jump: PureNumber
+
+
+def within(angle, corners):
+    begins, ends = corners
+    return 1.0 if begins <= angle % (2 * math.pi) < ends else 0.0
+
+
+def placed(maths, given, own):
+    return (BEGINS, ENDS)
+
+
+OUTPUT = Load(
+    name="made_up_output",
+    summary="drag in proportion to the speed, and a step between two angles",
+    own=OutputTable,
+    acts="output",
+    force=lambda m, pose, given, own, switch: own["c"] * pose.velocity + own["a"] * switch,
+    needs=("operation.speed",),
+    corners=placed,
+    switch=within,
+    examples=({"c": "0.02", "a": "0.3"},),
+)
+DRIVE = Load(
+    name="made_up_drive",
+    summary="drag in the drive",
+    own=DriveTable,
+    acts="drive",
+    force=lambda m, pose, given, own, switch: own["b"] * pose.omega * switch * m.sin(pose.phi) ** 2,
+    needs=("operation.speed",),
+    corners=placed,
+    switch=within,
+    examples=({"b": "0.01"},),
+)
+
+
+def check(quantity, row, reads):
+    """Return a check of a quantity and a row, both with figures and demands."""
+    return Check(
+        name="made_up_check",
+        summary="a reading of the motion and one of the design",
+        own=CheckTable,
+        reads=reads,
+        quantities={"made_up_peak": quantity},
+        rows={"made_up_size": row},
+        figures=(
+            Figure("made_up_peak", "length", "peak of the reading", sides=("max",)),
+            Figure("made_up_size", "length", "reading of the design"),
+        ),
+        demands=(Demand("made_up_peak", 1, "most"), Demand("made_up_size", 1, "high")),
+        examples=({"most": "1 km", "high": "1 km"},),
+    )
+
+
+BEATUP = check(lambda m, pose, v, own: v["l3"] * pose.q2, lambda m, v, own: v["l2"] + v["l3"], ())
+RAPIER = check(lambda m, pose, v, own: pose.q1 + 0 * v["l4"], lambda m, v, own: v["l5"] + v["l6"], ("l4",))
+SHEDDING = check(lambda m, pose, v, own: pose.q + v["X0"], lambda m, v, own: v["X0"], ("X0",))
+
+
+def at_event(name, angles):
+    """Return a load that jumps at the angles an event of the motion has."""
+
+    def switch(angle, corners):
+        return float(sum(corner <= angle % (2 * math.pi) for corner in sorted(c % (2 * math.pi) for c in corners)) % 2)
+
+    return Load(
+        name="made_up_event",
+        summary="a jump at an event",
+        own=EventTable,
+        acts="output",
+        force=lambda m, pose, given, own, switch: own["jump"] * switch,
+        reads=(name,),
+        corners=lambda m, given, own: angles(given),
+        switch=switch,
+        examples=({"jump": "0.5"},),
+    )
+
+
+DEAD_CENTRE = at_event("front dead centre", lambda given: (given["beta"], given["beta"] + 1))
+TURNS = at_event("turns", lambda given: tuple(given["turns"]))
+HALF_OPEN = at_event("half_open", lambda given: (*given["half_open"], BEGINS, ENDS))
+
+NAMES = {
+    "beatup.made_up_check": "BEATUP",
+    "rapier.made_up_check": "RAPIER",
+    "shedding.made_up_check": "SHEDDING",
+    "beatup.made_up_event": "DEAD_CENTRE",
+    "rapier.made_up_event": "TURNS",
+    "shedding.made_up_event": "HALF_OPEN",
+}
+for _job in ("beatup", "rapier", "shedding"):
+    NAMES |= {f"{_job}.made_up_output": "OUTPUT", f"{_job}.made_up_drive": "DRIVE"}
+
+
+def points(group):
+    """Return the entry points by which they are found."""
+    told = NAMES.items() if group == "loomopt.effects" else ()
+    return tuple(EntryPoint(name, f"{__name__}:{value}", group) for name, value in told)
