@@ -118,7 +118,8 @@ def test_a_neighbours_answer_is_a_warm_start_to_the_same_design(answer):
 
 
 def test_progress_is_told(answer):
-    iterations, starts = [], []
+    iterations: list[int] = []
+    starts: list[tuple[int, ...]] = []
     found = lo.solve(SCENE, starts=3, on_iteration=iterations.append, on_start=lambda *told: starts.append(told))
     assert starts == [(1, 3), (2, 3), (3, 3)]
     assert len(iterations) >= 3

@@ -1,10 +1,11 @@
 """What one sees of the shedding job on the command line: workshop files, figures, tables, equations, Jupyter."""
 
+import importlib
 import io
 import json
+from typing import Any
 from xml.etree import ElementTree
 
-import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +14,8 @@ import loomopt as lo
 from loomopt import packaged
 from loomopt.cli import run
 from loomopt.views import layout, scene_view, terminal
+
+ezdxf: Any = importlib.import_module("ezdxf")
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 
@@ -146,7 +149,7 @@ def test_solve_out_writes_the_cam(cli, tmp_path):
     cli("solve", "shedding", "--target", "law", "--set", "targets.law.intervals=8", "--out", "answer")
     assert 'data-layer="profile"' in (tmp_path / "answer/linkage.svg").read_text()
     table = pd.read_csv(tmp_path / "answer/table.csv", comment="#", index_col="name")
-    assert table.loc["K1", "design"] < 102_602
+    assert table["design"].astype(float)["K1"] < 102_602
     data = json.loads((tmp_path / "answer/answer.json").read_text())
     assert len(data["design"]["law"]) == 9
 

@@ -421,8 +421,8 @@ def test_bad_input_is_refused_before_anything_is_solved(capsys, monkeypatch, arg
 def test_a_study_that_is_stopped_shows_what_was_finished(capsys, monkeypatch):
     genuine = accuracy.climbs
 
-    def stopped(*arguments):
-        yield next(genuine(*arguments, accuracy.LADDERS[1:]))
+    def stopped(scene, full, on_run):
+        yield next(genuine(scene, full, on_run, accuracy.LADDERS[1:]))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(accuracy, "climbs", stopped)

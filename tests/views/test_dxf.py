@@ -1,13 +1,16 @@
+import importlib
 import math
 import subprocess
 import sys
+from typing import Any
 
-import ezdxf
 import pytest
 
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.shapes import LAYERS, Drawing, Line, Point
 from loomopt.views import dxf
+
+ezdxf: Any = importlib.import_module("ezdxf")
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 WRITE = """

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib
 import matplotlib.image
@@ -67,7 +68,7 @@ def panels(monkeypatch, frame, marks):
     """Return the axes that `curves` would save."""
     kept = []
     monkeypatch.setattr(figure, "_save", lambda drawn, path: kept.append(drawn))
-    figure.curves(frame, figure.Path("a.png"), "t", marks)
+    figure.curves(frame, Path("a.png"), "t", marks)
     kept[0].canvas.draw()
     return [axes for axes in kept[0].axes if axes.get_visible()]
 

@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +50,8 @@ def shown(monkeypatch, marks):
     columns = {"phi [rad]": angles, "S [m]": np.sin(angles)}
     job = SimpleNamespace(today=lambda scene: {}, curves=lambda scene, design: columns, views=views)
     monkeypatch.setattr(registry, "of", lambda scene: job)
-    head, table = scene_view.curves(SimpleNamespace(title="Drive"), {}, None)
+    drive: Any = SimpleNamespace(title="Drive")
+    head, table = scene_view.curves(drive, {}, None)
     assert isinstance(table, Grid)
     return head, [float(line[0]) for line in table.lines]
 

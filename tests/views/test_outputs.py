@@ -1,12 +1,13 @@
 """Files for people and programs: complete, readable by other tools, the same numbers everywhere."""
 
 import csv
+import importlib
 import io
 import json
 import math
+from typing import Any
 from xml.etree import ElementTree
 
-import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,6 +17,8 @@ from loomopt.cli import run
 from loomopt.errors import BadInput
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.views import outputs
+
+ezdxf: Any = importlib.import_module("ezdxf")
 
 SCENE = lo.load("beatup")
 LENGTHS = {name: 1000 * SCENE.mechanism[name] for name in ("l1", "l2", "l3", "l4")}

@@ -1,10 +1,11 @@
 import csv
 import dataclasses
+import importlib
 import io
 import itertools
 import math
+from typing import Any
 
-import ezdxf
 import numpy as np
 import pytest
 
@@ -17,6 +18,8 @@ from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture import shapes
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, figure, svg
+
+ezdxf: Any = importlib.import_module("ezdxf")
 
 
 def paper():

@@ -1,10 +1,11 @@
 """The cam for the workshop: DXF and CSV read back and compared with a cam made of plain rotated vectors."""
 
+import importlib
 import io
 import itertools
 import math
+from typing import Any
 
-import ezdxf
 import numpy as np
 import pandas as pd
 import plain_cam
@@ -20,6 +21,8 @@ from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture import shapes
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, svg
+
+ezdxf: Any = importlib.import_module("ezdxf")
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")

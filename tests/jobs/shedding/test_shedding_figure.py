@@ -11,6 +11,7 @@ from loomopt.jobs import registry
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.panels import Mark, Panel, split
 from loomopt.views import figure, outputs, scene_view
+from loomopt.views.layout import Grid
 
 LEAST = {"K1": 102602.609425357, "X0": 0.08}
 PACKAGED = ("shedding", "shedding-static", "shedding-printed-travel")
@@ -21,7 +22,12 @@ FORCES["shedding-printed-travel"], FORCES["shedding-static"] = FORCES["shedding"
 def axes_of(monkeypatch, scene, design, tmp_path):
     """Return the axes, by label, that `simulate --out` would save."""
     kept = []
-    monkeypatch.setattr(figure, "_save", lambda drawn, path: (kept.append(drawn), path.write_text("")))
+
+    def save(drawn, path):
+        kept.append(drawn)
+        path.write_text("")
+
+    monkeypatch.setattr(figure, "_save", save)
     outputs.curves(tmp_path / "a.png", scene, design)
     kept[0].canvas.draw()
     return {axes.get_ylabel(): axes for axes in kept[0].axes}
@@ -160,6 +166,8 @@ def test_a_columns_unit_is_what_stands_in_brackets():
 
 def test_the_table_of_curves_leaves_unknown_forces_empty():
     head, table = scene_view.curves(lo.load("shedding-static"), {}, None)
+    assert isinstance(head, str)
+    assert isinstance(table, Grid)
     assert "least cam force at 300.000 deg" in head
     place = [column.split("\n")[0] for column in table.columns].index("N")
     cells = {line[0]: line[place] for line in table.lines}

@@ -32,7 +32,7 @@ def test_an_undercut_cam_is_remarked_upon_with_where_how_much_and_what_helps():
     (remark,) = remarks(scene)
     most = lo.evaluate(scene).figures["curvature_max"]
     frame = lo.simulate(scene)
-    at = frame["phi [rad]"][frame["curvature [1/m]"].idxmax()]
+    at = frame["phi [rad]"].iloc[int(frame["curvature [1/m]"].argmax())]
     angle, radius, lacking = (float(x) for x in re.findall(r"([\d.]+) (?:deg|mm)", remark)[:3])
     assert angle == pytest.approx(math.degrees(at), abs=0.5)
     assert radius == pytest.approx(1000 / most, rel=1e-3)
