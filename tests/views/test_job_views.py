@@ -102,3 +102,16 @@ def test_a_job_shows_every_column_with_a_unit_unless_it_says_otherwise():
     panels = registry.of(scene).views.panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
     assert [panel.columns for panel in panels] == [("psi [rad]",), ("M3 [N*m]",)]
     assert [(panel.label, panel.unit) for panel in panels] == [("psi", "rad"), ("M3", "N*m")]
+
+
+@pytest.mark.parametrize("effects", [(), ("bearing_friction",), ("gravity", "rod_inertia")])
+def test_the_pulse_is_marked_from_end_to_end_also_where_another_effect_parts_it(effects):
+    scene = lo.load("beatup")
+    for effect in effects:
+        scene = scene.with_effect(effect)
+    marks = registry.of(scene).views.marks(scene, {})
+    front, half = lo.evaluate(scene).figures["beta"], math.radians(29.8) / 2
+    assert marks["pulse begins"] == pytest.approx(front - half, rel=1e-12)
+    assert marks["pulse ends"] == pytest.approx(front + half, rel=1e-12)
+    without = registry.of(scene).views.marks(scene.without_effect("resistance"), {})
+    assert set(without) == {"front dead centre", "rear dead centre"}
