@@ -1,0 +1,155 @@
+"""From a shedding scene and a target to its program: contact, the spring, a free law, what coils demand, refusals."""
+
+import math
+
+import pytest
+
+from loomopt.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.jobs.shedding.program import SPARE
+from loomopt.mechanisms.cam_spline import cycloid_like
+
+SCENE = registry.load("shedding")
+JOB = registry.of(SCENE)
+COIL = registry.load("shedding-printed-travel").with_effect("coil")
+
+
+def limits(program, name):
+    return [(each.sign, each.value, each.row, each.family) for each in program.limits if each.name == name]
+
+
+def named(program):
+    return {variable.name: variable for variable in program.variables}
+
+
+@pytest.mark.parametrize(
+    ("target", "objective"),
+    [
+        ("stiffness", ("K1", "K1", "value", 1)),
+        ("law", ("K1", "K1", "value", 1)),
+        ("force", ("contact_max", "cam_force", "peak", 1)),
+        ("speed", ("speed", "cam_period", "value", -1)),
+    ],
+)
+def test_objectives_are_the_targets_levels(target, objective):
+    (found,) = JOB.program(SCENE, target).objectives
+    assert (found.figure, found.row, found.form, found.power) == objective
+
+
+def test_contact_is_one_limit_all_round_and_never_gives_way_itself():
+    found = JOB.program(SCENE, "stiffness")
+    assert limits(found, "N_min") == [(-1, 0.0, "lift", "cycle")]
+    (own,) = (each for each in found.limits if each.name == "N_min")
+    assert (own.relaxable, own.hidden, own.where) == (False, False, None)
+    asked = JOB.program(SCENE.set("operation.N_min", "50 N"), "stiffness")
+    more, contact = (next(each for each in asked.limits if each.name == name) for name in ("N_min", "contact"))
+    assert (more.value, more.relaxable, contact.value, contact.relaxable, contact.hidden) == (
+        50.0,
+        True,
+        0.0,
+        False,
+        True,
+    )
+
+
+def test_where_the_warps_pull_is_known_in_the_dwells_contact_is_judged_there():
+    levels = JOB.program(SCENE.set("effects.warp_tension.shape", "levels"), "stiffness")
+    assert [each.where for each in levels.limits if each.name == "N_min"] == [("segment", 1.0), ("segment", 3.0)]
+
+
+def test_what_a_target_keeps_is_a_variable_without_room_that_gives_way_downward():
+    found = JOB.program(SCENE, "stiffness")
+    for name in ("travel", "speed"):
+        assert named(found)[name].lower == named(found)[name].upper
+        assert limits(found, name)[0][0] == -1
+    still = JOB.program(SCENE.without_effect("inertia"), "stiffness")
+    assert "speed" not in named(still), "nothing needs it"
+
+
+def test_target_speed_keeps_the_spring_and_starts_below_what_it_survives():
+    found = JOB.program(SCENE, "speed")
+    survived = JOB.figures(SCENE, JOB.today(SCENE))["contact_speed"]
+    assert [named(found)[name].upper for name in ("K1", "X0")] == [8029.14, 0.08]
+    assert found.starts[0]["speed"] == pytest.approx(0.9 * survived)
+    assert named(found)["speed"].scale == pytest.approx(survived)
+
+
+def test_starts_are_stiff_enough_for_contact():
+    start = JOB.program(SCENE, "stiffness").starts[0]
+    assert JOB.figures(SCENE, {"K1": start["K1"], "X0": start["X0"]})["contact_min"] > 0
+    softer = {"K1": start["K1"] / SPARE * 0.999, "X0": start["X0"]}
+    assert JOB.figures(SCENE, softer)["contact_min"] < 0
+    assert len(JOB.program(SCENE, "force").starts) == 2
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_a_free_law_has_its_inner_knots_for_variables_and_stays_a_law(symmetric):
+    scene = SCENE.update({"targets.law.symmetric": symmetric, "targets.law.intervals": 8})
+    found, knots = JOB.program(scene, "law"), range(1, 4 if symmetric else 8)
+    assert [name for name in named(found) if name.startswith("law_")] == [f"law_{k}" for k in knots]
+    assert limits(found, "law_end") == [(0, 1.0, "law_end", "static")]
+    assert limits(found, "law_end_slope") == ([] if symmetric else [(0, 0.0, "law_end_slope", "static")])
+    assert [row for name in ("law_slope_1", "law_slope_4") for _, _, row, _ in limits(found, name)] == [
+        "law_slope_1",
+        "law_slope_4",
+    ]
+    peak = {value for _, value, _, _ in limits(found, "law_acceleration")}
+    assert peak == {2 * math.pi}, "the cycloid's own"
+    other = JOB.program(scene.set("limits.law_acceleration.max", 8), "law")
+    assert {value for _, value, _, _ in limits(other, "law_acceleration")} == {8.0}
+    start = cycloid_like(8)
+    assert [found.starts[0].get(f"law_{k}") for k in knots] == pytest.approx([start[k] for k in knots], rel=1e-12)
+
+
+def test_freed_segments_leave_the_rest_to_the_near_dwell():
+    found = JOB.program(SCENE.free("rise"), "stiffness")
+    ends = [(sign, pytest.approx(math.radians(value)), "near_dwell", "static") for sign, value in ((-1, 50), (1, 90))]
+    assert limits(found, "near_dwell") == ends
+    assert {"rise", "far_dwell", "return"} <= set(named(found))
+    assert "near_dwell" not in named(found)
+    assert limits(JOB.program(SCENE, "stiffness"), "near_dwell") == []
+    held = JOB.program(SCENE.set("bounds.rise.free", True), "stiffness")
+    assert limits(held, "near_dwell") == [(0, pytest.approx(math.radians(60)), "near_dwell", "static")]
+    document = {table: dict(own) for table, own in SCENE.document.items()}
+    del document["bounds"]["near_dwell"]
+    unbound = registry.scene(document).set("bounds.rise.free", True)
+    (least,) = (each for each in JOB.program(unbound, "stiffness").limits if each.name == "near_dwell")
+    assert (least.sign, least.value, least.relaxable) == (-1, 0.0, False)
+
+
+def test_what_coils_demand_is_in_the_program_and_their_mass_comes_after_the_spring():
+    found = JOB.program(COIL, "stiffness")
+    assert [each.row for each in found.objectives] == ["K1", "spring_mass"]
+    assert limits(found, "coil_index") == [(-1, 4.0, "coil_index", "static"), (1, 12.0, "coil_index", "static")]
+    assert limits(found, "coils give K1") == [(0, 0.0, "coils give K1", "static")]
+    own = {each.name: each.relaxable for each in found.limits}
+    assert (own["surge_ratio"], own["coil_index"], own["coils give K1"]) == (True, False, False)
+    moves = [(move.name, move.along) for move in found.moves]
+    assert moves == [("preload", ("X0",)), ("initial tension", ("coil.initial_tension",))]
+    assert list(JOB.sizes(COIL)) == ["wire"]
+    assert JOB.sizes(COIL.set("effects.coil.sizes", "any")) == {}
+
+
+@pytest.mark.parametrize(
+    ("scene", "target", "problem"),
+    [
+        (SCENE.without_effect("inertia"), "speed", "needs the effect inertia"),
+        (SCENE.without_effect("inertia"), "law", "needs the effect inertia"),
+        (SCENE.set("mechanism.travel", "0 mm"), "speed", "nothing limits the speed"),
+        (SCENE.set("effects.warp_tension.shape", "levels"), "speed", "nothing limits the speed"),
+        (SCENE.set("targets.law.intervals", 3), "law", "cannot have so many intervals"),
+        (SCENE.update({"targets.law.intervals": 9, "targets.law.symmetric": True}), "law", "cannot have so many"),
+    ],
+)
+def test_what_a_target_lacks_is_named(scene, target, problem):
+    with pytest.raises(BadInput, match=problem):
+        JOB.demand(scene, target)
+
+
+def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
+    law = {f"law_{k}": value for k, value in enumerate(cycloid_like(8))}
+    adopted, target = JOB.adopted(SCENE, {"K1": 1e5, **law}, "law")
+    assert (adopted.tables["mechanism"].law, target) == ("spline", "stiffness")
+    assert adopted.tables["mechanism"].law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
+    assert adopted.limits["law_acceleration"].max == pytest.approx(2 * math.pi)
+    assert JOB.adopted(SCENE, {"K1": 1e5}, "force") == (SCENE, "force")
