@@ -22,6 +22,7 @@ import plain_beatup as plain
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.nlp import exchange, transcribe
+from loomopt.nlp.point import Settings
 
 SWEEP = range(600, 901, 10)
 BEFORE, SINGLE = 590, 745
@@ -80,7 +81,7 @@ class Loomopt:
     def __init__(self):
         self.scenes = {M0: scene(M0) for M0 in SWEEP}
         self.first = lo.solve(scene(BEFORE))
-        self.times = {name: [] for name in ("first", "cold", "certificate", "call")}
+        self.times: dict[str, list] = {name: [] for name in ("first", "cold", "certificate", "call")}
 
     def sweep(self):
         """Re-solve for each M0 from its neighbour's answer; returns the time each took and the designs.
@@ -91,7 +92,7 @@ class Loomopt:
         for M0, given in self.scenes.items():
             began = time.perf_counter()
             program = JOB.program(given, "balance")
-            point = exchange.solve(program, {}, exchange.Settings(), point)
+            point = exchange.solve(program, {}, Settings(), point)
             took.append(time.perf_counter() - began)
             claimed = point.raw["extra"][-1] * program.objectives[-1].scale
             designs[M0] = plain_design(JOB.design(program, point.x)), claimed
@@ -126,7 +127,8 @@ def slsqp_sweep():
 
 def fast(best, repeats, calls):
     """Return the rows of loomopt and of SLSQP, and the two ratios that are promised."""
-    own, times = Loomopt(), {"loomopt": [], "slsqp": []}
+    own = Loomopt()
+    times: dict[str, list] = {"loomopt": [], "slsqp": []}
     for _ in range(repeats):
         own.build()
     for _ in range(calls):

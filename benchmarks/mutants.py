@@ -75,7 +75,7 @@ def mutants(file: str) -> Iterator[Mutant]:
             yield Mutant(file, right.lineno, at, at + len(old.encode()), old, new)
 
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Constant) and type(node.value) in (int, float) and node.end_col_offset is not None:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and type(node.value) is not bool:
             for new in _numbers(node.value):
                 old = lines[node.lineno - 1][node.col_offset : node.end_col_offset].decode()
                 yield Mutant(file, node.lineno, node.col_offset, node.end_col_offset, old, new)

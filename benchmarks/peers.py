@@ -185,7 +185,7 @@ def unrolled(points=GRID):
     front = plain.front_torque(l1, l2, l3, l4, s, M0) / TORQUE
     rows = [z[5] - value for value in curve] + [z[5] + value for value in curve] + [z[6] - front, z[6] + front]
     rows += list(plain.limits(l1, l2, l3, l4))
-    nlp = {"x": z, "p": M0, "f": ca.dot(OBJECTIVE, z), "g": ca.vertcat(*rows)}
+    nlp: dict = {"x": z, "p": M0, "f": ca.dot(OBJECTIVE, z), "g": ca.vertcat(*rows)}
     return ca.nlpsol("unrolled", "ipopt", nlp, {"ipopt": {"print_level": 0, "sb": "yes"}, "print_time": False})
 
 

@@ -88,7 +88,7 @@ def peaks(design, M0):
     found = []
     for begin, end in corners:
         phi, step = np.linspace(begin, end, DENSE, retstep=True)
-        size = np.abs(crank_torque(*design, M0, phi))
+        size = np.abs(crank_torque(*(*design, M0, phi)))
         inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
         found += [_refined(design, M0, angle, step) for angle in phi[inner]]
         found += [(phi[k], size[k]) for k in (0, -1)]
@@ -98,10 +98,10 @@ def peaks(design, M0):
 def _refined(design, M0, phi, step):
     """Return a peak that lies within a step of φ, by parabolas over ever smaller steps."""
     for _ in range(4):
-        low, mid, high = np.abs(crank_torque(*design, M0, phi + step * np.array([-1, 0, 1])))
+        low, mid, high = np.abs(crank_torque(*(*design, M0, phi + step * np.array([-1, 0, 1]))))
         phi = phi + step * np.clip(0.5 * (low - high) / (low - 2 * mid + high), -1, 1)
         step = step / 4
-    return phi, abs(crank_torque(*design, M0, phi))
+    return phi, abs(crank_torque(*(*design, M0, phi)))
 
 
 def violation(design):

@@ -99,7 +99,7 @@ def polynomial_4567(m, u):
     return s, 140 * (u - u * u) ** 3, 420 * (u - u * u) ** 2 * (1 - 2 * u)
 
 
-FIRST_HALF = {
+FIRST_HALF: dict[str, list[tuple]] = {
     "cycloidal": [(0, 0.5, cycloidal)],
     "harmonic": [(0, 0.5, harmonic)],
     "modified_sine": [(0, 0.125, sine_start), (0.125, 0.5, sine_middle)],
@@ -291,19 +291,19 @@ def least_force(scene, X0_max=0.080, K1_max=None):
     """
     spots = [(stretch, float(u)) for stretch in stretches(scene) for u in stretch[3:5]]
     for _ in range(50):
-        rows, right = [[-X0_max, 1, 0]], [0.0]
+        rows: list[list[float]] = [[-X0_max, 1, 0]]
+        right = [0.0]
         for stretch, u in spots:
             X, rest = float(state(np, scene, stretch, u)[0]), float(force(np, replace(scene, X0=0), stretch, u, 0.0))
             rows += [[-X, -1, 0], [X, 1, -1]]
             right += [rest - scene.N_min, -rest]
-        rows, right = np.array(rows), np.array(right)
-        scaled = rows * np.array([1e5, 1e3, 1e3])
+        scaled = np.array(rows) * np.array([1e5, 1e3, 1e3])
         bounds = [(0, None if K1_max is None else K1_max / 1e5), (0, None), (0, None)]
-        found = linprog([0, 0, 1], scaled, right, bounds=bounds, method="highs-ds", options=TIGHT)
+        found = linprog([0, 0, 1], scaled, np.array(right), bounds=bounds, method="highs-ds", options=TIGHT)
         K1, P, peak = map(float, found.x * np.array([1e5, 1e3, 1e3]))
         at = replace(scene, X0=P / K1)
-        top, high, where = largest(at, lambda m, *spot, K1=K1: force(m, *spot, number(m, K1)))
-        below, low, there = largest(at, lambda m, *spot, K1=K1: -force(m, *spot, number(m, K1)))
+        top, high, where = largest(at, lambda m, *spot, K1=K1: force(m, *(*spot, number(m, K1))))
+        below, low, there = largest(at, lambda m, *spot, K1=K1: -force(m, *(*spot, number(m, K1))))
         if max(top - peak, below + scene.N_min) < 1e-12 * peak:
             return float(top), K1, P / K1
         spots += [(high, float(where)), (low, float(there))]
@@ -321,11 +321,11 @@ def stress_bound(length, surge, index=12, shear=81.5e9, density=7850):
 
 def linear_maps(n, u):
     """Return the matrices that take s'' at n + 1 even knots to s, s', s'' at u."""
-    a, s, v = np.eye(n + 1), [np.zeros(n + 1)], [np.zeros(n + 1)]
+    a, heights, slopes = np.eye(n + 1), [np.zeros(n + 1)], [np.zeros(n + 1)]
     for k in range(n):
-        s.append(s[k] + v[k] / n + (2 * a[k] + a[k + 1]) / (6 * n * n))
-        v.append(v[k] + (a[k] + a[k + 1]) / (2 * n))
-    s, v, k = np.array(s), np.array(v), np.minimum((np.asarray(u) * n).astype(int), n - 1)
+        heights.append(heights[k] + slopes[k] / n + (2 * a[k] + a[k + 1]) / (6 * n * n))
+        slopes.append(slopes[k] + (a[k] + a[k + 1]) / (2 * n))
+    s, v, k = np.array(heights), np.array(slopes), np.minimum((np.asarray(u) * n).astype(int), n - 1)
     d = (u - k / n)[:, None]
     slope = (a[k + 1] - a[k]) * n
     return s[k] + d * v[k] + d**2 / 2 * a[k] + d**3 / 6 * slope, v[k] + d * a[k] + d**2 / 2 * slope, a[k] + d * slope
@@ -390,8 +390,8 @@ def least_law(scene, n, amax=2 * np.pi, symmetric=False):
     Between the knots the law is looked at too; where more is needed there, rows are added.
     """
     within = np.linspace(0, 1, 40 * n + 1)
-    dense, more, at, K1 = contact_rows(scene, n, within), [], None, least_stiffness(replace(scene, law="cycloidal"))[0]
-    K1 = float(K1)
+    dense, at, more = contact_rows(scene, n, within), None, np.zeros(0)
+    K1 = float(least_stiffness(replace(scene, law="cycloidal"))[0])
     for _ in range(100):
         _, at = law_lp(scene, n, K1, amax, symmetric, more, at)
         f, f0, g, g0 = contact_rows(scene, n, np.concatenate([np.arange(n + 1) / n, more]))
@@ -399,7 +399,7 @@ def least_law(scene, n, amax=2 * np.pi, symmetric=False):
         f, f0, g, g0 = dense
         between = ((f @ at + f0) / (g @ at + g0)).reshape(-1, len(within)).max(axis=0)
         worst = (between[1:-1] >= between[:-2]) & (between[1:-1] > between[2:]) & (between[1:-1] > need * (1 + 1e-12))
-        more = [*more, *within[1:-1][worst]]
+        more = np.append(more, within[1:-1][worst])
         if abs(need / K1 - 1) < 1e-13 and not worst.any():
             break
         K1 = need

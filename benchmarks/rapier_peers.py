@@ -24,6 +24,7 @@ from scipy.optimize import differential_evolution, minimize
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
+from loomopt.nlp.point import Settings
 
 KNOWN = 0.6949847535697
 """Best-known peak |S''|, m/rad²: see `best_known`."""
@@ -151,7 +152,7 @@ def added(start, needs=plain.NEEDS, exact=False, rounds=20):
 
 def drawn(count, seed):
     """Return random designs within the bounds that assemble all round, whatever their other limits."""
-    generator, found = np.random.default_rng(seed), []
+    generator, found = np.random.default_rng(seed), list[np.ndarray]()
     with np.errstate(all="ignore"):
         while len(found) < count:
             trial = generator.uniform(plain.LOWER, plain.UPPER)
@@ -213,7 +214,7 @@ class Loomopt:
     def solve(self, start):
         """Return the design of one solve; no silent levels, no certificate."""
         given = self.program.completed(dict(zip(plain.NAMES, map(float, start), strict=True)))
-        point = exchange.solve(self.program, given, exchange.Settings())
+        point = exchange.solve(self.program, given, Settings())
         return self._plain(JOB.design(self.program, point.x))
 
     def call(self, _=None):
@@ -244,9 +245,9 @@ def judged(runs, best):
 
 def timed(methods, starts, repeats):
     """Return name → (least seconds, design) for each start; all methods take each start in turn."""
-    runs = {name: [] for name in methods}
+    runs: dict[str, list] = {name: [] for name in methods}
     for start in starts:
-        designs = {}
+        designs: dict = {}
 
         def kept(name, start=start, designs=designs):
             designs[name] = methods[name](start)

@@ -75,7 +75,8 @@ def faults(case, law):
 
 def row(name, n, symmetric):
     """Return one row of the study."""
-    case, best, _ = SCENES[name], *fixed(SCENES[name])
+    case = SCENES[name]
+    best, _ = fixed(case)
     began = time.perf_counter()
     reference, _ = plain.least_law(case, n, symmetric=symmetric)
     programme = time.perf_counter() - began

@@ -14,6 +14,7 @@ import argparse
 import functools
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 
 import harness
@@ -39,7 +40,7 @@ CASES = {
     "modified sine, unlike sides": replace(plain.PAPER, law="modified_sine", angles=(100, 70, 130, 60)),
     "return in 7 deg": replace(plain.PRINTED, rpm=60, angles=(120, 60, 7, 173)),
 }
-PARTS = []
+PARTS: list[dict[str, float]] = []
 """What loomopt's calls say of their own times, s."""
 TODAY = (8029.14, 0.080)
 """K1 and X0 of the packaged scene: where SLSQP starts."""
@@ -164,17 +165,19 @@ def called(case):
     return answer.figures["K1"], answer.design["X0"]
 
 
-METHODS = {
+def even(count, case):
+    """Return K1 and X0 by the formula at equal points."""
+    return plain.uniform_grid(case, count), case.X0
+
+
+METHODS: dict[str, Callable] = {
     "loomopt: whole call": called,
     "formula, 360 points, the highest refined": formula,
     "SciPy SLSQP, 360 points": lambda case: slsqp(case, turn(360)),
     "SciPy SLSQP, 36 points and the lowest added": exchanged,
-    **{
-        f"formula, {count} equal points": lambda case, n=count: (plain.uniform_grid(case, n), case.X0)
-        for count in GRIDS
-    },
+    **{f"formula, {count} equal points": functools.partial(even, count) for count in GRIDS},
 }
-SLOW = {
+SLOW: dict[str, Callable] = {
     "SciPy SLSQP, 3600 points": lambda case: slsqp(case, turn(3600)),
     "referee, 30 digits": lambda case: (plain.least_stiffness(case)[0], case.X0),
 }
