@@ -82,6 +82,7 @@ class Effect:
     own: model of that table's values. rank: its place among the job's effects, the lowest first.
     reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
     needs: scene keys that must be given. examples: tables it may have, as a scene writes them, for tests and templates.
+    letters: keys of its table → their symbols in equations, a key's own name without one.
     figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
     many: whether the table holds one table for each of several instances; instance: which of them this is.
     """
@@ -93,6 +94,7 @@ class Effect:
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     examples: tuple[Mapping[str, str], ...] = ({},)
+    letters: Mapping[str, str] = field(default_factory=dict)
     figures: tuple[Figure, ...] = ()
     margins: Mapping[str, str] = field(default_factory=dict)
     many: bool = False

@@ -15,8 +15,6 @@ from loomopt.schema import Values
 Expression = Any
 """A SymPy expression."""
 
-_OWN_NAMES = {"pulse": "delta", "coulomb": "T_c", "viscous": "c", "offset": "chi"}
-"""Keys of effects' tables whose docstrings give them a symbol; any other key is its own symbol."""
 _GREEK = {"alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "chi", "omega"}
 
 
@@ -114,7 +112,7 @@ def _constant(value: Expression) -> Callable[..., Expression]:
 
 def own_values(effect: Effect, words: Mapping[str, str]) -> Values:
     """Return the symbols of an effect's table; words: values that choose a formula."""
-    return {key: words.get(key, symbol(_OWN_NAMES.get(key, key))) for key in effect.own.model_fields}
+    return {key: words.get(key, symbol(effect.letters.get(key, key))) for key in effect.own.model_fields}
 
 
 def equation(name: str, left: Expression, right: Expression) -> Equation:

@@ -39,6 +39,7 @@ EFFECT = Load(
     name="bearing_friction",
     summary="Coulomb and viscous friction of the rocking shaft",
     own=Own,
+    letters={"coulomb": "T_c", "viscous": "c"},
     rank=70,
     acts="output",
     force=force,

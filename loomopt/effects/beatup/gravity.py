@@ -31,6 +31,7 @@ EFFECT = Load(
     name="gravity",
     summary="weight of reed system and counterweight",
     own=Own,
+    letters={"offset": "chi"},
     rank=60,
     acts="output",
     force=force,

@@ -37,6 +37,7 @@ EFFECT = Load(
     name="resistance",
     summary="beating-up resistance of the cloth",
     own=Own,
+    letters={"pulse": "delta"},
     rank=20,
     acts="output",
     force=force,
