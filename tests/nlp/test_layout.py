@@ -1,0 +1,19 @@
+"""Where each parameter of an NLP stands."""
+
+import numpy as np
+
+from loomopt.nlp.layout import Layout
+
+
+def test_layout_gives_back_what_was_written():
+    layout, vector = Layout(), np.zeros(9)
+    layout.add("one")
+    layout.add("grid", 2, 3)
+    layout.add("pair", 2)
+    layout.write(vector, "grid", [[1, 2, 3], [4, 5, 6]])
+    layout.write(vector, "pair", [7, 8])
+    layout.write(vector, "one", 9)
+    assert layout.size == 9
+    assert layout.read(vector, "one") == [9]
+    assert layout.read(vector, "pair") == [7, 8]
+    assert layout.rows(vector, "grid") == [[1, 2, 3], [4, 5, 6]]
