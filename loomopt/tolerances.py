@@ -113,7 +113,8 @@ POLISH_MET, POLISH_DONE = 1e-12, 1e-13
 """Excess of a polished row that is rounding of its terms, and the step after which there is none left to take."""
 
 FOLLOW_FARTHEST, FOLLOW_ROUNDS = 0.2, 24
-"""Farthest that a neighbour's answer is followed: farther the cycle is another; rounds, two of which IPOPT outweighs."""
+"""Farthest that a neighbour's answer is followed: farther the cycle is another; rounds, two of which IPOPT
+outweighs."""
 
 FOLLOW_PROGRESS, FOLLOW_PATIENCE = 0.9, 5
 """Share to which the extremes' moves must shrink, and the rounds in a row in which they may fail to."""
@@ -202,9 +203,9 @@ NEWTON_SHIFT = "1e-3"
 """How far, in u, one Newton step may move a sampled extreme: it is right to 1e-8, what moves farther is no extreme."""
 
 CONE_STEPS = 30
-"""Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A heuristic,
-for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions with under 2 % of them falling none was missed, with
-one step some are (tests/solving/test_cone.py)."""
+"""Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A
+heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
+missed; with one step some are (tests/solving/test_cone.py)."""
 
 CONE_OPEN, CONE_TIP = 1e-9, 1e-9
 """Slope up to which a unit direction does not leave a limit, and length below which a projection is the cone's tip:
@@ -264,3 +265,45 @@ about a hundred roundings; exchanges allowed per column (Lawson and Hanson need 
 
 ROUNDED = 1e-15
 """Nothing is known better, relative to its natural size: the least error an answer claims."""
+
+# Studies and pictures
+#
+# What a study says of an error, when answers count as the references', and how closely a curve is drawn.
+
+REFERENCE_DIGITS, CLOSED_DIGITS = 40, 60
+"""Digits of references, and of those that readings in 40 digits are compared with: 20 more than any of them has."""
+
+REFERENCE_STEP, REFERENCE_SLOPE = 12, 20
+"""Decimals of the step of central differences in u, whose second one then has 16 digits of 40, enough for Newton's
+method; and of one-sided slopes in the design, which are right to 20 digits."""
+
+EXTREME_STEPS, EXTREME_FAR, EXTREME_TIED = 4, 1e-3, 1e-9
+"""Newton steps toward an extreme in many digits: from the 8 digits of u in float64 three are enough; the largest step
+that still leads there; share by which float64 may order two extremes wrongly."""
+
+MET_ROUNDS, MET = 6, 1e-28
+"""Steps onto what binds with slopes in float64, each worth at least 8 digits, and where they have arrived: references
+must be 100 times tighter than errors of 1e-25 (tests/studies/test_accuracy.py)."""
+
+OPEN_RANK, OPEN_TURNS, OPEN_FLAT = 1e-9, 3, 1e-7
+"""Directions that what binds moves by less than this share are open; Newton steps along them; curvature below which
+nothing changes along one: prices are known in float64 only, and their rounding must not count as one."""
+
+REFERENCE_ACCURACY = 1e-11
+"""Accuracy of the answers that references start from: the finest that can be asked."""
+
+TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
+"""Work-precision rows: how many times better a reference is known than the error it judges; errors that are rounding;
+factor of the least error within which errors have stopped falling; factor of the middle slope within which slopes are
+one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 % (test_accuracy)."""
+
+SAME_OBJECTIVE, SAME_DESIGN = 1e-8, 1e-6
+"""Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design, which
+moves more than its objective does."""
+
+CURVE_CLOSE, CURVE_NARROW = 5e-7, 1e-8
+"""How far, m, a traced curve may lie from the true one: half of the micrometre that is promised; the same as a share of
+the machine where that is more, for a machine of a kilometre."""
+
+SHOWN_AS_ZERO = 1e-8
+"""Share of the largest number of its kind below which one is shown as 0: the accuracy asked by default."""

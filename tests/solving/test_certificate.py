@@ -272,3 +272,50 @@ def test_a_point_that_is_no_number_never_passes(bad):
         except (ValueError, OverflowError, np.linalg.LinAlgError):
             passed = False
     assert not passed
+
+
+# Thresholds -------------------------------------------------------------------------------------------------------
+
+
+def leaning(price):
+    """Return: least price · x − y² held by x ≥ 0 (in its natural size), at 0."""
+    return toy.program("xy", {"f": lambda v: price * v["x"] + v["y"] ** 2}, limits=(("x", -1, 0.0),))
+
+
+@pytest.mark.parametrize(("price", "passes"), [(0.99e6, True), (1.01e6, False)])
+def test_a_price_beyond_measure_is_no_kkt_point(price, passes):
+    certificate = certify(leaning(price), {"x": 0.0, "y": 0.0}, ACCURACY)
+    assert certificate.passed == passes
+    if not passes:
+        refused(certificate, "the price of limit x is without measure: 1")
+
+
+@pytest.mark.parametrize(("far", "passes"), [(0.99e8, True), (1.01e8, False)])
+def test_a_design_out_of_all_proportion_is_not_trusted(far, passes):
+    program = toy.program("xy", {"f": lambda v: (v["x"] - far) ** 2 + v["y"] ** 2}, bounds={"x": (0.0, 1e9)})
+    assert certify(program, {"x": far, "y": 0.0}, ACCURACY).passed == passes
+
+
+@pytest.mark.parametrize(("short", "passes"), [(0.9e-8, True), (1.1e-8, False)])
+def test_a_limit_that_is_not_met_may_carry_no_price(short, passes):
+    certificate = certify(leaning(1.0), {"x": short, "y": 0.0}, ACCURACY)
+    assert certificate.passed == passes
+    assert certificate.levels[0].complementarity == pytest.approx(short, rel=1e-6)
+
+
+@pytest.mark.parametrize(("beyond", "passes"), [(0.9e-9, True), (1.1e-9, False)])
+def test_a_limit_holds_to_a_billionth(beyond, passes):
+    assert certify(leaning(1.0), {"x": -beyond, "y": 0.0}, ACCURACY).passed == passes
+
+
+@pytest.mark.parametrize(("slope", "passes"), [(0.9e-6, True), (1.1e-6, False)])
+def test_a_slope_of_a_millionth_is_none(slope, passes):
+    program = toy.program("x", {"f": lambda v: v["x"] ** 2 / 2 + slope * v["x"]})
+    certificate = certify(program, {"x": 0.0}, ACCURACY)
+    assert certificate.passed == passes
+    assert certificate.levels[0].stationarity == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize(("price", "binds"), [(0.9e-8, False), (1.1e-8, True)])
+def test_a_limit_with_next_to_no_price_does_not_bind(price, binds):
+    assert bool(certify(leaning(price), {"x": 0.0, "y": 0.0}, ACCURACY).binding) == binds

@@ -7,7 +7,7 @@ from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
 from loomopt.program.program import Move, Wish
-from loomopt.solving.settle import settle
+from loomopt.solving.settle import goal_of, settle, wished
 
 
 def slide(goal, low=-100.0, high=100.0):
@@ -132,3 +132,75 @@ def test_nothing_is_said_to_be_settled_where_nothing_moved():
     assert slid(FLAT, 0.5) == (0.5, ())
     program = toy.program("xy", FLAT)
     assert settle(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
+
+
+# Goals of a move --------------------------------------------------------------------------------------------------
+
+
+def a_move(kind="axis", toward="today", along=("y",), today=None, bounds=None, **wish):
+    today, bounds = today or dict.fromkeys(along, 1.0), bounds or dict.fromkeys(along, (0.5, 4.0))
+    return Move("slide", along, kind, (Wish(toward, "tidier", **wish),), today, bounds)
+
+
+@pytest.mark.parametrize(
+    ("toward", "today", "expected"),
+    [("least", 1.0, 0.5), ("most", 1.0, 4.0), ("today", 1.0, 1.0), ("today", 0.1, 0.5), ("today", 9.0, 4.0)],
+)
+def test_an_axis_goes_to_its_ends_or_to_today_within_its_bounds(toward, today, expected):
+    move = a_move(toward=toward, today={"y": today})
+    assert goal_of(move, move.wishes[0], {"y": 2.0}) == {"y": expected}
+
+
+def test_an_axis_without_room_stays():
+    move = a_move(along=("x", "y"), bounds={"x": (2.0, 2.0), "y": (0.0, 3.0)})
+    assert goal_of(move, move.wishes[0], {"x": 2.0, "y": 2.0}) == {"y": 1.0}
+
+
+LENGTHY = {"x": (1.0, 9.0), "y": (1.0, 5.0)}
+
+
+@pytest.mark.parametrize(("toward", "factor"), [("least", 0.5), ("most", 1.25)])
+def test_a_scale_goes_as_far_as_every_bound_allows(toward, factor):
+    move = a_move("scale", toward, ("x", "y"), bounds=LENGTHY)
+    expected = {"x": 2 * factor, "y": 4 * factor}
+    assert goal_of(move, move.wishes[0], {"x": 2.0, "y": 4.0}) == pytest.approx(expected)
+
+
+def test_a_scale_nearest_to_today_weighs_each_length_by_the_width_of_its_bound():
+    move = a_move("scale", "today", ("x", "y"), {"x": 3.0, "y": 4.0}, LENGTHY)
+    x, widths = {"x": 2.0, "y": 4.0}, {"x": 8.0, "y": 4.0}
+    factors = np.linspace(0.5, 1.25, 100_001)
+    far = sum(((factors * x[n] - move.today[n]) / widths[n]) ** 2 for n in x)
+    best = factors[np.argmin(far)]
+    goal = goal_of(move, move.wishes[0], x)
+    assert goal == pytest.approx({name: best * value for name, value in x.items()}, rel=1e-5)
+    away = a_move("scale", "today", ("x", "y"), {"x": 30.0, "y": 40.0}, LENGTHY)
+    assert goal_of(away, away.wishes[0], x) == pytest.approx({"x": 2.5, "y": 5.0})
+
+
+def test_a_scale_without_room_or_size_stays():
+    held = a_move("scale", "today", ("x", "y"), bounds={"x": (2.0, 2.0), "y": (1.0, 5.0)})
+    assert goal_of(held, held.wishes[0], {"x": 2.0, "y": 4.0}) == {}
+    none = a_move("scale", "today", ("x", "y"), bounds=LENGTHY)
+    assert goal_of(none, none.wishes[0], {"x": 0.0, "y": 0.0}) == {}
+
+
+def test_a_negative_coordinate_scales_with_the_lengths():
+    move = a_move("scale", "most", ("x", "y"), bounds={"x": (-3.0, 3.0), "y": (1.0, 5.0)})
+    assert goal_of(move, move.wishes[0], {"x": -2.0, "y": 2.0}) == pytest.approx({"x": -3.0, "y": 3.0})
+
+
+def test_the_first_wish_that_holds_is_followed():
+    wishes = Wish("most", "heavy", when="x", above=1.0), Wish("least", "light", when="x", above=0.5), Wish("today", "")
+    move = Move("slide", ("y",), "axis", wishes, {"y": 1.0}, {"y": (0.0, 2.0)})
+    program = toy.program("xy", FLAT, moves=(move,))
+    found = [wished(program, move, {"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
+    assert found == ["most", "least", "today"]
+    assert wished(program, Move("slide", ("y",), "axis", wishes[:2], {}, {}), {"x": 0.0}) is None
+
+
+def test_a_peak_is_compared_all_round_not_by_its_height():
+    """The peak of x cos φ + y sin 2 φ / 9 stays 1 or nearly; the wave does not."""
+    waves = {"w": lambda m, v, phi: m.cos(phi) * v["x"] + v["y"] * (1 - m.cos(phi) ** 2) ** 4 / 99}
+    program = toy.program("xy", {}, waves, objectives=("peak w",), moves=(slide(0.9),))
+    assert settle(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
