@@ -14,6 +14,7 @@ from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
+from loomopt.tolerances import SAME_DESIGN, SAME_OBJECTIVE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,8 +23,6 @@ LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""
 LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
 """Figures that another of the same unit, which may be zero, is measured against."""
-OBJECTIVE, DESIGN = 1e-8, 1e-6
-"""Allowed differences, relative to the value (to the largest of its kind where it is zero)."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
             if str(new) != str(old):
                 found.append(f"{name}: {new}, reference {old}")
             continue
-        allowed = OBJECTIVE if name.split(" [")[0] in objectives else DESIGN
+        allowed = SAME_OBJECTIVE if name.split(" [")[0] in objectives else SAME_DESIGN
         size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
         if not abs(float(new) - float(old)) <= allowed * size:
             found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")

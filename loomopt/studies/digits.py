@@ -17,21 +17,20 @@ from loomopt.nlp.point import Point
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import BINDING
-
-DIGITS = 40
-STEP, SLOPE_STEP = 12, 20
-"""Decimals of the steps of central differences in u, and of one-sided ones in the design."""
-NEWTON, FAR = 4, 1e-3
-"""Newton steps toward an extreme, and the largest that is one."""
-TIED = 1e-9
-"""Extremes this close to the highest, relative, are each looked at."""
-ROUNDS, MET = 6, 1e-28
-"""Newton steps onto what binds, and where they have arrived, in natural sizes."""
-RANK = 1e-9
-"""Directions that what binds moves by less than this share are open."""
-TURNS, FLAT = 3, 1e-7
-"""Newton steps along open directions, and the curvature below which nothing changes along one, in natural sizes."""
+from loomopt.tolerances import (
+    BINDING,
+    EXTREME_FAR,
+    EXTREME_STEPS,
+    EXTREME_TIED,
+    MET,
+    MET_ROUNDS,
+    OPEN_FLAT,
+    OPEN_RANK,
+    OPEN_TURNS,
+    REFERENCE_DIGITS,
+    REFERENCE_SLOPE,
+    REFERENCE_STEP,
+)
 
 
 def tiny(system: Maths, decimals: int) -> Number:
@@ -39,19 +38,19 @@ def tiny(system: Maths, decimals: int) -> Number:
     return system.number(10.0) ** -decimals
 
 
-def precise(sampler: Sampler, digits: int = DIGITS) -> Reading:
+def precise(sampler: Sampler, digits: int = REFERENCE_DIGITS) -> Reading:
     """Return a sampled design in many digits."""
     return sampler.read(maths.mpmath(digits))
 
 
 def extreme(exact: Reading, name: str, near: Extreme) -> Number:
     """Return a quantity at the extreme near one found in float64; an extreme at a piece's end stays there."""
-    u, step = exact.maths.number(near.u), tiny(exact.maths, STEP)
-    for _ in range(NEWTON if 0.0 < near.u < 1.0 else 0):
+    u, step = exact.maths.number(near.u), tiny(exact.maths, REFERENCE_STEP)
+    for _ in range(EXTREME_STEPS if 0.0 < near.u < 1.0 else 0):
         low, mid, high = (exact.at(name, near.piece, u + k * step) for k in (-1, 0, 1))
         bend = (high - 2 * mid + low) / step**2
         shift = -(high - low) / (2 * step * bend) if bend else 0 * u
-        if abs(shift) > FAR:
+        if abs(shift) > EXTREME_FAR:
             break
         u += shift
     return exact.at(name, near.piece, u)
@@ -64,7 +63,7 @@ def peak(sampler: Sampler, name: str, signed: bool = False) -> Number:
     plain = signed or name in sampler.model.signed
     heights = [each.value if plain else abs(each.value) for each in found]
     top = max(heights)
-    near = [e for e, height in zip(found, heights, strict=True) if height >= top - TIED * max(abs(top), 1e-300)]
+    near = [e for e, height in zip(found, heights, strict=True) if height >= top - EXTREME_TIED * max(abs(top), 1e-300)]
     values = [extreme(exact, name, each) for each in near]
     return max(value if plain else abs(value) for value in values)
 
@@ -159,7 +158,7 @@ class _Rows:
 
     def slopes(self, unknown: Sequence[Number]) -> Floats:
         """Return (rows, unknowns): first derivatives by one-sided differences."""
-        step, base = tiny(self.maths, SLOPE_STEP), self.values(unknown)
+        step, base = tiny(self.maths, REFERENCE_SLOPE), self.values(unknown)
         columns = []
         for place in range(len(unknown)):
             moved = self.values(moved_by(unknown, place, step))
@@ -172,7 +171,7 @@ class _Rows:
 
     def gradient(self, unknown: Sequence[Number]) -> Floats:
         """Return the last objective's first derivatives."""
-        step, base = tiny(self.maths, SLOPE_STEP), self.objective(unknown)
+        step, base = tiny(self.maths, REFERENCE_SLOPE), self.objective(unknown)
         moved = (moved_by(unknown, place, step) for place in range(len(unknown)))
         return np.array([float((self.objective(each) - base) / step) for each in moved])
 
@@ -186,7 +185,7 @@ def moved_by(unknown: Sequence[Number], place: int, step: Number) -> list[Number
     return [value + step * (k == place) for k, value in enumerate(unknown)]
 
 
-def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int = DIGITS) -> Optimum:
+def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int = REFERENCE_DIGITS) -> Optimum:
     """Return the optimum near a certified one: x (SI) moved until all that binds is met to many digits.
 
     Along directions that what binds leaves open, Newton's method on the Lagrangian, its slope in float64: the
@@ -195,7 +194,7 @@ def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int 
     rows = _Rows(program, point, x, digits)
     unknown, missed = _met(rows, rows.start)
     step, curved, flat = 0.0, 0.0, 0
-    for _ in range(TURNS):
+    for _ in range(OPEN_TURNS):
         way, step, curved, flat = _open(rows, unknown)
         if not step:
             break
@@ -208,10 +207,10 @@ def optimum(program: Program, point: Point, x: Mapping[str, float], digits: int 
 
 def _met(rows: _Rows, unknown: list[Number]) -> tuple[list[Number], float]:
     """Return the unknowns moved, least change, onto what binds, and the largest row that is still not met."""
-    back = np.linalg.pinv(rows.slopes(unknown), rcond=RANK)
+    back = np.linalg.pinv(rows.slopes(unknown), rcond=OPEN_RANK)
     residual = rows.values(unknown)
     missed = rows.number(0.0)
-    for _ in range(ROUNDS):
+    for _ in range(MET_ROUNDS):
         missed = max((abs(value) for value in residual), default=missed)
         if missed <= MET:
             break
@@ -225,11 +224,11 @@ def _open(rows: _Rows, unknown: Sequence[Number]) -> tuple[Floats, float, float,
     """Return Newton's step along what is left open, its size, the largest curvature, and how many ways are flat."""
     slopes, gradient = rows.slopes(unknown), rows.gradient(unknown)
     _, sizes, basis = np.linalg.svd(slopes.reshape(-1, len(unknown)))
-    free = basis[int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0)))) :]
+    free = basis[int(np.sum(sizes > OPEN_RANK * max(1.0, sizes.max(initial=0.0)))) :]
     if not len(free):
         return np.zeros(len(unknown)), 0.0, 0.0, 0
     prices = np.linalg.lstsq(slopes.T, -gradient, rcond=None)[0]
-    step = tiny(rows.maths, STEP)
+    step = tiny(rows.maths, REFERENCE_STEP)
 
     def lagrangian(by: Floats) -> Number:
         at = rows.moved(unknown, by, step)
@@ -243,7 +242,7 @@ def _open(rows: _Rows, unknown: Sequence[Number]) -> tuple[Floats, float, float,
             bend = (lagrangian(free[i] + free[j]) - ahead[i] - ahead[j] + here) / step**2
             bends[i, j] = bends[j, i] = float(bend)
     values, vectors = np.linalg.eigh(bends)
-    curved = values > FLAT
+    curved = values > OPEN_FLAT
     ways = vectors[:, curved].T @ free
     way = -(ways @ gradient / values[curved]) @ ways
     return way, float(np.abs(way).max()), float(values.max()), int(np.sum(~curved))

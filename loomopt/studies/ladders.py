@@ -16,19 +16,10 @@ import numpy as np
 from loomopt.errors import BadInput
 from loomopt.maths import Number
 from loomopt.program.sampling import Tally
+from loomopt.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
 
 Setting = float | int | str
-TIGHTER = 100.0
-"""A reference must be known this many times better than the error it judges."""
 EPSILON = float(np.finfo(float).eps)
-FLOOR = 100 * EPSILON
-"""Errors below this are rounding: no order is read from them."""
-STILL = 2.0
-"""Errors within this factor of the least one have stopped falling."""
-SPREAD = 1.25
-"""Slopes from row to row within this factor of the middle one are one order."""
-LEAST_ORDER = 0.25
-"""An error that falls more slowly does not converge."""
 BUDGET = 0.3
 """Seconds after which a run is not repeated once more."""
 FAILURES = (ArithmeticError, ValueError, RuntimeError, BadInput, np.linalg.LinAlgError)
@@ -192,7 +183,7 @@ def _falling(rows: Sequence[Row], step: Callable[[Any], float]) -> list[list[tup
     stretches: list[list[tuple[float, float]]] = [[]]
     for row in rows:
         point = None
-        if row.error is not None and row.error > FLOOR:
+        if row.error is not None and row.error > NO_ORDER:
             point = math.log(step(row.setting)), math.log(row.error)
         if point is None or (stretches[-1] and point[1] >= stretches[-1][-1][1]):
             stretches.append([])
@@ -208,7 +199,7 @@ def _slopes(pairs: Iterable[tuple[tuple[float, float], tuple[float, float]]]) ->
 def _alike(slopes: Sequence[float]) -> bool:
     """Say whether errors fall by one power of the step, and one that counts."""
     middle = statistics.median(slopes)
-    return min(slopes) >= max(middle / SPREAD, LEAST_ORDER) and max(slopes) <= SPREAD * middle
+    return min(slopes) >= max(middle / ONE_ORDER, LEAST_ORDER) and max(slopes) <= ONE_ORDER * middle
 
 
 def knee(rows: Sequence[Row]) -> Setting | None:

@@ -15,6 +15,7 @@ from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
+from loomopt.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"
@@ -107,9 +108,9 @@ def _crossed(subject: Subject, crossing: Crossing) -> Number:
     """Return the crank angle, rad, of a crossing in many digits, by Newton's method."""
     near = subject.job.figures(subject.scene, subject.job.today(subject.scene))[crossing.figure] or 0.0
     exact, cycle = subject.exact, subject.sampler.cycle
-    switch, step = cycle.switch(cycle.place(near)[0]), digits.tiny(exact.maths, digits.SLOPE_STEP)
+    switch, step = cycle.switch(cycle.place(near)[0]), digits.tiny(exact.maths, REFERENCE_SLOPE)
     angle, level = exact.maths.number(near), exact.given.values[crossing.level]
-    for _ in range(digits.NEWTON):
+    for _ in range(EXTREME_STEPS):
         low, value, high = (exact.quantity(crossing.quantity, angle + k * step, switch) for k in (-1, 0, 1))
         sign = 1 if value > 0 else -1
         angle -= 2 * step * (sign * value - level) / (sign * (high - low))

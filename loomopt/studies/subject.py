@@ -23,11 +23,8 @@ from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import check, digits
 from loomopt.studies.ladders import Reference
+from loomopt.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS
 
-CLOSEST = 1e-11
-"""Accuracy of the answers that references start from."""
-TIGHTEST = 60
-"""Digits of the references of closed forms: twenty more than the most that a method has."""
 POSITIONS = 24
 """Crank angles, evenly over the turn, at which closed forms are compared."""
 
@@ -71,7 +68,7 @@ class Subject:
     @functools.cached_property
     def exact(self) -> Reading:
         """Today's machine in more digits than any method has."""
-        return digits.precise(self.sampler, TIGHTEST)
+        return digits.precise(self.sampler, CLOSED_DIGITS)
 
     def reference(self, quantity: str) -> Reference | None:
         """Return what a reading of today's machine truly is, in 40 digits; closed forms in 60."""
@@ -119,7 +116,7 @@ class Target:
     @functools.cached_property
     def answer(self) -> Solution:
         """The closest answer there is."""
-        return engine.solve(self.scene, self.name, accuracy=CLOSEST)
+        return engine.solve(self.scene, self.name, accuracy=REFERENCE_ACCURACY)
 
     @functools.cached_property
     def optimum(self) -> digits.Optimum | None:
@@ -138,12 +135,12 @@ class Target:
             return Reference(self.placed(found.x), found.design_uncertainty, 1.0)
         objective, value = self.program.objectives[-1], found.objectives[-1]
         if objective.power != 1:
-            value = value ** (1 / maths.mpmath(digits.DIGITS).number(objective.power))
+            value = value ** (1 / maths.mpmath(REFERENCE_DIGITS).number(objective.power))
         return Reference(value, found.uncertainty, 0.0 if value else objective.scale)
 
     def placed(self, x: Mapping[str, Number]) -> list[Number]:
         """Return variables in natural sizes, apart from the moves that leave every figure unchanged."""
-        number = maths.mpmath(digits.DIGITS).number
+        number = maths.mpmath(REFERENCE_DIGITS).number
         scaled = {v.name: number(x[v.name]) / number(v.scale) for v in self.program.variables}
         for move in self.program.moves:
             if move.kind == "axis":

@@ -8,14 +8,12 @@ from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
+from loomopt.tolerances import SHOWN_AS_ZERO
 from loomopt.units import factor
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:
     from loomopt.solving.proof import Proofs
-
-NEGLIGIBLE = 1e-8
-"""Shown as 0 when below this share of the largest number in the same unit."""
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
@@ -89,7 +87,7 @@ def lists(found: Evaluation, scene: Scene) -> list[str]:
 
 def _number(value: float, size: float) -> str:
     """Return six significant digits; what is only rounding beside `size` is 0."""
-    return "0" if abs(value) <= NEGLIGIBLE * size else f"{value:.6g}"
+    return "0" if abs(value) <= SHOWN_AS_ZERO * size else f"{value:.6g}"
 
 
 def _limit(low: float | None, high: float | None) -> str:

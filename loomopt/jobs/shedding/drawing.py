@@ -23,11 +23,10 @@ from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
+from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, SHOWN_AS_ZERO
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"
-NEGLIGIBLE = 1e-8
-"""Share of the largest cam force that is only rounding."""
 STEP = 0.5
 """Degrees of cam angle between the table's rows at most."""
 SAME = 1e-9
@@ -35,10 +34,6 @@ SAME = 1e-9
 DIGITS = 10
 """Decimals of a degree in the table: 120 deg is 120."""
 Figures = Mapping[str, float | None]
-CLOSE = 5e-7
-"""How far, m, a traced curve may lie from the true one: half of the micrometre that is promised."""
-NARROW = 1e-8
-"""The same as a share of the machine, where that is more: what a machine of a kilometre is traced by."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +96,8 @@ def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
 def traced(found: Cam) -> Stations:
     """Return stations once round, the last before the first again, close enough that straight lines join them.
 
-    No point of the profile or of the roller centre's curve is farther than CLOSE from the lines. Corners of the law
-    are stations.
+    No point of the profile or of the roller centre's curve is farther than CURVE_CLOSE from the lines. Corners of the
+    law are stations.
     """
 
     def curves(pieces: Pieces, u: Floats) -> tuple[Floats, Floats]:
@@ -110,7 +105,7 @@ def traced(found: Cam) -> Stations:
         return at.profile, at.pitch
 
     size = found.follower.arm + found.follower.centre_distance
-    return found.stations(*tracing.nodes(curves, found.sampler.cycle.starts, max(CLOSE, NARROW * size)))
+    return found.stations(*tracing.nodes(curves, found.sampler.cycle.starts, max(CURVE_CLOSE, CURVE_NARROW * size)))
 
 
 @dataclass(frozen=True)
@@ -205,7 +200,7 @@ SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
 
 def settled(least: float, most: float) -> float:
     """Return the least cam force, N, as it is told: what is only rounding is 0."""
-    return 0.0 if abs(least) <= NEGLIGIBLE * abs(most) else least
+    return 0.0 if abs(least) <= SHOWN_AS_ZERO * abs(most) else least
 
 
 def _legend(scene: Scene, drawn: Picture, skeleton: Skeleton, figures: Figures) -> tuple[tuple[str, str], ...]:
