@@ -5,7 +5,6 @@ Text from outside is shortened, and stripped of whatever a terminal would obey.
 
 import difflib
 from collections.abc import Iterable
-from typing import Any
 
 from pydantic import BaseModel, ValidationError
 

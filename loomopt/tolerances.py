@@ -298,8 +298,8 @@ factor of the least error within which errors have stopped falling; factor of th
 one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 % (test_accuracy)."""
 
 SAME_OBJECTIVE, SAME_DESIGN = 1e-8, 1e-6
-"""Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design, which
-moves more than its objective does."""
+"""Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
+which moves more than its objective does."""
 
 CURVE_CLOSE, CURVE_NARROW = 5e-7, 1e-8
 """How far, m, a traced curve may lie from the true one: half of the micrometre that is promised; the same as a share of
