@@ -8,7 +8,7 @@ from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
 from loomopt.owned import label, owned
 from loomopt.program.model import JobModel
-from loomopt.program.program import Limit, Move, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 
@@ -119,6 +119,12 @@ def demand_figures(scene: Scene, model: JobModel, rows: Mapping[str, Sequence[st
                 allowed="figures whose numbers and effects the scene has",
                 remedy=remedy.format(name=name),
             )
+
+
+def least(sampler: Sampler) -> tuple[Objective, ...]:
+    """Return the levels after a target's own: rows that the checks would have least; sampler: today's machine."""
+    rows = [check.least for check in sampler.model.checks if check.least]
+    return tuple(Objective(row, row, "value", abs(sampler.static[row]) or 1.0) for row in rows)
 
 
 def inside(variables: Iterable[Variable], values: Mapping[str, float]) -> dict[str, float]:

@@ -3,8 +3,8 @@
 import math
 from importlib.metadata import EntryPoint
 
-from loomopt.effects.kinds import Check, Demand, Load
-from loomopt.quantities import Coordinate, PureNumber
+from loomopt.effects.kinds import Axis, Check, Demand, Load
+from loomopt.quantities import Coordinate, PositiveLength, PureNumber
 from loomopt.schema import Figure, Table
 
 BEGINS, ENDS = 1.1, 2.6
@@ -104,6 +104,23 @@ def at_event(name, angles):
     )
 
 
+class PlateTable(Table):
+    thickness: PositiveLength
+    spare: PositiveLength
+    strong: PositiveLength
+
+
+PLATE: Check[object] = Check(
+    name="made_up_plate",
+    summary="a plate as thin as it may be, and a number that nothing reads",
+    own=PlateTable,
+    rows={"plate": lambda m, given, own: own["thickness"]},
+    figures=(Figure("plate", "length", "thickness of the plate"),),
+    demands=(Demand("plate", -1, "strong"),),
+    least="plate",
+    axes=(Axis(name="spare", key="spare"),),
+    examples=({"thickness": "5 mm", "spare": "7 mm", "strong": "3 mm"},),
+)
 DEAD_CENTRE = at_event("front dead centre", lambda given: (given["beta"], given["beta"] + 1))
 TURNS = at_event("turns", lambda given: tuple(given["turns"]))
 HALF_OPEN = at_event("half_open", lambda given: (*given["half_open"], BEGINS, ENDS))
@@ -117,7 +134,7 @@ NAMES = {
     "shedding.made_up_event": "HALF_OPEN",
 }
 for _job in ("beatup", "rapier", "shedding"):
-    NAMES |= {f"{_job}.made_up_output": "OUTPUT", f"{_job}.made_up_drive": "DRIVE"}
+    NAMES |= {f"{_job}.made_up_output": "OUTPUT", f"{_job}.made_up_drive": "DRIVE", f"{_job}.made_up_plate": "PLATE"}
 
 
 def points(group):

@@ -15,6 +15,7 @@ from loomopt.effects.kinds import Check, Demand
 from loomopt.jobs import registry
 from loomopt.program.sampling import Sampler
 from loomopt.schema import Figure
+from loomopt.solving.solution import Solution
 from loomopt.studies.check import served
 
 JOBS = ("beatup", "rapier", "shedding")
@@ -41,7 +42,7 @@ def scene_of(job, **demands):
     return lo.load(job).update({**LOADS, "effects.made_up_check": LOOSE | demands})
 
 
-SOLVED = {}
+SOLVED: dict[str, Solution] = {}
 
 
 def solve(scene):
@@ -225,7 +226,8 @@ EVENT = {
 def test_an_event_that_an_effect_calls_in_is_there_and_parts_the_cycle(job):
     scene = lo.load(job).set("effects.made_up_event.jump", "0.5")
     sampled = sampler(scene)
-    angles = scene.schema.effects["made_up_event"].corners(maths.FLOAT, sampled.given.values, {})
+    load = {"beatup": made_up.DEAD_CENTRE, "rapier": made_up.TURNS, "shedding": made_up.HALF_OPEN}[job]
+    angles = load.corners(maths.FLOAT, sampled.given.values, {})
     events = angles[: {"beatup": 1, "shedding": 2}.get(job)]
 
     def at(angle, beside=0.0):
@@ -250,6 +252,21 @@ def test_corners_beside_an_event_that_lies_on_the_laws_own_are_there_too():
     sampled = Sampler(program.model, {**program.parameters, **program.starts[0]})
     for angle in (made_up.BEGINS, made_up.ENDS, sampled.given.values["half_open"][0]):
         assert np.sum(np.abs(sampled.cycle.starts - angle) < 1e-9) == 1
+
+
+@every_job
+def test_numbers_of_an_effect_are_chosen_the_least_made_so_and_what_nothing_reads_kept(job):
+    ranges = {"thickness": ("1 mm", "9 mm"), "spare": ("2 mm", "8 mm")}
+    changes = {"effects.made_up_plate": dict(made_up.PLATE.examples[0])}
+    changes |= {f"bounds.{name}": {"min": low, "max": high} for name, (low, high) in ranges.items()}
+    scene = lo.load(job).update(changes)
+    for target in served(scene):
+        answer = lo.solve(scene, target)
+        assert (answer.status, answer.certificate.passed) == ("optimal", True), target
+        assert answer.design["spare"] == pytest.approx(0.007, rel=1e-9), target
+        assert answer.figures["plate"] == answer.design["thickness"]
+        assert answer.figures["plate"] >= 0.003 * (1 - 1e-9)
+    assert solve(scene).figures["plate"] == pytest.approx(0.003, rel=1e-8)
 
 
 @every_job

@@ -92,7 +92,8 @@ def test_every_own_scene_is_kept_in_results_of_its_own():
 
 
 def test_a_job_whose_schema_is_anothers_is_refused(monkeypatch):
-    monkeypatch.setattr(registry, "find", lambda name: registry.importlib.import_module("loomopt.jobs.rapier.job").JOB)
+    rapier = registry.find("rapier")
+    monkeypatch.setattr(registry, "find", lambda name: rapier)
     with pytest.raises(BadInput, match="job beatup describes scenes of rapier"):
         registry.load("beatup")
 

@@ -63,8 +63,8 @@ def program(scene: Scene, target: str) -> Program:
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
     starts = _starts(variables, known, direct, target == "retrofit")
-    moves = _moves(variables, known, limited)
-    objectives = _objectives(target, sizes)
+    moves = (*_moves(variables, known, limited), *scene_numbers.axis_moves(scene, known, limited))
+    objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
     return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves)
 
 

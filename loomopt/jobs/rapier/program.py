@@ -83,7 +83,7 @@ def program(scene: Scene, target: str) -> Program:
         scene_numbers.scale_move(name, along, known, limited) for name, along in scales if taken >= set(along)
     ]
     moves += scene_numbers.axis_moves(scene, known, limited)
-    objectives = _objectives(target, sampler, read(sampler).stroke)
+    objectives = (*_objectives(target, sampler, read(sampler).stroke), *scene_numbers.least(sampler))
     starts = _starts(variables, known)
     return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow)
 
@@ -92,7 +92,7 @@ def _reads_effects(scene: Scene) -> bool:
     """Say whether the program reads anything that effects give: then they are in it, else they are not."""
     checks = [effect for effect in scene.active if isinstance(effect, Check)]
     given = {name for check in checks for name in (*check.quantities, *check.rows)}
-    return bool((given | set(LOADED)) & set(scene.limits)) or any(check.demands for check in checks)
+    return bool((given | set(LOADED)) & set(scene.limits)) or any(check.demands or check.least for check in checks)
 
 
 def _demand_figures(scene: Scene) -> None:

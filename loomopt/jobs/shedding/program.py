@@ -166,9 +166,7 @@ class _Task:
             return (Objective("contact_max", "cam_force", "peak", self.sizes.force),)
         if self.target == "speed":
             return (Objective("speed", "cam_period", "value", 1 / self.fastest, power=-1),)
-        least = Objective("K1", "K1", "value", self.sizes.stiffness)
-        rows = [check.least for check in self.checks if check.least]
-        return least, *(Objective(row, row, "value", self.sampler.static[row]) for row in rows)
+        return Objective("K1", "K1", "value", self.sizes.stiffness), *scene_numbers.least(self.sampler)
 
     def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""

@@ -39,7 +39,10 @@ class Press(Job):
             variables,
             {name: value for name, value in known.items() if name not in limited},
             tuple(limits),
-            (Objective("peak_torque", "peak_torque", "peak", sampler.peak("peak_torque") or 1.0),),
+            (
+                Objective("peak_torque", "peak_torque", "peak", sampler.peak("peak_torque") or 1.0),
+                *numbers.least(sampler),
+            ),
             (numbers.inside(variables, known),),
             tuple(numbers.axis_moves(scene, known, limited)),
         )
