@@ -114,19 +114,23 @@ class _Registered:
         schema = find(job).schema(document)
         if schema.name != job:
             raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
-        others = [name for name in effects if name not in schema.effects]
-        if not others:
-            return schema
-        added = [effect for name in others if (effect := _brought(job, name)) is not None]
-        return replace(schema, effects=ranked([*schema.effects.values(), *added])) if added else schema
+        for name in dict.fromkeys(name for name in effects if name not in schema.effects):
+            effect = _brought(schema, name)
+            if effect is not None:
+                schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
+        return schema
 
 
-def _brought(job: str, name: str) -> Effect | None:
+def _brought(schema: SceneSchema, name: str) -> Effect | None:
     """Return another distribution's effect of a job; None where nobody brings it. Raises BadInput."""
-    point = _single(EFFECTS, f"{job}.{name}", "effect")
+    point = _single(EFFECTS, f"{schema.name}.{name}", "effect")
     if point is None:
         return None
     effect: Effect = _loaded(point, "effect", Effect, name)
+    taken = {*schema.variables, *schema.figures, *schema.margins}
+    for told in (*(figure.name for figure in effect.figures), *effect.margins):
+        if told in taken:
+            raise _useless(point, "effect", f"brings {told}, which there is already")
     return effect
 
 

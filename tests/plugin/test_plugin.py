@@ -164,6 +164,17 @@ def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribu
     assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
 
 
+def test_an_effect_whose_figure_there_is_already_is_named(loomopt, distribution):
+    code = """
+from loomopt.effects.beatup.centrifugal import EFFECT as KNOWN
+import dataclasses
+EFFECT = dataclasses.replace(KNOWN, name="wind")
+"""
+    same = [distribution("same-figure", {"beatup.wind": "same_figure:EFFECT"}, code, "loomopt.effects")]
+    told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=same).stderr
+    assert "effect beatup.wind of same-figure brings bearing_force, which there is already" in told
+
+
 def test_an_effect_of_two_distributions_is_refused(loomopt, distribution):
     both = [distribution("other-bar", {"beatup.torsion_bar": "other_bar:EFFECT"}, group="loomopt.effects")]
     told = loomopt("show", "beatup", "--set", "effects.torsion_bar.k=1 N*m/rad", status=2, folders=both).stderr
