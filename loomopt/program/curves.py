@@ -61,7 +61,7 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     if columns.torque and loads:
         found[columns.torque[0]] = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
     for name, unit in columns.checks.items():
-        found[f"{name} [{unit}]"] = sampler.at(name, pieces, u)
+        found[f"{name} [{unit}]"] = _column(sampler.model.formula(name), at, u)
     return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
 
 

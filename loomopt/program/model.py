@@ -267,6 +267,10 @@ class JobModel:
         """Return the mechanism with its effects at a node."""
         return Instant(self, maths, given, node)
 
+    def formula(self, name: str) -> Formula:
+        """Return the formula of a whole-cycle quantity."""
+        return self._quantities[name].formula
+
     def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
         """Return a whole-cycle quantity, SI, at a node."""
         if name in self._cased:
