@@ -163,7 +163,7 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
 def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
     """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
     grown = max(map(len, here.nodes), default=0) > nlp.slots or here.sampler.corner_count != nlp.structure.corners
-    if calls.elastic or len(extra) != nlp.structure.extras or grown:
+    if calls.elastic or grown:
         return False
     arguments = calls.arguments(nlp, here.sampler, here.x, extra, here.nodes)
     rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()

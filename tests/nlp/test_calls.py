@@ -91,6 +91,13 @@ def test_epigraph_variables_begin_a_little_above_what_they_stand_for():
     assert len(calls.epigraphs) == 4
 
 
+def test_the_highest_extreme_is_what_an_epigraph_variable_stands_above():
+    calls, nlp, arguments, _ = put(program((), (objective("wave", "peak"),)))
+    first = calls.first_extra(nlp, calls.sampler(X), [[Extreme(0, 0.1, -4.0), Extreme(0, 0.6, 3.0)]])
+    assert first == pytest.approx([1.01 * 4.0 + 0.01], rel=1e-14)
+    assert (arguments["lbx"][2], arguments["ubx"][2]) == (-np.inf, np.inf)
+
+
 def test_what_gives_way_begins_at_one_and_never_below_none():
     calls, nlp, arguments, _ = put(program([("sum", 1, -5.0), ("wave", 1, 1.0)]), elastic=True)
     assert nlp.structure.extras == 4

@@ -2,15 +2,18 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from waves import objective, program
+from waves import model, objective, program
 
+from loomopt.cycle import TURN, split
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
-from loomopt.program.sampling import Sampler
+from loomopt.program.kinematics import Arcs
+from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.certificate import certify
 
 BEATUP = registry.load("beatup")
@@ -162,3 +165,104 @@ def test_a_warm_start_goes_where_a_cold_one_goes_even_from_afar():
     for name in ("l1", "l2", "l3", "l4", "s"):
         assert warm.x[name] == pytest.approx(cold.x[name], abs=1e-8), name
     assert math.isfinite(warm.violation)
+
+
+def gives_up(monkeypatch, moved=0.0):
+    """Let IPOPT give up where it would have succeeded, x moved by so much."""
+    run = exchange.run
+
+    def given_up(*arguments):
+        answer = run(*arguments)
+        x = {name: value + moved for name, value in answer.x.items()}
+        return replace(answer, status="Search_Direction_Becomes_Too_Small", x=x)
+
+    monkeypatch.setattr(exchange, "run", given_up)
+
+
+@pytest.mark.parametrize(
+    ("limits", "moved", "stands"),
+    [
+        ((("sum", 1, 4.0),), 0.0, True),
+        ((("sum", 1, 4.0),), 2e-8, True),
+        ((("sum", 1, 4.0),), 1e-6, False),
+        ((("sum", 0, 4.0),), -1e-6, False),
+        ((("sum", 1, 4.0),), -1e-6, True),
+        ((("circle", 1, 1.0),), 0.0, False),
+        ((("circle", 1, 9.0),), 0.0, True),
+    ],
+)
+def test_where_the_solver_gives_up_the_rows_decide(limits, moved, stands, monkeypatch):
+    """An extreme between the nodes of the only round counts too."""
+    gives_up(monkeypatch, moved)
+    monkeypatch.setattr(exchange, "EXCHANGE_ROUNDS", 1)
+    point = solved(program(limits=limits))
+    assert point.status == "Search_Direction_Becomes_Too_Small"
+    assert point.reached is stands
+
+
+def test_rounds_that_run_out_leave_a_point_with_its_violation(monkeypatch):
+    monkeypatch.setattr(exchange, "EXCHANGE_ROUNDS", 1)
+    task = program(limits=(("circle", 1, 1.0),))
+    point = solved(task, polished=False)
+    assert point.reached
+    assert point.violation == pytest.approx(highest(task, point, "circle") - 1.0, rel=1e-6)
+    assert point.violation > 1e-3
+
+
+def test_an_elastic_solve_whose_rounds_run_out_is_not_reached(monkeypatch):
+    task = program(limits=(("sum", -1, 4.0), ("circle", 1, 2.0)))
+    monkeypatch.setattr(exchange, "ELASTIC_ROUNDS", 2)
+    assert not exchange.solve(task, task.starts[0], Settings(), elastic=True).reached
+
+
+def test_what_needs_no_relaxation_is_told_as_none():
+    task = program(limits=(("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
+    point = exchange.solve(task, task.starts[0], Settings(), elastic=True)
+    assert set(point.relaxed) <= {0, 1}
+    assert all(need > 1e-9 for need in point.relaxed.values())
+
+
+def test_equal_nodes_of_a_turn_are_all_that_is_seen():
+    task = program(limits=(("circle", 1, 1.0),))
+    point = solved(task, uniform=5, polished=False)
+    assert point.reached
+    assert point.violation == 0.0
+    assert [len(nodes) for nodes in point.nodes] == [10], "both signs"
+    angles = sorted({2 * math.pi * node.u for node in point.nodes[0]})
+    assert angles == pytest.approx([2 * math.pi * k / 5 for k in range(5)], abs=1e-15)
+    assert {node.sign for node in point.nodes[0]} == {1.0, -1.0}
+    assert 1e-3 < highest(task, point, "circle") - 1.0 < 1 / math.cos(math.pi / 10) - 1
+    assert point.iterations < 60, "one round"
+    signed = program(limits=(("circle", 1, 1.0),), physics=model(signed=("circle",)))
+    assert [len(nodes) for nodes in solved(signed, uniform=5, polished=False).nodes] == [5]
+
+
+def test_equal_nodes_keep_to_the_pieces_their_limit_speaks_of():
+    half = Arcs("half", lambda maths, given: (1.0, 2.5), lambda angle, corners: float(1.0 <= angle % TURN < 2.5))
+    task = program(limits=(("circle", 1, 1.0),), physics=model(arcs=(half,)))
+    limited = replace(task, limits=(replace(task.limits[0], where=("half", 1.0)),))
+    nodes = solved(limited, uniform=36, polished=False).nodes[0]
+    sampler = sampler_at(limited, limited.starts[0])
+    angles = {round(sampler.angle(node) % TURN, 12) for node in nodes}
+    assert angles == {round(TURN * k / 36, 12) for k in range(36) if 1.0 <= TURN * k / 36 < 2.5}
+
+
+def test_a_node_keeps_its_crank_angle_when_corners_change_their_order():
+    def cycle(first, second):
+        return split((first, second), ("a",), lambda angle: (0.0,))
+
+    before, after = cycle(1.0, 2.0), SimpleNamespace(cycle=cycle(2.1, 2.0))
+    node = Extreme(1, 0.25, -3.0, signed=True)
+    angle = float(before.angles(np.array([1]), np.array([0.25]))[0])
+    moved = exchange._carried(node, before, after)
+    here = float(after.cycle.angles(np.array([moved.piece]), np.array([moved.u]))[0])
+    assert math.remainder(here - angle, TURN) == pytest.approx(0.0, abs=1e-14)
+    assert (moved.value, moved.signed) == (-3.0, True)
+
+
+def test_no_more_random_starts_are_drawn_than_are_worth_it(monkeypatch):
+    task = program()
+    drawn = []
+    monkeypatch.setattr(exchange, "sampler_at", lambda program, x: drawn.append(x))
+    assert exchange.starts(task, 3) == []
+    assert len(drawn) == 1 + 200 * 3
