@@ -27,7 +27,6 @@ from loomopt.tolerances import (
     LARGEST_PRICE,
     LARGEST_VARIABLE,
     POSITIVE,
-    SLOPING,
     STATIONARY,
 )
 
@@ -81,9 +80,17 @@ def _judged_level(local: Local, place: int, earlier: Sequence[Multipliers]) -> J
     """Solve one level's KKT system and judge its curvature."""
     system = kkt.system(local.active, place, earlier)
     first = kkt.solved(local.gradients, system)
-    if local.active.zero[place] or not first.residual <= SLOPING:
-        return JudgedLevel(_residuals(local, place, system, first, first.residual), first)
-    multipliers, curvature = _best(local, place, system, first)
+    alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
+    if local.active.zero[place]:
+        return alone
+    try:
+        multipliers, curvature = _best(local, place, system, first)
+    except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError):
+        # Beside a point where a row's slope has no end there is no second derivative: where the slope that is left
+        # refuses the design already, nothing hangs on it.
+        if first.residual <= STATIONARY:
+            raise
+        return alone
     return JudgedLevel(_residuals(local, place, system, multipliers, first.residual), multipliers, curvature)
 
 

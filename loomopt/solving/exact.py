@@ -62,9 +62,7 @@ class Exact:
         base = self._values(self.base)
         sides = [[self._values(self._along(d, sign * step)) for sign in (1, -1)] for d in directions]
         for i, (ahead, behind) in enumerate(sides):
-            result[:, i, i] = [
-                float((a - 2 * b + c) / step**2) for a, b, c in zip(ahead, base, behind, strict=True)
-            ]
+            result[:, i, i] = [float((a - 2 * b + c) / step**2) for a, b, c in zip(ahead, base, behind, strict=True)]
             for j in range(i):
                 result[:, i, j] = result[:, j, i] = self._mixed(directions[i], directions[j], step)
         for k, row in enumerate(self.rows):

@@ -56,12 +56,18 @@ class Multipliers:
         """Rows that bind."""
         return set(np.flatnonzero(np.abs(self.of) > POSITIVE).tolist())
 
-    def subgradient(self, gradients: Floats, system: System) -> Floats:
-        """Return the slope that is left, with the multipliers of each group's pieces made to sum to 1 exactly."""
+    def normalised(self, system: System) -> Floats:
+        """Return the multipliers of the Lagrangian in which each group's pieces weigh 1 together.
+
+        Least squares leave a little of that sum where a slope is left; the limits' share it.
+        """
         weights = self.of.copy()
-        for group in map(list, system.groups):
-            weights[group] /= weights[group].sum() or 1.0
-        return np.asarray(weights @ gradients)
+        sums = np.array([weights[list(group)].sum() or 1.0 for group in system.groups])
+        pieces = [(k, total) for group, total in zip(system.groups, sums, strict=True) for k in group]
+        weights /= sums.mean() if len(sums) else 1.0
+        for k, total in pieces:
+            weights[k] = self.of[k] / total
+        return weights
 
 
 def system(active: ActiveSet, level: int, earlier: Sequence[Multipliers]) -> System:

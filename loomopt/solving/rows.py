@@ -96,9 +96,7 @@ def _pieces(sampler: Sampler, place: int, objective: Objective, group: tuple[str
             yield Row(objective.figure, name, objective.scale, sign, place, excess, node=node)
 
 
-def _smooth(
-    sampler: Sampler, objective: Objective, name: str
-) -> list[tuple[float, float, Extreme | None]]:
+def _smooth(sampler: Sampler, objective: Objective, name: str) -> list[tuple[float, float, Extreme | None]]:
     """Return value, sign and node of each smooth function whose largest is what one row is worth."""
     if objective.form == "peak":
         return [(e.height, e.sign, e) for e in sampler.extremes(name)]

@@ -11,6 +11,7 @@ decided by a heuristic: H indefinite there, where the least curvature over the c
 Lagrangian is read at a few steps along the line (`lagrangian`: what falls along a curve only is not looked for).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -73,6 +74,10 @@ class Critical:
     back: Floats
     slopes: Floats
 
+    def ways(self, line: Floats) -> list[Floats]:
+        """Return the directions (variables) of a line, in the cone's basis, that touching rows leave open."""
+        return [self.basis @ way for way in (line, -line) if np.max(self.slopes @ way, initial=-np.inf) <= FLAT]
+
 
 def critical(local: Local, system: System, multipliers: Multipliers) -> Critical:
     """Return the critical cone of one level.
@@ -101,24 +106,31 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
     """Return what second order says of one level with one set of multipliers."""
     cone = critical(local, system, multipliers)
-    slope = multipliers.subgradient(local.gradients, system)
+    weights = multipliers.normalised(system)
+    slope = weights @ local.gradients
     if cone.basis.shape[1] == 0:
         step = _newton(cone, np.zeros((0, 0)), np.zeros(0), slope)
         return Curvature(settled=True, step=step)
-    hessian = np.tensordot(multipliers.of, local.exact.curvatures(cone.basis), axes=1)
+    hessian = np.tensordot(weights, local.exact.curvatures(cone.basis), axes=1)
     values, vectors = np.linalg.eigh(hessian)
     curved = values > NEWTON_CURVED
     step = _newton(cone, vectors[:, curved], values[curved], slope)
     settled = bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian)
     if values.min() < -FLAT and least_on_cone(hessian, cone.slopes) < -FLAT:
         return Curvature(minimum=False, unique=False, settled=settled, step=step)
-    unique, ways = True, []
-    for value, vector in zip(values, vectors.T, strict=True):
-        open_ways = [way for way in (vector, -vector) if np.max(cone.slopes @ way, initial=-np.inf) <= FLAT]
-        unique = unique and (bool(value > FLAT) or not open_ways)
-        ways += [cone.basis @ way for way in open_ways] if value <= FAINT else []
+    unique = not any(cone.ways(vector) for vector in vectors.T[values <= FLAT])
+    ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
     falls = bool(ways) and _falls(local, level, multipliers, ways)
     return Curvature(unique=unique, falls=falls, settled=settled, step=step)
+
+
+def _lines(level: Floats) -> list[Floats]:
+    """Return the lines along which a level subspace, its basis in rows, is looked at: its axes and their diagonals.
+
+    Which basis it has is chance, and a product of two variables is level along both their axes.
+    """
+    pairs = [(one, other) for k, one in enumerate(level) for other in level[:k]]
+    return [*level, *((one + sign * other) / math.sqrt(2) for one, other in pairs for sign in (1.0, -1.0))]
 
 
 def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Floats:

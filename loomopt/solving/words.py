@@ -10,7 +10,7 @@ from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
-SIDES = {-1: "min", 0: "equal", 1: "max"}
+SIDES = {-1: "min", 1: "max"}
 UNKNOWN = "number"
 """The kind of what no table names, such as a variable that only the target's task has."""
 

@@ -102,3 +102,19 @@ def test_both_rows_of_a_limit_need_what_the_worse_one_does():
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("x", -1, 3.0), ("x", 1, 0.0), ("y", 1, 1.0)))
     needed = {0: 0.5, 1: -1.5, 2: 2.0, 3: 0.9e-9}
     assert elastic._by_limit(program, needed) == {1: -1.5, 2: 2.0}
+
+
+def test_a_limit_by_itself_is_sought_from_two_starts(monkeypatch):
+    """The first call finds the least sum of two needs; each of the other limits is then tried from two starts."""
+    calls = []
+
+    def least(program, starts, settings):
+        calls.append((len(starts), sum(limit.relaxable for limit in program.limits)))
+        return (Point({}, "", True), {0: 1.0, 1: 1.0} if len(calls) == 1 else {2: 1.0, 3: 1.0})
+
+    monkeypatch.setattr(elastic, "_least", least)
+    monkeypatch.setattr(elastic, "_priced", lambda *_: ("both",))
+    program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("y", -1, 1.0), ("p", 1, 0.0)))
+    answer = clash(program, [{}] * 5, Settings(), Words(toy.scene_of(toy.ToyJob(program))))
+    assert calls == [(5, 4), (2, 1), (2, 1), (2, 1), (2, 1)]
+    assert [one.limit for one in answer.relaxations] == ["x", "y"], "one that needs two of a kind is none alone"

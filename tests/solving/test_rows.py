@@ -113,3 +113,22 @@ def test_a_limit_whose_weight_vanishes_keeps_its_row_from_below_only():
         found = active(replace(weighed, limits=(limit,)), {"x": 0.0})
         assert found.limits == rows
         assert all(row.limit.sign == -1 for row in found.rows[:rows])
+
+
+@pytest.mark.parametrize("size", [4.0, 0.25])
+def test_what_touches_is_told_in_natural_sizes(size):
+    sizes = {"p": size}
+    for share, count in ((0.9, 2), (1.1, 1)):
+        below = 2 - share * ACTIVE * size
+        program = toy.program("xy", ROWS, objectives=("p, q",), sizes=sizes)
+        assert len(active(program, {"x": 2.0, "y": below}).pieces(0)) == count
+        program = toy.program("xy", ROWS, objectives=("|p|",), sizes=sizes)
+        found = active(program, {"x": share * 1e-9 * size, "y": 0.0})
+        assert (len(found.pieces(0)), found.zero) == (count, (count == 2,))
+
+
+def test_an_objective_is_zero_where_all_its_magnitudes_are():
+    for objective in ("|p + q|", "|p, q|"):
+        program = toy.program("xy", ROWS, objectives=(objective, "p + q"))
+        assert active(program, {"x": 0.0, "y": 0.0}).zero == (True, False)
+        assert active(program, {"x": 0.0, "y": 1.0}).zero == (False, False)

@@ -204,3 +204,9 @@ def test_a_peak_is_compared_all_round_not_by_its_height():
     waves = {"w": lambda m, v, phi: m.cos(phi) * v["x"] + v["y"] * (1 - m.cos(phi) ** 2) ** 4 / 99}
     program = toy.program("xy", {}, waves, objectives=("peak w",), moves=(slide(0.9),))
     assert settle(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
+
+
+@pytest.mark.parametrize(("size", "told"), [(1.0, True), (1e3, False), (1e-3, True)])
+def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, told):
+    program = toy.program("xy", FLAT, moves=(slide(0.5 + 1e-7),), sizes={"y": size})
+    assert bool(settle(program, {"x": 1.0, "y": 0.5})[1]) == told
