@@ -35,8 +35,12 @@ SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90
 """Crank angle, rad, within which a spike beside a singular position is sought: five samples; its halvings, to rounding
 of an angle of 2π (0.02/2^44 = 1e-15); golden sections of what brackets it: 0.618^90 = 1e-19."""
 
-ROOT_OF_ROUNDING = 1e-8
-"""What a maximum's place is right to where its value is right to 1e-16."""
+SINGULAR_SAMPLES, WORTH_A_LOOK = 361, 10
+"""Samples of one turn between which the closest position of a triangle is sought, and how many times NEARLY_SINGULAR
+its share may be there: a parabola through samples a degree apart misses far less."""
+
+SAME_ANGLE = 1e-12
+"""rad; a piece that ends this close before an angle ends at it: a thousand roundings of angles of a few turns."""
 
 SPARSE_STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
 """Equal steps of one turn that curves of few rows begin with, by accuracy; no stretch between corners gets fewer than
@@ -52,6 +56,9 @@ than a fifth above them. Share by which rows on a level may differ: a thousand r
 
 SAME_ROW = 1e-9
 """rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
+
+START_ROOM = 0.01
+"""Share of a bound's width that a start keeps from its ends: IPOPT would push it there."""
 
 # NLP
 #
@@ -153,10 +160,6 @@ FEASIBLE = 1e-9
 
 STATIONARY = 1e-6
 """Slope that KKT multipliers may leave: an objective that curves by 1 is then within 1e-12 of its least."""
-
-SLOPING = 0.1
-"""Slope left (at most 1, for the multipliers of an objective's pieces sum to 1) beyond which second order is not asked:
-Newton's method is nowhere near, and a row may end where its slope has no end."""
 
 COMPLEMENTARY = 1e-8
 """Multiplier times distance of a limit: what the objective might still gain by meeting it. The usual accuracy."""
