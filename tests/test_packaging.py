@@ -17,6 +17,7 @@ import pytest
 import loomopt
 from loomopt import packaged
 from loomopt.errors import BadInput
+from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 
 ROOT = Path(__file__).parents[1]
@@ -109,6 +110,7 @@ def test_the_wheel_holds_scenes_results_types_and_nothing_else(wheel):
     for folder in ("problems", "results"):
         assert {f"loomopt/{folder}/{path.name}" for path in (ROOT / folder).iterdir()} <= names
     assert "loomopt/py.typed" in names
+    assert {f"loomopt/jobs/{job}/template.toml" for job in registry.own_names()} <= names
     assert {name.split("/")[0].split("-")[0] for name in names} == {"loomopt"}
     assert not [name for name in names if "test" in name.lower() or "__pycache__" in name]
 
