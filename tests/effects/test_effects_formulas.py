@@ -52,7 +52,7 @@ def cases():
         elif name == "rod_inertia":
             for model in ("lumped", "exact"):
                 yield f"{name}: {model}", switched(effect, 1), OWN[name] | {"model": model}
-        elif effect.corners:
+        elif isinstance(effect, Load) and effect.corners:
             for switch in (-1, 0, 1):
                 yield f"{name}: switch {switch}", switched(effect, switch), OWN[name]
         else:
@@ -134,7 +134,7 @@ def test_terms_take_arrays_of_crank_angles(label):
 
 def names_read(function, own):
     """Return the names of all symbols that a term's CasADi expression holds."""
-    symbols = {}
+    symbols: dict[str, ca.SX] = {}
 
     def number(name, _):
         return symbols.setdefault(name, ca.SX.sym(name))
@@ -162,5 +162,7 @@ def test_an_effect_reads_what_it_declares_and_nothing_else(label):
 
 @pytest.mark.parametrize("name", [name for name, effect in BEATUP.items() if isinstance(effect, Load)])
 def test_where_a_load_acts(name):
-    assert BEATUP[name].acts == ("drive" if name == "rod_inertia" else "output")
-    assert bool(BEATUP[name].corners) == (name in {"resistance", "bearing_friction"})
+    load = BEATUP[name]
+    assert isinstance(load, Load)
+    assert load.acts == ("drive" if name == "rod_inertia" else "output")
+    assert bool(load.corners) == (name in {"resistance", "bearing_friction"})

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
+from loomopt.jobs.beatup.model import ReedPose
 from loomopt.mechanisms import crank_rocker
 
 MP = mpmath.MPContext()
@@ -103,7 +104,7 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
     lengths = crank_rocker.Lengths(LENGTHS[0], 0.065, LENGTHS[2], LENGTHS[3])
     for phi in np.linspace(0, TURN, 50):
         rod = crank_rocker.Pose(maths.FLOAT, lengths, float(phi))
-        here = Pose(phi, SPEED, -rod.psi, -rod.psi_1, -rod.psi_2, rod, 30.0)
+        here = ReedPose(phi, SPEED, rod, 30.0)
         lumped, exact = (rod_inertia.MODELS[name](maths.FLOAT, here, same, own) for name in ("lumped", "exact"))
         assert lumped == pytest.approx(exact, rel=1e-12, abs=1e-11)
 
@@ -111,7 +112,7 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
 @given(angles, st.floats(0, 300))
 @REPEATABLE
 def test_centrifugal_forces_are_those_of_the_centres_of_mass(phi, omega_dot):
-    moving, own = pose(phi, omega_dot), {}
+    moving, own = pose(phi, omega_dot), dict[str, float]()
     moment = centrifugal.moment(GIVEN)
     assert moment == pytest.approx(56.8 * 0.045 - 3.0 * 0.05, rel=1e-15)
     phi_mp = MP.mpf(phi)

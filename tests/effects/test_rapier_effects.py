@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ import loomopt as lo
 from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.cycle import Node
+from loomopt.effects.kinds import Motion
 from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs import registry
 
@@ -39,7 +39,7 @@ def test_head_inertia_is_mass_times_acceleration(mass, S_1, S_2, omega):
 
 @pytest.mark.parametrize("switch", [-1.0, 0.0, 1.0])
 def test_tape_friction_is_its_force_with_the_sign_of_the_speed(switch):
-    assert tape_friction.force(maths.FLOAT, SimpleNamespace(), {}, {"force": 15.0}, switch) == 15.0 * switch
+    assert tape_friction.force(maths.FLOAT, Motion(), {}, {"force": 15.0}, switch) == 15.0 * switch
 
 
 @given(st.lists(st.floats(0, TURN), min_size=2, max_size=6, unique=True).filter(lambda c: len(c) % 2 == 0))

@@ -45,9 +45,10 @@ def exact(follower):
 class Positions:
     """Where [Qiu21, eq 2-3] puts the roller centre when φ is the parabola of the given φ, φ', φ'' at θ; 60 digits."""
 
-    def __init__(self, follower, phi, phi_1, phi_2, theta):
+    def __init__(self, motion, theta):
+        follower, *swing = motion
         self.follower, self.theta = exact(follower), MP.number(theta)
-        self.motion = tuple(MP.number(value) for value in (phi, phi_1, phi_2))
+        self.motion = tuple(MP.number(value) for value in swing)
 
     def swing(self, theta):
         """Return φ, φ', φ'' at θ."""
@@ -103,7 +104,7 @@ angles = st.floats(0, 2 * math.pi)
 @given(motions(), angles)
 @REPEATABLE
 def test_centre_tangent_and_curvature_are_those_of_the_equations_positions(motion, theta):
-    there = Positions(*motion, theta)
+    there = Positions(motion, theta)
     contact, known = there.contact(), there.centre(there.theta)
     first, second = there.rates(there.centre)
     centre, tangent = contact.centre(there.theta), contact.tangent(there.theta)
@@ -120,7 +121,7 @@ def test_centre_tangent_and_curvature_are_those_of_the_equations_positions(motio
 @REPEATABLE
 def test_the_pressure_angle_is_the_one_between_normal_and_path(motion, theta):
     """Normal from differences of the curve, path from differences of the swing alone: both from positions."""
-    there = Positions(*motion, theta)
+    there = Positions(motion, theta)
     first, _ = there.rates(there.centre)
     outward = (-first[1] / length(first), first[0] / length(first))
     phi = there.motion[0]
@@ -138,7 +139,7 @@ def test_the_pressure_angle_is_the_one_between_normal_and_path(motion, theta):
 @given(motions(), angles)
 @REPEATABLE
 def test_the_profile_is_one_roller_radius_from_the_centre_curve_and_parallel_to_it(motion, theta):
-    there = Positions(*motion, theta)
+    there = Positions(motion, theta)
     contact, centre = there.contact(), there.centre(there.theta)
     offset = [p - q for p, q in zip(there.profile(there.theta), centre, strict=True)]
     first, _ = there.rates(there.centre)
@@ -155,7 +156,7 @@ def test_the_profile_is_one_roller_radius_from_the_centre_curve_and_parallel_to_
 @given(motions(), angles)
 @REPEATABLE
 def test_the_curvature_of_the_profile_is_that_of_its_points(motion, theta):
-    there = Positions(*motion, theta)
+    there = Positions(motion, theta)
     contact = there.contact()
     shrinkage = 1 - contact.curvature * there.follower.roller_radius
     if abs(shrinkage) > 1e-2:
@@ -168,7 +169,7 @@ def test_the_curvature_of_the_profile_is_that_of_its_points(motion, theta):
 @REPEATABLE
 def test_undercut_begins_exactly_where_curvature_is_one_over_the_roller_radius(motion, theta):
     """There the profile stands still (a cusp); with a larger roller it runs backwards, with a smaller one forwards."""
-    there = Positions(*motion, theta)
+    there = Positions(motion, theta)
     curvature = there.contact().curvature
     first, _ = there.rates(there.centre)
     for share in (-1, 0, 1):
@@ -186,7 +187,7 @@ def test_in_a_dwell_the_curve_is_a_circle_about_the_cam(motion, theta):
     follower, phi, _, _ = motion
     contact = Contact(MP, exact(follower), MP.number(phi), 0, 0)
     a, arm = (MP.number(value) for value in (follower.centre_distance, follower.arm))
-    radius = MP.sqrt(a**2 + arm**2 - 2 * a * arm * MP.cos(Positions(*motion, 0.0).arm(MP.number(phi))))
+    radius = MP.sqrt(a**2 + arm**2 - 2 * a * arm * MP.cos(Positions(motion, 0.0).arm(MP.number(phi))))
     assert abs(contact.curvature * radius - 1) < 1e-50
     assert abs(contact.profile_curvature * (radius - contact.follower.roller_radius) - 1) < 1e-45
     point = contact.profile(MP.number(theta))
@@ -214,9 +215,9 @@ def test_the_start_angle_keeps_its_digits_folded_and_stretched(reach, sign, marg
 def test_a_larger_cam_of_the_same_shape_has_the_same_angles(motion, exponent):
     follower, *swing = motion
     scale = math.exp(exponent)
-    lengths = [value * scale for value in dataclasses.astuple(follower)[:4]]
+    sizes = [*(value * scale for value in dataclasses.astuple(follower)[:4]), follower.arm_swing]
     here = Contact(maths.FLOAT, follower, *swing)
-    there = Contact(maths.FLOAT, Follower(*lengths, follower.arm_swing), *swing)
+    there = Contact(maths.FLOAT, Follower(*sizes), *swing)
     size = 1e-9 * (abs(here.curvature) + 1 / here.speed)
     assert there.pressure_angle == pytest.approx(here.pressure_angle, rel=0, abs=1e-11)
     assert there.curvature * scale == pytest.approx(here.curvature, rel=0, abs=size)

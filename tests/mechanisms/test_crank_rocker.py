@@ -106,7 +106,8 @@ def test_psi_and_its_derivatives_to_four_ulp_times_condition(lengths, phi):
 def test_closed_forms_to_twenty_digits(lengths, phi):
     system = maths.mpmath(60)
     exact = [MP.mpf(x) for x in (*numbers(lengths), phi)]
-    pose = Pose(system, Lengths(*exact[:4], lengths.side), exact[4])
+    l1, l2, l3, l4, angle = exact
+    pose = Pose(system, Lengths(l1, l2, l3, l4, lengths.side), angle)
     for found, value in zip((pose.psi, pose.psi_1, pose.psi_2), motion(lengths.side)(*exact), strict=True):
         assert abs(found - value) <= MP.mpf(10) ** -20 * (1 + abs(value))
 
@@ -114,8 +115,8 @@ def test_closed_forms_to_twenty_digits(lengths, phi):
 def automatic():
     """Return ψ' and ψ'' by AD of ψ alone, both as closed forms, and the sizes of both: |f| + Σ|x ∂f/∂x|."""
     data, side = ca.SX.sym("x", 5), ca.SX.sym("side")
-    *lengths, phi = ca.vertsplit(data)
-    pose = Pose(maths.casadi(), Lengths(*lengths, side), phi)
+    l1, l2, l3, l4, phi = ca.vertsplit(data)
+    pose = Pose(maths.casadi(), Lengths(l1, l2, l3, l4, side), phi)
     first = ca.jacobian(pose.psi, phi)
     closed = ca.vertcat(pose.psi_1, pose.psi_2)
     size = ca.fabs(closed) + ca.mtimes(ca.fabs(ca.jacobian(closed, data)), ca.fabs(data))
@@ -183,7 +184,7 @@ def test_dead_centres_are_the_extremes_of_a_dense_scan(lengths, side):
 def test_the_closed_form_at_front_dead_centre_is_the_general_one_there(lengths):
     """ψ'' there is the limit of the general formula, and [Yuan24]'s l1(l1+l2)/(l2 l3 sin μ)."""
     system = maths.mpmath(60)
-    exact = Lengths(*(MP.mpf(x) for x in numbers(lengths)), lengths.side)
+    exact = Lengths(*[*map(MP.mpf, numbers(lengths)), lengths.side])
     centres = dead_centres(system, exact)
     for angle, value in ((centres.beta, centres.psi_2_front), (MP.pi + centres.beta_r, centres.psi_2_rear)):
         pose = Pose(system, exact, angle)
@@ -272,7 +273,7 @@ def test_synthesis_refuses_angles_of_no_crank_rocker(theta, beta, swing):
 @given(linkages(), angles, st.integers(-20, 20))
 @REPEATABLE
 def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
-    scaled = Lengths(*(length * 2.0**power for length in numbers(lengths)), lengths.side)
+    scaled = Lengths(*[*(length * 2.0**power for length in numbers(lengths)), lengths.side])
     first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, scaled, phi)
     assert (first.psi, first.psi_1, first.psi_2) == (second.psi, second.psi_1, second.psi_2)
     one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, scaled)

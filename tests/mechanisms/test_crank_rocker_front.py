@@ -16,7 +16,8 @@ sides = pytest.mark.parametrize("side", [1, -1])
 
 
 def front(system, lengths, side):
-    sized = Lengths(*map(system.number, lengths), side)
+    l1, l2, l3, l4 = map(system.number, lengths)
+    sized = Lengths(l1, l2, l3, l4, side)
     return crank_rocker.front_pose(system, sized, crank_rocker.dead_centres(system, sized))
 
 

@@ -94,7 +94,7 @@ def test_peak_acceleration_and_transmission_angle_of_the_papers_layout(built):
 def test_derivatives_agree_with_differences_at_sixty_digits(built, phi1):
     system = maths.mpmath(60)
     exact = Dimensions(*(system.number(value) for value in dataclasses.astuple(built)))
-    step, front = system.number("1e-10"), poses(exact, system.number(0), system)[1]
+    step, front = system.number(10) ** -10, poses(exact, system.number(0), system)[1]
     angles = [poses(exact, system.number(phi1) + k * step, system)[0].phi63(front) for k in range(-2, 3)]
     first = (angles[0] - 8 * angles[1] + 8 * angles[3] - angles[4]) / (12 * step)
     second = (angles[1] - 2 * angles[2] + angles[3]) / step**2

@@ -10,6 +10,7 @@ import pytest
 import loomopt as lo
 from loomopt import maths
 from loomopt.cycle import Node
+from loomopt.effects.beatup import counterweight_inertia, rod_inertia
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker
 from loomopt.mechanisms import crank_rocker
@@ -89,20 +90,23 @@ def test_joints_at_front_dead_centre_are_the_limit_of_the_general_pose_in_two_nu
     numbers = JOB.numbers_of(FULL, design)
     exact = JOB.model(FULL).given(many, {name: many.number(value) for name, value in numbers.items()})
     plain = JOB.model(FULL).given(maths.FLOAT, numbers)
-    near = CrankRocker().pose(many, exact, Node(exact.values["beta"] + many.number("1e-20"), {})).joints
+    near = CrankRocker().pose(many, exact, Node(exact.values["beta"] + many.number(10) ** -20, {})).joints
     front = CrankRocker().still(many, exact, FRONT, {}).joints
     floats = CrankRocker().still(maths.FLOAT, plain, FRONT, {}).joints
     for name in ROD:
         limit = getattr(near, name)
         assert float(abs(getattr(front, name) - limit)) <= 1e-18 * max(1.0, abs(float(limit))), name
         assert getattr(floats, name) == pytest.approx(float(limit), rel=1e-12, abs=1e-15), name
-    assert (front.psi_1, float(front.sin_crank_rod)) == (0, pytest.approx(0, abs=1e-30))
+    assert front.psi_1 == 0
+    assert float(front.sin_crank_rod) == pytest.approx(0, abs=1e-30)
 
 
 def test_an_effect_may_read_joints_at_front_dead_centre():
     """The exact rod model, put on the reed's torque: its term is in M3_fdc."""
     rod = FULL.set("effects.rod_inertia.model", "exact")
-    effects = [dataclasses.replace(e, acts="output") if e.name == "rod_inertia" else e for e in rod.active]
+    of_reed = dataclasses.replace(rod_inertia.EFFECT, acts="output")
+    effects = [of_reed if effect is rod_inertia.EFFECT else effect for effect in rod.active]
+    assert of_reed in effects
     model = dataclasses.replace(JOB.model(rod), effects=tuple(effects))
     given = model.given(maths.FLOAT, JOB.numbers(rod))
     without = JOB.model(rod).given(maths.FLOAT, JOB.numbers(rod))
@@ -127,7 +131,7 @@ def test_events_of_the_motion_are_both_dead_centres():
 def test_static_figures_are_their_formulas():
     found = figures(FULL, DESIGN)
     s = 3.0 * 0.07**2
-    JS = FULL.effects["counterweight_inertia"].JS
+    JS = FULL.own(counterweight_inertia.Own).JS
     assert found["J4"] == pytest.approx(0.62 + s + JS, rel=1e-15)
     assert found["r4"] == pytest.approx((56.8 * 0.045 - 3.0 * 0.07) / 59.8, rel=1e-15)
     centres = JOB.sampler(FULL, DESIGN).given.values["centres"]
@@ -219,6 +223,6 @@ def test_a_model_is_plain_unchangeable_data():
     found = JOB.model(FULL)
     assert type(found) is JobModel
     with pytest.raises(dataclasses.FrozenInstanceError):
-        found.effects = ()
+        found.effects = ()  # type: ignore[misc]
     assert [load.name for load in found.loads] == [name for name in FULL.effects if name != "centrifugal"]
     assert found.quantities == ("peak_torque", "bearing_force", "shaking_force")

@@ -121,7 +121,8 @@ def test_moves_are_data_the_counterweights_first():
         ("scale", LENGTHS, "scale"),
     ]
     used, none = found[0].wishes
-    assert used == Wish("most", "least added mass, so the largest radius", "s", pytest.approx(NO_MASS * ROOM))
+    assert used == Wish("most", "least added mass, so the largest radius", "s", used.above)
+    assert used.above == pytest.approx(NO_MASS * ROOM)
     assert none == Wish("today", "no mass, so the radius nearest today's")
     assert found[1].today == {name: BEATUP.mechanism[name] for name in LENGTHS}
     assert [move.name for move in JOB.program(BEATUP.set("bounds.r4e", "70 mm"), "balance").moves] == ["scale"]

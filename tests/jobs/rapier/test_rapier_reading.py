@@ -29,7 +29,7 @@ DEGREE = math.pi / 180
 @functools.cache
 def random_designs():
     """Return twenty drives that turn, around today's; seeded."""
-    random, found = np.random.default_rng(17), []
+    random, found = np.random.default_rng(17), list[dict[str, float]]()
     today = {name: SCENE.mechanism[name] for name in ("l4", "l5", "l6", "l3p", "alpha", "C0x", "C0y", "phi40")}
     widths = {"alpha": 0.3, "phi40": 0.35, "C0x": 0.05, "C0y": 0.05}
     while len(found) < 20:

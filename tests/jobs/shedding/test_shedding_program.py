@@ -7,6 +7,7 @@ import pytest
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
+from loomopt.jobs.shedding.scene import Frame
 from loomopt.mechanisms.cam_spline import cycloid_like
 
 SCENE = registry.load("shedding")
@@ -149,7 +150,7 @@ def test_what_a_target_lacks_is_named(scene, target, problem):
 def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
     law = {f"law_{k}": value for k, value in enumerate(cycloid_like(8))}
     adopted, target = JOB.adopted(SCENE, {"K1": 1e5, **law}, "law")
-    assert (adopted.tables["mechanism"].law, target) == ("spline", "stiffness")
-    assert adopted.tables["mechanism"].law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
+    assert (adopted.table(Frame).law, target) == ("spline", "stiffness")
+    assert adopted.table(Frame).law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
     assert adopted.limits["law_acceleration"].max == pytest.approx(2 * math.pi)
     assert JOB.adopted(SCENE, {"K1": 1e5}, "force") == (SCENE, "force")
