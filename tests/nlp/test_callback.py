@@ -11,7 +11,7 @@ from loomopt.nlp.point import Settings
 
 
 def test_every_iteration_is_reported_in_order():
-    seen = []
+    seen: list[int] = []
     task = program([("circle", 1, 1.0)])
     point = exchange.solve(task, task.starts[0], Settings(callback=IterationCallback(seen.append)))
     assert seen[0] == 0

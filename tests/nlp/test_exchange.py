@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from waves import model, objective, program
 
 from loomopt.cycle import TURN, split
 from loomopt.jobs import registry
-from loomopt.nlp import exchange
+from loomopt.nlp import exchange, ipopt
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.program.kinematics import Arcs
 from loomopt.program.sampling import Extreme, Sampler
@@ -169,10 +170,9 @@ def test_a_warm_start_goes_where_a_cold_one_goes_even_from_afar():
 
 def gives_up(monkeypatch, moved=0.0):
     """Let IPOPT give up where it would have succeeded, x moved by so much."""
-    run = exchange.run
 
     def given_up(*arguments):
-        answer = run(*arguments)
+        answer = ipopt.run(*arguments)
         x = {name: value + moved for name, value in answer.x.items()}
         return replace(answer, status="Search_Direction_Becomes_Too_Small", x=x)
 
@@ -254,7 +254,7 @@ def test_a_node_keeps_its_crank_angle_when_corners_change_their_order():
     before, after = cycle(1.0, 2.0), SimpleNamespace(cycle=cycle(2.1, 2.0))
     node = Extreme(1, 0.25, -3.0, signed=True)
     angle = float(before.angles(np.array([1]), np.array([0.25]))[0])
-    moved = exchange._carried(node, before, after)
+    moved = exchange._carried(node, before, cast(Sampler, after))
     here = float(after.cycle.angles(np.array([moved.piece]), np.array([moved.u]))[0])
     assert math.remainder(here - angle, TURN) == pytest.approx(0.0, abs=1e-14)
     assert (moved.value, moved.signed) == (-3.0, True)

@@ -31,7 +31,8 @@ def merit(task, x):
             return float(np.max(values if row in task.model.signed else np.abs(values)))
         return abs(sampler.single(row)) if level.form == "magnitude" else sampler.single(row)
 
-    return {"worst": max, "sum": sum}[level.combine](map(worth, level.rows))
+    values = [worth(row) for row in level.rows]
+    return max(values) if level.combine == "worst" else sum(values)
 
 
 KNOWN = {

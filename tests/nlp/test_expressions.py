@@ -14,6 +14,7 @@ from loomopt.nlp.families import families
 from loomopt.nlp.point import Settings
 from loomopt.program.reading import Reading
 
+CASES: list[tuple[tuple[str, ...], str, tuple[tuple[str, str], ...]]]
 CASES = [((), target, ()) for target in TARGETS]
 CASES += [((name,), "balance", ()) for name in EFFECTS] + [(EFFECTS, target, ()) for target in TARGETS]
 CASES += [
@@ -56,7 +57,7 @@ def at_nodes(name, size, nodes, at):
 def differences(program, sampler, read):
     """Return slopes (rows, variables, each scaled) of what `read` gives of a design, by differences at 40 digits."""
     exact = maths.mpmath(40)
-    step = exact.number("1e-20")
+    step = exact.number(10) ** -20
 
     def at(moved):
         values = {name: exact.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}

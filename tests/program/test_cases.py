@@ -28,7 +28,7 @@ ONE = JobModel(
 )
 FABRICS = replace(ONE, cases=(tuple(OTHER), tuple(THIRD)))
 ALL = {**NUMBERS, **{cased(n, k + 1): v for k, case in enumerate((OTHER, THIRD)) for n, v in case.items()}}
-CASES = ({}, OTHER, THIRD)
+CASES: tuple[dict[str, float], ...] = ({}, OTHER, THIRD)
 
 
 def name_of(name, case):
@@ -154,8 +154,8 @@ def test_the_least_peak_over_all_fabrics_is_that_of_brute_force(combine):
     assert dense(combine, best) == pytest.approx(value, rel=1e-6)
     tried = []
     for start in ([3000, 0.04], [5000, 0.1], [8000, 0.05]):
-        options = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000}
-        options["initial_simplex"] = [start, [start[0] * 1.3, start[1]], [start[0], start[1] + 0.03]]
+        simplex = [start, [start[0] * 1.3, start[1]], [start[0], start[1] + 0.03]]
+        options = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000, "initial_simplex": simplex}
         bounds = [(v.lower, v.upper) for v in program.variables]
         found = minimize(lambda x: dense(combine, x), start, method="Nelder-Mead", bounds=bounds, options=options)
         tried.append(found.fun)

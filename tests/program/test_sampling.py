@@ -84,7 +84,7 @@ def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
         tops = np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] > padded[2:]))
         here = [e for e in found if e.piece == piece]
         for k in tops[values[tops] > 1e-3 * sampled.peak("peak_torque")]:
-            nearest = min(here, key=lambda e, k=k: abs(e.u - k / (len(values) - 1)))
+            nearest = min(here, key=lambda e: abs(e.u - k / (len(values) - 1)))
             assert abs(nearest.value) == pytest.approx(vertex(values, k), rel=1e-10)
             signed = sampled.at("peak_torque", np.array([piece]), np.array([nearest.u]))[0]
             assert nearest.value == pytest.approx(signed, rel=1e-13)

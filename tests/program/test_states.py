@@ -188,7 +188,7 @@ def test_rows_of_the_nlp_are_those_of_40_digits():
     x0 = [program.starts[0][v.name] / v.scale for v in program.variables]
     rows, slopes = nlp.jacobian([*x0, 0.0], nlp.structure.vector(program, sampler, [1.0], nodes))
     exact = maths.mpmath()
-    step = exact.number("1e-20")
+    step = exact.number(10) ** -20
 
     def at(moved):
         values = {name: exact.number(value) for name, value in sampler.values.items()}
