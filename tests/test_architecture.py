@@ -76,8 +76,8 @@ def imports(source):
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"line {node.lineno}: imports name the whole path"
             names += [(f"{node.module}.{alias.name}", node.lineno) for alias in node.names]
-        elif isinstance(node, ast.Constant) and re.fullmatch(r"loomopt(\.\w+)+", str(node.value)):
-            names.append((node.value, node.lineno))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names += [(node.value, node.lineno)] if re.fullmatch(r"loomopt(\.\w+)+", node.value) else []
     inner = [(name.removeprefix("loomopt."), line) for name, line in names if name.startswith("loomopt.")]
     return [(name, line) for name, line in inner if room(name) in FLOOR]
 
@@ -132,7 +132,7 @@ def test_no_file_reaches_itself():
     graph = arrows()
 
     def reached(start):
-        seen, todo = set(), [start]
+        seen, todo = set[str](), [start]
         while todo:
             new = graph[todo.pop()] - seen
             seen |= new

@@ -34,7 +34,7 @@ def changed(*path_and_value):
 
 def nested(depth):
     """Return tables in tables."""
-    table = {}
+    table: dict[str, object] = {}
     for _ in range(depth):
         table = {"a": table}
     return table
@@ -278,7 +278,7 @@ def test_an_unknown_packaged_name_tells_the_nearest():
     told(caught(load, ""), "", "", "no packaged scene", "beatup, beatup-heavy")
     told(caught(load, "x\x1b[2J"), "x\\x1b[2J", "", "no packaged scene", ".toml")
     told(caught(scene, nested(50)), "<dict>", "a.a.a...", "nested too deep", "loomopt new")
-    itself = {}
+    itself: dict[str, object] = {}
     itself["again"] = itself
     told(caught(scene, itself), "<dict>", "again", "nested too deep", "loomopt new")
 

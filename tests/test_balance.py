@@ -47,7 +47,7 @@ def test_output_terms_reach_the_crank_through_q_prime_and_drive_terms_as_they_ar
     ],
 )
 def test_absent_kinds_of_terms_are_absent_from_the_sums(loads, force, torque):
-    arguments = (maths.FLOAT, loads, POSE, given(*loads), {})
+    arguments = (maths.FLOAT, loads, POSE, given(*loads), dict[str, float]())
     assert balance.output_force(*arguments) == force
     assert balance.crank_torque(*arguments) == torque
 

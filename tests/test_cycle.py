@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt import cycle
+from loomopt.effects.beatup import resistance
 from loomopt.jobs import registry
 
 TURN = 2 * math.pi
@@ -78,7 +79,7 @@ def test_a_node_is_an_affine_function_of_the_corners(a, b, c, d, u):
         offset, coefficients = found.coefficients(piece, u, 4)
         assert math.fsum(coefficients) == pytest.approx(1.0, rel=1e-15)
         here = float(found.angles(np.array([piece]), np.array([u]))[0])
-        assert cycle.node_angle(offset, coefficients, corners) == pytest.approx(here, rel=0, abs=1e-13)
+        assert cycle.node_angle(offset, coefficients, list(corners)) == pytest.approx(here, rel=0, abs=1e-13)
         there = cycle.node_angle(offset, coefficients, ca.vertsplit(symbols))
         value = float(ca.Function("f", [symbols], [there])(moved))
         distances = [abs(math.remainder(value - x, TURN)) for x in after.angles(np.arange(4), np.full(4, u))]
@@ -135,7 +136,8 @@ def test_without_corners_the_cycle_is_one_piece():
     found = cycle.split((), ("plain",), lambda angle: (0.0,))
     assert (found.pieces, found.order) == (1, ())
     assert list(found.starts) == [0.0, TURN]
-    assert found.coefficients(0, 0.25, 0) == (TURN / 4, pytest.approx([]))
+    offset, coefficients = found.coefficients(0, 0.25, 0)
+    assert (offset, list(coefficients)) == (TURN / 4, [])
     assert found.piece_before(1.0) == 0
 
 
@@ -204,7 +206,7 @@ def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     phi = curves["phi [rad]"].to_numpy()
     assert (phi[0], phi[-1]) == (0.0, pytest.approx(TURN))
     assert np.all(np.diff(phi) >= 0)
-    pulse = scene.effects["resistance"].pulse
+    pulse = scene.own(resistance.Own).pulse
     away = np.abs((phi - values["beta"] + math.pi) % TURN - math.pi)
     expected = np.where(away < pulse / 2, 745.0 * np.cos(math.pi * away / pulse), 0.0)
     assert curves["M_R [N*m]"].to_numpy() == pytest.approx(expected, rel=0, abs=1e-9)

@@ -16,6 +16,7 @@ import loomopt as lo
 from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.jobs.rapier.model import HeadPose
 from loomopt.mechanisms import crank_rocker_synthesis, rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 
@@ -84,8 +85,9 @@ def rear_dead_centre():
 def link_5_at_180():
     """Return by what angle, deg, link 5 is past the second crank's direction at 180°."""
     sampled = JOB.sampler(RAPIER, built())
-    pose = sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(math.pi, {})).joints
-    turned = rapier_drive.between(pose.second_crank, pose.dyad.link1)
+    pose = sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(math.pi, {}))
+    assert isinstance(pose, HeadPose)
+    turned = rapier_drive.between(pose.joints.second_crank, pose.joints.dyad.link1)
     return math.degrees(math.atan2(turned.y, turned.x))
 
 

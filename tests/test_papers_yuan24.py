@@ -6,9 +6,12 @@ a figure that follows from them is known within the spread of half a millimetre;
 """
 
 import csv
+import functools
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,6 +54,10 @@ def by_angles(case, l4=0.167, swing=23.08):
     theta, beta = ANGLES[case] if isinstance(case, str) else case
     found = crank_rocker_synthesis.synthesise(math.radians(theta), math.radians(beta), math.radians(swing), l4)
     return found.l1, found.l2, found.l3, found.l4
+
+
+def of_table_2(case):
+    return by_angles(case, l4=1.0)[:3]
 
 
 def angle(lengths, name):
@@ -126,7 +133,7 @@ def resistance_sign():
     return f"{ratio.iloc[0]:+.0f}"[0]
 
 
-COMPUTED = {
+COMPUTED: dict[str, Callable[[], Any]] = {
     "beta_reference": lambda: angle(REFERENCE, "beta"),
     "beta_lighter": lambda: angle(LIGHTER, "beta"),
     "beta_heavier": lambda: angle(HEAVIER, "beta"),
@@ -148,7 +155,7 @@ COMPUTED = {
     "peak_change_heavier": lambda: bend_change(HEAVIER, "peak"),
     "torque_change_inertia": lambda: 100 * (inertia_torque(REFERENCE, 0.71) / inertia_torque(REFERENCE, 0.62) - 1),
     **{
-        f"table_2_{theta}_{beta}": lambda case=(theta, beta): by_angles(case, l4=1.0)[:3]
+        f"table_2_{theta}_{beta}": functools.partial(of_table_2, (theta, beta))
         for theta, beta in itertools.product((-2, 0, 2), (60, 70))
     },
     "J4_counterweight": lambda: counterweight("J4"),

@@ -16,8 +16,10 @@ import pytest
 from loomopt import packaged
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.jobs.beatup.scene import RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load, scene
-from loomopt.scenes import Bound, Limit, Scene
+from loomopt.scene_tables import Bound, Limit
+from loomopt.scenes import Scene
 from loomopt.studies.check import served
 
 BEATUP = load("beatup")
@@ -57,7 +59,9 @@ def test_the_packaged_scene_reads_in_SI():
         ("resistance", {"pulse": pytest.approx(math.radians(29.8), rel=1e-15)}),
     ]
     assert BEATUP.bounds["l1"] == Bound(0.03, 0.035, True, "mm")
-    assert BEATUP.limits["mu_min"] == Limit(pytest.approx(math.radians(56.5), rel=1e-15), None, "deg")
+    least = BEATUP.limits["mu_min"]
+    assert least == Limit(least.min, None, "deg")
+    assert least.min == pytest.approx(math.radians(56.5), rel=1e-15)
 
 
 @pytest.mark.parametrize("name", packaged.problem_names())
@@ -67,7 +71,7 @@ def test_packaged_scenes_are_complete(name):
     assert found.title
     assert found.source
     for target in served(found):
-        assert found.targets[target].expected is not None
+        assert found.targets[target].model_dump()["expected"] is not None
     for effect in set(found.schema.effects) - set(found.effects):
         assert effect in found.with_effect(effect).effects
 
@@ -183,8 +187,8 @@ def test_bounds_that_hold_free_and_fix():
 
 def test_targets_have_their_own_values():
     found = BEATUP.set("targets.torque.M3_tolerance", "5 N*m").set("targets.retrofit.weights.l1", 3)
-    assert found.targets["torque"].M3_tolerance == 5.0
-    assert found.targets["retrofit"].weights == {"l1": 3.0}
+    assert found.table(TorqueTarget).M3_tolerance == 5.0
+    assert found.table(RetrofitTarget).weights == {"l1": 3.0}
     assert list(scene(edited({"targets": {}})).targets) == list(BEATUP.schema.targets)
 
 
@@ -268,7 +272,7 @@ def test_reading_imports_little():
 
 def test_the_scene_type_is_frozen():
     with pytest.raises(AttributeError):
-        BEATUP.name = "other"
+        BEATUP.name = "other"  # type: ignore[misc]
     assert isinstance(BEATUP, Scene)
 
 

@@ -15,6 +15,7 @@ from loomopt.jobs.registry import load
 from loomopt.owned import label, owned
 from loomopt.program import numbers
 from loomopt.quantities import Length, PositiveMass
+from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Figure, Table
 
 BEATUP = load("beatup")
@@ -96,9 +97,9 @@ def test_labels_with_dots_may_be_bounded_freed_and_limited():
     limits = {"rod": {"tension": {"max": "5 kN"}}}
     found = built({"effects": {"mass": TWO}, "bounds": bounds, "limits": limits})
     assert {"rod.m", "rod.at", "A.x", "l1"} <= set(found.bounds)
-    assert found.bounds["rod.m"] == scenes.Bound(1.0, 2.0, False, "kg")
+    assert found.bounds["rod.m"] == Bound(1.0, 2.0, False, "kg")
     assert found.bounds["A.x"].max == 0.002
-    assert found.limits["rod.tension"] == scenes.Limit(None, 5000.0, "kN")
+    assert found.limits["rod.tension"] == Limit(None, 5000.0, "kN")
     freed = found.free("rod.m")
     assert freed.bounds["rod.m"].free
     assert freed.set("bounds.rod.m.max", "2500 g").bounds["rod.m"].max == 2.5

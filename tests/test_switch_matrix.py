@@ -100,7 +100,7 @@ def sampler_of(combination):
 @functools.cache
 def table_of(combination):
     design = DESIGNS.get(combination.job, {})
-    return registry.find(combination.job).curves(scene_of(combination), design, steps=1, also=PHI)
+    return registry.find(combination.job).curves(scene_of(combination), design, steps=1, also=PHI.tolist())
 
 
 def at_phi(table, column):
