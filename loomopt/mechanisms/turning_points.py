@@ -1,4 +1,4 @@
-"""Where a motion turns: sought between samples, then followed in any number system by Newton's method."""
+"""Where a motion turns: sought between samples, then followed in any number system by Halley's step."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,18 +10,18 @@ from loomopt.maths import Number
 
 Floats = NDArray[np.float64]
 SAMPLES = 720
-STEPS = 2
-"""Newton steps from a hint that is right in float64: one makes the value right to first order in the design, and both
-make it right to second order, as curvatures need (the first derivative of the value's error is of the first order)."""
 
 
-def newton(rates: Callable[[Number], tuple[Number, Number]], hint: Number) -> Number:
-    """Return the root near a hint, so that it moves with the design; rates(x): a function's value and slope."""
-    found = hint
-    for _ in range(STEPS):
-        value, slope = rates(found)
-        found = found - value / slope
-    return found
+def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Number) -> Number:
+    """Return the root near a hint that is right in float64, so that it moves with the design to second order.
+
+    rates(x): a function's value f, slope f' and bend f''. Halley's step, x − 2 f f'/(2 f'² − f f''): value, gradient and
+    curvature with respect to the design are those of the root, for its error is of the third order. One step of Newton
+    is right to first order only; two are right too, but at a design that has moved far from the hint the second
+    starts where the first has thrown it.
+    """
+    value, slope, bend = rates(hint)
+    return hint - 2 * value * slope / (2 * slope * slope - value * bend)
 
 
 def turns(slope: Callable[[Floats], Any]) -> list[float]:

@@ -124,13 +124,13 @@ class RapierDrive:
             given = Given({**values, **found}, {})
             hints = [values[name] for name in itertools.takewhile(values.__contains__, map(_turn, itertools.count()))]
             found[TURNS] = tuple(
-                turning_points.newton(lambda phi: self._rates(maths, given, phi), hint) for hint in hints
+                turning_points.followed(lambda phi: self._rates(maths, given, phi), hint) for hint in hints
             )
         return found
 
-    def _rates(self, maths: Maths, given: Given, phi: Number) -> tuple[Number, Number]:
+    def _rates(self, maths: Maths, given: Given, phi: Number) -> tuple[Number, Number, Number]:
         pose = self.pose(maths, given, Node(phi, {}))
-        return pose.q1, pose.q2
+        return pose.q1, pose.q2, pose.q3
 
     def pose(self, maths: Maths, given: Given, node: Node) -> HeadPose:
         """Return the pose at crank angles φ1, rad."""

@@ -18,7 +18,7 @@ from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, mirrored, piece_at, segment_at
-from loomopt.mechanisms.turning_points import newton
+from loomopt.mechanisms.turning_points import followed
 from loomopt.program.kinematics import Arcs, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.schema import Table, Values
@@ -172,11 +172,11 @@ class CamFrame:
         if self.law.symmetric or MIDDLE not in values:
             return Fraction(1, 2)
 
-        def rates(u: Number) -> tuple[Number, Number]:
+        def rates(u: Number) -> tuple[Number, Number, Number]:
             there = self.law.at(maths, values, u, values[MIDDLE_PIECE])
-            return 2 * there.s - 1, 2 * there.s1
+            return 2 * there.s - 1, 2 * there.s1, 2 * there.s2
 
-        return newton(rates, values[MIDDLE])
+        return followed(rates, values[MIDDLE])
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         """Return where a law that is not symmetric passes the middle of the shed, and on which piece."""
