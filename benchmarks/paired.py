@@ -4,8 +4,8 @@ Two worker processes do the same piece of work in turn, over and over, so that n
 the processor's time, so that other work on the machine counts little. "Built" is a solve with no NLP built before;
 "cold" one from the job's own starts; "warm" one from a neighbour's answer; "certificate" is part of the cold one.
 
-    git worktree add /tmp/before TAG
-    python benchmarks/paired.py /tmp/before [--repeats N] [--only JOB] [--json]
+    git worktree add ../before TAG
+    python benchmarks/paired.py ../before [--repeats N] [--only JOB] [--json]
 """
 
 import functools

@@ -5,8 +5,8 @@ A case is the same when its status, its binding limits and the keys of its JSON 
 relaxation is the same to 1e-9; of a refusal, when its words are. Every exception is printed; the exit code says
 whether there are any.
 
-    git worktree add /tmp/before TAG
-    python benchmarks/same_answers.py /tmp/before [--only SCENE] [--json]
+    git worktree add ../before TAG
+    python benchmarks/same_answers.py ../before [--only SCENE] [--json]
 """
 
 import sys
