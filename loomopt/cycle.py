@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from loomopt.maths import Number
 from loomopt.schema import Values
+from loomopt.tolerances import SAME_ANGLE
 
 TURN = 2 * math.pi
-SAME_ANGLE = 1e-12
-"""rad; a piece that ends this close before an angle is taken to end at it."""
 Floats = NDArray[np.float64]
 Pieces = NDArray[np.intp]
 Where = tuple[str, float]

@@ -110,7 +110,7 @@ DRAWS = 200
 
 TOUCHING, SETTLED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
-ROOT_OF_ROUNDING both, for a maximum's place is known no better."""
+both the root of rounding, for a maximum's place is known no better."""
 
 POLISH_STEPS, POLISH_FARTHEST, POLISH_RANK = 3, 1e-6, 1e-10
 """Newton steps of polishing (1e-6 squared twice is past rounding), the farthest they may lead, a thousand times what
@@ -138,7 +138,7 @@ PIVOT_MET, PIVOT_STATIONARY = 1e-12, 1e-9
 
 PIVOT_DEPENDENT, PIVOT_CURVED = 1e-7, 1e-6
 """Part of a slope outside the span of others below which it depends on them, and curvature below which a direction is
-flat: both the size of what second derivatives change over a move of ROOT_OF_ROUNDING to 1e-7. Ten times more or less
+flat: both the size of what second derivatives change over a move of 1e-8 to 1e-7. Ten times more or less
 changes no answer (tests/nlp/test_pivot.py holds them to a thousand)."""
 
 PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10

@@ -15,10 +15,7 @@ from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import spikes
 from loomopt.schema import Values
-from loomopt.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR
-
-SAMPLES = 361
-"""Crank angles of one turn, evenly spread, between which a singular position is sought."""
+from loomopt.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR, SINGULAR_SAMPLES, WORTH_A_LOOK
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""
@@ -55,9 +52,9 @@ class Group:
 
 def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
     """Return the crank angle, rad, of the highest value where it is worth a closer look."""
-    angles = np.linspace(0.0, 2 * math.pi, SAMPLES)
-    top, step = float(angles[int(np.argmax(height(angles)))]), 2 * math.pi / (SAMPLES - 1)
-    if height(np.array([top]))[0] <= 1 - 10 * NEARLY_SINGULAR:
+    angles = np.linspace(0.0, 2 * math.pi, SINGULAR_SAMPLES)
+    top, step = float(angles[int(np.argmax(height(angles)))]), 2 * math.pi / (SINGULAR_SAMPLES - 1)
+    if height(np.array([top]))[0] <= 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
         return ()
     return (spikes.sectioned(height, top - step, top + step),)
 

@@ -11,12 +11,11 @@ from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Objective, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
+from loomopt.tolerances import START_ROOM
 
 Bounds = Mapping[str, tuple[float, float]]
 """Lower and upper bound of numbers by full name, SI."""
 LEAST_CHANGE = "least change from today"
-ROOM = 0.01
-"""Share of a bound's width that a start keeps from its ends."""
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -131,7 +130,7 @@ def inside(variables: Iterable[Variable], values: Mapping[str, float]) -> dict[s
     """Return a start: values, or lower bounds, moved just inside the bounds of the variables."""
     start = {}
     for v in variables:
-        room = ROOM * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
+        room = START_ROOM * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
         start[v.name] = min(max(values.get(v.name, v.lower), v.lower + room), v.upper - room)
     return start
 

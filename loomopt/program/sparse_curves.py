@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from loomopt.cycle import SAME_ANGLE, TURN, Floats
+from loomopt.cycle import TURN, Floats
 from loomopt.program import spikes
 from loomopt.program.curves import ANGLE
 from loomopt.program.sampling import Sampler
 from loomopt.tolerances import (
     ROUNDED,
+    SAME_ANGLE,
     SPARSE_LEVEL,
     SPARSE_MOST_ROWS,
     SPARSE_NEARLY,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from loomopt import maths
-from loomopt.cycle import SAME_ANGLE, TURN, Floats, Node
+from loomopt.cycle import TURN, Floats, Node
 from loomopt.maths import Maths, Number
 from loomopt.nlp import slopes
 from loomopt.program.sampling import Sampler, Tally
@@ -15,7 +15,7 @@ from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
-from loomopt.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
+from loomopt.tolerances import EXTREME_STEPS, REFERENCE_SLOPE, SAME_ANGLE
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"

@@ -20,3 +20,8 @@ def test_one_variable_stands_above_each_group_and_one_family_for_each_row():
     assert epigraphs(program(limit, (objective("x", "value", ("y",), "sum"),))) == ()
     assert epigraphs(worst, elastic=True) == ()
     assert families(worst, elastic=True) == [Family("wave", limit=0)]
+
+
+def test_a_family_stands_below_one_thing_only():
+    task = program([("wave", 1, 9.0)], (objective("circle", "peak"),))
+    assert [(family.epigraph, family.limit) for family in families(task)] == [(0, -1), (-1, 0)]

@@ -25,6 +25,7 @@ from loomopt.program.program import Limit, Move, Objective, Program, Variable, W
 from loomopt.program.sampling import Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.scenes import Scene
+from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
 SLOWER = 0.9
@@ -171,7 +172,7 @@ class _Task:
     def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
         found = []
-        room = scene_numbers.ROOM
+        room = START_ROOM
         for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
             start = inside(variables, self.known)
             for v in variables:
