@@ -22,6 +22,7 @@ class SceneSchema:
     fault(design): why a design, SI, cannot work as this mechanism; "" when it can.
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
     groups: name → bounds that --free frees together.
+    partly_known: whether the job honours loads that are known on some pieces of the cycle only.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
     """
 
@@ -40,6 +41,7 @@ class SceneSchema:
     own_margins: Mapping[str, str] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)
+    partly_known: bool = False
 
     @property
     def figures(self) -> dict[str, Figure]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
-from loomopt.effects.kinds import UNBUILT, Check, Effect, instance
+from loomopt.effects.kinds import UNBUILT, Check, Effect, Load, instance
 from loomopt.owned import label
 from loomopt.quantities import Quantity, quantity_of, unit_of
 from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
@@ -132,6 +132,11 @@ def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Eff
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
             raise missing(type(tables[path]), origin, path, name, f"{who} needs it")
+    for effect, own in active.items():
+        words = {key: value for key, value in own if isinstance(value, str)}
+        if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
+            problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
+            raise refusal(problem, origin, f"effects.{effect.name}", remedy="Take it off, or choose other values")
 
 
 def places(

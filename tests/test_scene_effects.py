@@ -11,6 +11,7 @@ from loomopt.effects.beatup import inertia, rocker_inertia
 from loomopt.effects.kinds import Event, Load, Speed, State, ranked
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
+from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.owned import label, owned
 from loomopt.program import numbers
@@ -175,3 +176,23 @@ def test_a_scene_with_every_effect_pickles_to_the_same_scene(name):
     assert again == scene
     assert (again.hash, again.active, again.jobs) == (scene.hash, scene.active, scene.jobs)
     assert again.set("problem.title", "another").effects == scene.effects
+
+
+@pytest.mark.parametrize(("job", "refused"), [("beatup", True), ("rapier", True), ("shedding", False)])
+def test_a_load_known_in_part_of_the_cycle_is_refused_by_jobs_that_cannot_judge_it(job, refused, monkeypatch):
+    partly = Load(
+        name="partly",
+        summary="known in some stretch only",
+        own=Table,
+        acts="output",
+        force=lambda maths, pose, given, own, switch: 0 * pose.q,
+        known_in=lambda words: (("segment", 1.0), ("segment", 3.0)),
+    )
+    monkeypatch.setattr(registry, "_brought", lambda job, name: partly)
+    raw = load(job).document
+    document = {**raw, "effects": {**raw.get("effects", {}), "partly": {}}}
+    if not refused:
+        assert "partly" in registry.scene(document).effects
+        return
+    with pytest.raises(BadInput, match="partly is known in part of the cycle only"):
+        registry.scene(document)

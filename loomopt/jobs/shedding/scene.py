@@ -237,4 +237,5 @@ SCHEMA = SceneSchema(
     fault=fault,
     groups={"rise": SEGMENTS},
     lists={"law": "number"},
+    partly_known=True,
 )
