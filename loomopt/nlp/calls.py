@@ -33,10 +33,10 @@ class Calls:
         """Return the local extremes of each family's quantity, largest first."""
         return [sampler.extremes(family.row, family.where) for family in self.families]
 
-    def transcribed(self, sampler: Sampler, nodes: int, warm: bool) -> Transcription:
-        """Return the NLP with room for that many nodes a family, its solver made; charges what had to be built."""
+    def transcribed(self, sampler: Sampler, nodes: Sequence[Sequence[Extreme]], warm: bool) -> Transcription:
+        """Return the NLP with room for nodes of each family, its solver made; charges what had to be built."""
         slots = FIRST_SLOTS
-        while slots < nodes:
+        while any(len(of) > slots for of in nodes):
             slots *= 2
         began = time.perf_counter()
         nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)

@@ -103,7 +103,7 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
 
     A point of failure where what the solver reached has no real cycle; iterations: of the rounds before.
     """
-    nlp = calls.transcribed(here.sampler, max(map(len, here.nodes), default=0), warm=bool(here.raw))
+    nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
     extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
     answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.raw)
     iterations += answer.iterations
@@ -162,8 +162,8 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
 
 def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
     """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
-    grown = max(map(len, here.nodes), default=0) > nlp.slots or here.sampler.corner_count != nlp.structure.corners
-    if calls.elastic or grown:
+    grown = any(len(of) > nlp.slots for of in here.nodes)
+    if calls.elastic or grown or here.sampler.corner_count != nlp.structure.corners:
         return False
     arguments = calls.arguments(nlp, here.sampler, here.x, extra, here.nodes)
     rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()

@@ -90,7 +90,7 @@ def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> P
     """Return the point that pivots lead to from another, with nodes on the extremes; None without one."""
     variables = len(calls.program.variables)
     nodes = [_chosen(of, old) for of, old in zip(extremes, point.binding, strict=True)]
-    nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
+    nlp = calls.transcribed(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, point.x, np.asarray(point.raw["extra"]), nodes)
     first = nlp.rows - len(calls.families) * nlp.slots
     # Binding nodes come first in their family.

@@ -62,4 +62,7 @@ def run(
 
 def _padded(multipliers: Floats, size: int) -> Floats:
     """Return multipliers for an NLP that has grown by empty rows at its end."""
-    return np.concatenate([multipliers, np.zeros(max(0, size - len(multipliers)))])[:size]
+    padded = np.zeros(size)
+    common = min(size, len(multipliers))
+    padded[:common] = multipliers[:common]
+    return padded

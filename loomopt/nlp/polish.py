@@ -79,7 +79,7 @@ def _newton(
 
     None where there is no such point nearby.
     """
-    nlp = calls.transcribed(sampler, max(map(len, nodes), default=0), warm=False)
+    nlp = calls.transcribed(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
     first = nlp.rows - len(calls.families) * nlp.slots
     used = ~np.array(calls.idle_rows(nlp, nodes)[first:], dtype=bool)

@@ -25,7 +25,7 @@ def put(task, elastic=False, nodes=2):
     sampler = calls.sampler(X)
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
-    nlp = calls.transcribed(sampler, nodes, warm=False)
+    nlp = calls.transcribed(sampler, chosen, warm=False)
     extra = calls.first_extra(nlp, sampler, peaks)
     return calls, nlp, calls.arguments(nlp, sampler, X, extra, chosen), chosen
 
@@ -64,15 +64,18 @@ def test_equalities_and_idle_slots_have_bounds_of_their_own():
 @pytest.mark.parametrize(("nodes", "slots"), [(0, 6), (6, 6), (7, 12), (13, 24)])
 def test_room_for_nodes_is_doubled_when_it_is_used_up(nodes, slots):
     calls = calls_of(program((), (objective("circle", "peak"),)))
-    assert calls.transcribed(calls.sampler(X), nodes, warm=False).slots == slots
+    sampler = calls.sampler(X)
+    of = [Extreme(0, k / 20, 1.0) for k in range(nodes)]
+    assert calls.transcribed(sampler, [of], warm=False).slots == slots
+    assert calls.transcribed(sampler, [[], of, of[:3]], warm=False).slots == slots
 
 
 def test_only_what_is_built_anew_is_charged():
     task = program([("wave", 1, 123.0)], (objective("other bowl"),))
     first, second = calls_of(task), calls_of(task)
-    nlp = first.transcribed(first.sampler(X), 3, warm=False)
+    nlp = first.transcribed(first.sampler(X), [], warm=False)
     assert first.built > 0.0
-    assert second.transcribed(second.sampler(X), 3, warm=False) is nlp
+    assert second.transcribed(second.sampler(X), [], warm=False) is nlp
     assert second.built == 0.0
 
 

@@ -148,6 +148,8 @@ def test_a_secant_through_two_rounds_points_to_where_extremes_stand_still():
     assert [e.value for e in aimed[0]] == [1.0, 1.0]
     outside = follow._aimed(extremes, [extremes[0][0]], change([0.1], [-0.2]), change([0.3], [-0.3]))
     assert outside[0][0].u == 0.0, "no node leaves its piece"
+    outside = follow._aimed(extremes, [extremes[0][0]], change([0.9], [0.2]), change([0.7], [0.3]))
+    assert outside[0][0].u == 1.0
 
 
 @pytest.mark.parametrize("last", [None, change([0.8, 0.1], [-0.2, 0.0]), change([0.8], [-0.1])])

@@ -19,8 +19,9 @@ def begun(task, nodes=1):
     calls = Calls(task, Settings(), False)
     sampler = calls.sampler(X)
     peaks = calls.peaks(sampler)
-    nlp = calls.transcribed(sampler, nodes, warm=False)
-    return calls, nlp, sampler, calls.first_extra(nlp, sampler, peaks), [of[:nodes] for of in peaks]
+    chosen = [of[:nodes] for of in peaks]
+    nlp = calls.transcribed(sampler, chosen, warm=False)
+    return calls, nlp, sampler, calls.first_extra(nlp, sampler, peaks), chosen
 
 
 def run(task, raw=None):
@@ -97,5 +98,6 @@ def test_evaluations_are_counted_with_the_nodes_they_look_at(monkeypatch):
     assert ipopt.run(calls, nlp, sampler, X, extra, nodes, {}).iterations == 4
     assert Tally.positions - before == 12 * 2
     before = Tally.positions
-    ipopt.run(calls, nlp, sampler, X, extra, [[], []], {})
+    del calls_made["iter_count"]
+    assert ipopt.run(calls, nlp, sampler, X, extra, [[], []], {}).iterations == 0, "it did not come to iterate"
     assert Tally.positions - before == 12, "a program without nodes is one position"

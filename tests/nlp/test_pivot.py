@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
+from loomopt.nlp import pivot
 from loomopt.nlp.pivot import active_by, reach
 
 WIDE = 10.0
@@ -223,6 +224,20 @@ def test_held_variables_stay_active_and_give_way_to_none():
     assert found.x == pytest.approx([1.25, 0.25], abs=1e-12)
     assert list(found.active) == [True, True, False, False, False]
     assert found.multipliers == pytest.approx([1, 1, 0, 0, 0], abs=1e-12)
+
+
+def test_a_step_along_curvature_is_newton_s(monkeypatch):
+    """Each of these takes two looks: one that moves, and one that finds nothing left."""
+    monkeypatch.setattr(pivot, "PIVOTS", 2)
+    slid = reach(curved([0, -1e-5], [[1, 0], [0, 1e-4]], [[1, 0]], [0.0]), call([0, 0], rows=1), bound([1]), 5.0)
+    assert slid.x == pytest.approx([0, 0.1], abs=1e-9)
+    let_go = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
+    assert reach(let_go, call([1, 0], rows=2), bound([1, 1]), 5.0).x == pytest.approx([1, -0.1], abs=1e-9)
+    first_in_the_way = programme([-2, -1], 0, [[1, 0], [0, 1], [-1, 0]], [0.3, 1, 0])
+    found = reach(first_in_the_way, call([0, 1], rows=3), bound([0, 1, 1]), 5.0)
+    assert found.x == pytest.approx([0.3, 1], abs=1e-12)
+    stopped = programme([-1, -1], 2, [[1, -1], [1, 1]], [0.0, 0.6])
+    assert reach(stopped, call([0.1, 0.1], rows=2), bound([1, 0]), 5.0).x == pytest.approx([0.3, 0.3], abs=1e-12)
 
 
 def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():

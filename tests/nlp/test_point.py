@@ -46,3 +46,7 @@ def test_a_linkage_that_does_not_assemble_has_no_sampler(lengths):
     scene = registry.load("beatup")
     task = registry.of(scene).program(scene, "balance")
     assert sampler_at(task, {**task.starts[0], **lengths}) is None or lengths == {"l1": 0.0}
+
+
+def test_what_is_not_said_is_as_usual():
+    assert Settings() == Settings(1e-8, 1000.0, None, 0, 0.0, "exact", True, 0)

@@ -53,3 +53,74 @@ def test_what_clashes_is_left_as_it_is():
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
     assert polish.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
     assert polish.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
+
+
+def bare(lower=(-9.0, -9.0), upper=(9.0, 9.0)):
+    """Return arguments of an NLP of two variables and one row."""
+    ends = {"lbx": np.array(lower), "ubx": np.array(upper), "ubg": np.zeros(1), "lbg": np.full(1, -np.inf)}
+    return {**ends, "p": None}
+
+
+def row(value):
+    """Return a row that is always worth the same."""
+    return lambda x, p: (np.array([value]), np.zeros((1, 2)))
+
+
+def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
+    return polish.met(nlp, arguments, np.array(x), polish.binding(np.array(lam_x), np.array(lam_g)))
+
+
+def test_what_binds_at_its_bound_is_put_on_it():
+    arguments = bare((0.0, -9.0), (9.0, 1.0))
+    assert list(holds(row(-1.0), arguments, (1e-7, 1.0 - 1e-7), (-1.0, 1.0))) == [0.0, 1.0]
+    assert list(holds(row(-1.0), arguments, (1e-6, 0.5), (-1.0, 0.0))) == [0.0, 0.5], "just not too far"
+    assert holds(row(-1.0), arguments, (2e-6, 0.5), (-1.0, 0.0)) is None
+    assert list(holds(row(-1.0), arguments, (1e-7, 0.5), (-1e-6, 0.0))) == [1e-7, 0.5], "no multiplier to speak of"
+
+
+def test_rounding_beyond_a_bound_is_cut_and_more_is_refused():
+    arguments = bare((0.0, -9.0), (9.0, 0.0))
+    assert list(holds(row(-1.0), arguments, (-1e-12, 1e-12))) == [0.0, 0.0]
+    assert holds(row(-1.0), arguments, (-1.1e-12, 0.0)) is None
+    assert holds(row(-1.0), arguments, (0.0, 1.1e-12)) is None
+
+
+def test_rounding_beyond_a_row_passes_and_more_is_refused():
+    equal = bare() | {"lbg": np.zeros(1)}
+    for value, arguments, passes in (
+        (1e-12, bare(), True),
+        (1.1e-12, bare(), False),
+        (-1.0, bare(), True),
+        (-1e-12, equal, True),
+        (-1.1e-12, equal, False),
+    ):
+        assert (holds(row(value), arguments, (0.5, 0.5)) is not None) is passes
+
+
+def test_only_a_multiplier_above_the_threshold_binds():
+    bound = polish.binding(np.array([1e-6, -1e-6]), np.array([1e-6, 1.1e-6]))
+    assert list(bound.rows) == [False, True]
+    assert not bound.at_upper.any()
+    assert not bound.at_lower.any()
+
+
+def test_idle_rows_are_no_rows():
+    arguments = bare() | {"ubg": np.ones(1)}
+    assert list(holds(row(0.5), arguments, (0.5, 0.5), lam_g=(1.0,))) == [0.5, 0.5]
+
+
+def test_no_number_is_no_point():
+    assert holds(row(-1.0), bare(), (np.nan, 0.5)) is None
+    assert holds(row(np.nan), bare(), (0.5, 0.5), lam_g=(1.0,)) is None
+
+
+def test_newton_s_steps_meet_a_curved_row():
+    def circle(x, p):
+        return np.array([x @ x - 1.0]), 2 * x[None, :]
+
+    arguments = bare() | {"lbg": np.zeros(1)}
+    start = np.array([0.6, 0.8]) + 3e-7
+    met = holds(circle, arguments, start, lam_g=(1.0,))
+    assert met @ met == pytest.approx(1.0, abs=1e-15)
+    assert np.abs(met - start).max() < 1e-6
+    assert abs((met - start) @ np.array([0.8, -0.6])) < 1e-12, "the least change"
