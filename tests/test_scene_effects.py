@@ -10,8 +10,8 @@ from loomopt import scenes
 from loomopt.effects.beatup import inertia, rocker_inertia
 from loomopt.effects.kinds import Event, Load, Speed, State, ranked
 from loomopt.errors import BadInput
-from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
 from loomopt.jobs import registry
+from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load
 from loomopt.owned import label, owned
 from loomopt.program import numbers
