@@ -12,6 +12,7 @@ from hard_digits import CENTRES, EPS, MP, centres, exact, motion, transmission, 
 
 import loomopt as lo
 from loomopt import maths
+from loomopt.effects.beatup import inertia
 from loomopt.mechanisms import crank_rocker, dyad
 from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 
@@ -81,7 +82,7 @@ def draws(name, cases=None):
     chosen = list(itertools.islice(((sides, place) for sides, place in tried if turns(*sides)), DRAWS))
     assert len(chosen) == DRAWS
     for number, (sides, place) in enumerate(chosen):
-        lengths = Lengths(*map(float, sides), int(random.choice([-1, 1])))
+        lengths = Lengths(*[*map(float, sides), int(random.choice([-1, 1]))])
         if place == "dead centre":
             stands = dead_centres(maths.FLOAT, lengths)
             yield lengths, float(random.choice([stands.beta, math.pi + stands.beta_r]))
@@ -203,8 +204,8 @@ def test_peaks_of_a_machine_next_to_its_change_point_are_the_true_ones():
     near = np.geomspace(1e-9, 0.5, 20001)
     lengths = Lengths(l1, l2, l3, scene.mechanism["l4"])
     _, rate, bend = crank_rocker.curves(lengths, np.concatenate([math.pi - near, math.pi + near]))
-    inertia = scene.effects["inertia"].J4 * scene.operation["speed"] ** 2
-    assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(inertia * np.abs(rate * bend).max(), rel=1e-4)
+    steady = scene.own(inertia.Own).J4 * scene.operation["speed"] ** 2
+    assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(steady * np.abs(rate * bend).max(), rel=1e-4)
 
 
 @pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
@@ -215,8 +216,8 @@ def test_peaks_are_right_as_near_to_a_change_point_as_designs_may_come(share):
     near = np.geomspace(1e-9, 0.5, 200_001)
     lengths = Lengths(l1, l2, l3, scene.mechanism["l4"])
     _, rate, bend = crank_rocker.curves(lengths, np.concatenate([math.pi - near, math.pi + near]))
-    inertia = scene.effects["inertia"].J4 * scene.operation["speed"] ** 2
-    assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(inertia * np.abs(rate * bend).max(), rel=1e-7)
+    steady = scene.own(inertia.Own).J4 * scene.operation["speed"] ** 2
+    assert lo.evaluate(scene).figures["peak_torque"] == pytest.approx(steady * np.abs(rate * bend).max(), rel=1e-7)
 
 
 # Dead centres ----------------------------------------------------------------------------------------------------

@@ -58,8 +58,8 @@ def named(thing, names):
 @given(crank_rockers(), angles)
 def test_crank_rocker_angles_and_their_derivatives(lengths, phi):
     def formulas(system, *numbers):
-        *links, angle = numbers
-        sized = Lengths(*links, lengths.side)
+        l1, l2, l3, l4, angle = numbers
+        sized = Lengths(l1, l2, l3, l4, lengths.side)
         spans = {of.__name__: of(system, sized, angle) for of in (crank_rocker.span_far, crank_rocker.span_near)}
         return named(Pose(system, sized, angle), OF_POSE) | spans
 
@@ -69,7 +69,8 @@ def test_crank_rocker_angles_and_their_derivatives(lengths, phi):
 @given(crank_rockers(nearest=1e-12), st.sampled_from([0.0, math.pi]), powers(-12, 0), st.sampled_from([-1, 1]))
 def test_crank_rocker_angles_where_the_linkage_is_nearly_flat(lengths, flat, off, way):
     def formulas(system, *numbers):
-        return named(Pose(system, Lengths(*numbers[:4], lengths.side), numbers[4]), OF_POSE)
+        l1, l2, l3, l4, angle = numbers
+        return named(Pose(system, Lengths(l1, l2, l3, l4, lengths.side), angle), OF_POSE)
 
     assert_right(formulas, sides_of(lengths), MOST, flat + way * off)
 
@@ -77,7 +78,8 @@ def test_crank_rocker_angles_where_the_linkage_is_nearly_flat(lengths, flat, off
 @given(crank_rockers(nearest=1e-12))
 def test_dead_centres_and_transmission_angles(lengths):
     def formulas(system, *numbers):
-        sized = Lengths(*numbers, lengths.side)
+        l1, l2, l3, l4 = numbers
+        sized = Lengths(l1, l2, l3, l4, lengths.side)
         ends = {
             "near": crank_rocker.transmission_angle_near(system, sized),
             "far": crank_rocker.transmission_angle_far(system, sized),

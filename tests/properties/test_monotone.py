@@ -1,6 +1,7 @@
 """What grows or falls with what: the least spring with its loads, peaks with the cloth, optima with their limits."""
 
 import functools
+from collections.abc import Mapping
 
 import pytest
 from hypothesis import given, settings
@@ -155,7 +156,8 @@ OF_DRIVE = {
     "bounds.C0y.min": (174.2173, 170, "mm"),
 }
 OF_SPRING = {"bounds.X0.max": (80, 120, "mm"), "operation.N_min": (50, 0, "N"), "bounds.K1.max": (400, 500, "kN/m")}
-TASKS = {
+Ranges = Mapping[str, tuple[float, float, str]]
+TASKS: dict[tuple[str, str], tuple[Ranges, tuple[str, ...]]] = {
     ("beatup", "balance"): (LENGTHS | OF_LINKAGE, ("M3_fdc", "peak_torque")),
     ("beatup", "torque"): (LENGTHS | OF_LINKAGE | {"targets.torque.M3_tolerance": (2, 30, "N*m")}, ("peak_torque",)),
     ("beatup", "pulse"): (LENGTHS | OF_LINKAGE, ("pulse_rms",)),
@@ -186,12 +188,13 @@ def test_a_looser_limit_never_makes_an_optimum_worse(job, target):
         answers = []
         for step in (0, 1):
             changes = {}
-            for name, (tight, loose, unit) in limits.items():
+            for name, (low, high, unit) in limits.items():
                 share, more = drawn[name]
                 share += step * (1 - share) * more
-                changes[name] = f"{tight + share * (loose - tight)!r} {unit}"
+                changes[name] = f"{low + share * (high - low)!r} {unit}"
             answers.append(solved(lo.load(job).update(changes), target))
-        assert not worse(*reversed(answers), figures)
+        tight, loose = answers
+        assert not worse(loose, tight, figures)
 
     holds()
 

@@ -77,7 +77,7 @@ def test_an_optimum_moved_in_any_direction_is_refused(name):
     refused()
 
 
-TIGHTER = {
+TIGHTER: dict[str, dict[str, tuple[float, float, str]]] = {
     "beatup torque": {"limits.mu_min.min": (56.5, 57.5, "deg"), "bounds.l1.min": (30, 31, "mm")},
     "beatup pulse": {"limits.swing.min": (22.9, 23.3, "deg"), "bounds.l4.max": (167, 165, "mm")},
     "rapier stroke-dwell": {"operation.dwell_after": (30, 32, "deg"), "bounds.l3p.max": (260, 250, "mm")},

@@ -221,7 +221,7 @@ def least_peak(machine, start, firm=(), equal=()):
 
 def random_designs(machine, count, seed):
     """Return designs drawn within the bounds that close all round, whatever their limits."""
-    generator, found = np.random.default_rng(seed), []
+    generator, found = np.random.default_rng(seed), list[dict[str, float]]()
     while len(found) < count:
         trial = {name: float(generator.uniform(*machine.bounds[name])) for name in DESIGN}
         with np.errstate(all="ignore"):

@@ -130,7 +130,7 @@ def test_the_best_answer_estimates_no_more_than_it_promises(name):
 def test_the_best_optimum_has_the_digits_that_other_solvers_found(name):
     """Twelve digits, printed with the packaged scene: SciPy from many starts, 40-digit arithmetic."""
     scene, target, figure = JOBS[name]
-    expected = float(str(scene.targets[target].expected[figure]).split()[0])
+    expected = float(str(scene.targets[target].model_dump()["expected"][figure]).split()[0])
     for accuracy in ACCURACIES:
         found = solved(name, accuracy).figures[figure]
         assert found == pytest.approx(expected, rel=min(accuracy, 1e-3)), accuracy
@@ -241,7 +241,7 @@ def highest(name):
     also = np.concatenate([sampler.cycle.angles(*sampler.grid(20_000)), math.pi + np.geomspace(1e-8, 1e-3, 1000)])
     also = also % (2 * math.pi)
     for _ in range(4):
-        columns = job.curves(scene, today, 360, also)
+        columns = job.curves(scene, today, 360, also.tolist())
         phi = columns["phi [rad]"]
         tops = {int(np.nanargmax(np.abs(values))) for key, values in columns.items() if key != "phi [rad]"}
         around = [np.linspace(phi[max(k - 1, 0)], phi[min(k + 1, len(phi) - 1)], 201) for k in tops]

@@ -12,7 +12,7 @@ from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8
 MILLIONTH = 1e-6
-OPTIMA = {
+OPTIMA: dict[str, tuple[str, str, dict[str, object]]] = {
     "beatup 600": ("beatup", "balance", {"operation.M0": "600 N*m"}),
     "beatup 745": ("beatup", "balance", {}),
     "beatup 900": ("beatup", "balance", {"operation.M0": "900 N*m"}),

@@ -1,6 +1,7 @@
 """The certificate, tried by points that only look optimal: each is refused, with a reason."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -155,7 +156,9 @@ def square(x, y=0.0):
     return {"f": lambda v: (v["x"] - x) ** 2 + (v["y"] - y) ** 2}
 
 
-PASS = {
+Rows = dict[str, Callable[[dict[str, float]], float]]
+Limits = tuple[tuple[str, int, float], ...]
+PASS: dict[str, tuple[Rows, Limits, dict[str, float], bool]] = {
     "a bowl's bottom": (square(1.0, 2.0), (), {"x": 1.0, "y": 2.0}, True),
     "a valley's floor": ({"f": lambda v: v["x"] ** 2}, (), {"x": 0.0, "y": 3.0}, False),
     "a corner of two limits": (
@@ -191,7 +194,7 @@ PASS = {
 }
 CURVES = "second order fails"
 SLOPE, DROP = {"f": lambda v: v["x"] + v["y"] ** 2}, {"f": lambda v: v["x"] - v["y"] ** 2}
-REFUSED = {
+REFUSED: dict[str, tuple[Rows, Limits, dict[str, float], str]] = {
     "a maximum": ({"f": lambda v: -(v["x"] ** 2) - v["y"] ** 2}, (), {"x": 0, "y": 0}, CURVES),
     "a saddle": ({"f": lambda v: v["x"] ** 2 - v["y"] ** 2}, (), {"x": 0, "y": 0}, CURVES),
     "a saddle along an active limit": (DROP, (("x", -1, 0.0),), {"x": 0, "y": 0}, CURVES),

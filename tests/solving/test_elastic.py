@@ -3,6 +3,7 @@
 import pytest
 import toy
 
+from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
 from loomopt.solving import elastic
 from loomopt.solving.elastic import clash
@@ -15,7 +16,6 @@ def found(limits, sizes=None, waves=None, starts=1):
     program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
     words = Words(toy.scene_of(toy.ToyJob(program)))
     return clash(program, [program.starts[0]] * starts, Settings(), words)
-
 
 
 def told(answer):
@@ -84,14 +84,14 @@ def test_nothing_clashes_where_a_design_needs_nothing():
     ],
 )
 def test_starts_are_tried_until_three_agree_on_the_least(monkeypatch, sums, tried, least):
-    calls = []
+    calls: list[dict[str, float]] = []
 
     def solve(program, start, settings, elastic):
         total = sums[len(calls)]
         calls.append(start)
         return Point({}, "", total is not None, relaxed={} if total is None else {0: total})
 
-    monkeypatch.setattr(elastic.exchange, "solve", solve)
+    monkeypatch.setattr(exchange, "solve", solve)
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0),))
     answer = elastic._least(program, [{}] * len(sums), Settings())
     assert len(calls) == tried

@@ -3,9 +3,9 @@
 import pytest
 import toy
 
+from loomopt.nlp import exchange
 from loomopt.nlp.point import Point
 from loomopt.solving import engine
-from loomopt.solving import search as searching
 from loomopt.solving.solution import Clash
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
@@ -74,7 +74,7 @@ def test_limits_that_clash_are_told_with_what_helps():
 
 def test_a_design_that_only_the_elastic_solve_finds_is_taken(monkeypatch):
     """Every start fails, the relaxation needs nothing: its design is solved from, and judged."""
-    genuine, tried = searching.exchange.solve, []
+    genuine, tried = exchange.solve, []
 
     def solve(program, start, settings, warm=None):
         tried.append(dict(start))
@@ -82,7 +82,7 @@ def test_a_design_that_only_the_elastic_solve_finds_is_taken(monkeypatch):
             return genuine(program, start, settings, warm)
         return Point(dict(start), "Restoration_Failed", False, iterations=7)
 
-    monkeypatch.setattr(searching.exchange, "solve", solve)
+    monkeypatch.setattr(exchange, "solve", solve)
     monkeypatch.setattr("loomopt.solving.elastic.clash", lambda *_: Clash(x={"x": 0.25, "y": 0.0}))
     answer = toy.solve(toy.program("xy", BOWL))
     assert (answer.status, answer.solver["starts"], answer.solver["starts_at_best"]) == ("optimal", 9, 1)
@@ -91,7 +91,7 @@ def test_a_design_that_only_the_elastic_solve_finds_is_taken(monkeypatch):
 
 def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
     failed = Point({"x": 0.5, "y": 0.5}, "Restoration_Failed", False, iterations=7)
-    monkeypatch.setattr(searching.exchange, "solve", lambda *_, **__: failed)
+    monkeypatch.setattr(exchange, "solve", lambda *_, **__: failed)
     monkeypatch.setattr("loomopt.solving.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert (answer.status, answer.solver["status"]) == ("failed", "Restoration_Failed")
@@ -109,7 +109,7 @@ def test_a_point_that_is_not_certified_is_told_with_the_reason():
 
 
 def test_the_callback_counts_iterations():
-    seen = []
+    seen: list[int] = []
     toy.solve(toy.program("xy", VALLEYS), on_iteration=seen.append)
     assert seen[:3] == [0, 1, 2]
     assert engine._callback(None) is None

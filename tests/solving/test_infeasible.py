@@ -9,7 +9,7 @@ from plain_beatup import DESIGN
 
 import loomopt as lo
 
-TIGHT = {
+TIGHT: dict[str, tuple[str, dict[str, object], str]] = {
     "light, torque": ("beatup-light", {}, "torque"),
     "light, retrofit": ("beatup-light", {}, "retrofit"),
     "swing out of reach": ("beatup", {"limits.swing": {"min": "40 deg", "max": "41 deg"}}, "balance"),
@@ -105,20 +105,23 @@ def test_what_it_prints_holds_a_design_and_no_nan(answer_of, name):
 
 @pytest.mark.parametrize("name", TIGHT)
 def test_the_least_relaxation_helps_and_no_less_does(answer_of, name):
-    assert_just_enough(*scene_of(name), together(answer_of(name)))
+    scene, target = scene_of(name)
+    assert_just_enough(scene, target, together(answer_of(name)))
 
 
 @pytest.mark.parametrize("name", TIGHT)
 def test_each_limit_that_would_do_by_itself_does_and_no_less_of_it(answer_of, name):
+    scene, target = scene_of(name)
     for relaxation in (one for one in answer_of(name).relaxation if one.alone):
-        assert_just_enough(*scene_of(name), [relaxation])
+        assert_just_enough(scene, target, [relaxation])
 
 
 @pytest.mark.parametrize("name", TIGHT)
 def test_the_least_relaxation_helps_as_it_is_printed(answer_of, name):
     """Six digits are shown: they must be rounded to the side that helps."""
     printed = [as_printed(one) for one in together(answer_of(name))]
-    found = lo.solve(*granted(*scene_of(name), printed))
+    scene, target = scene_of(name)
+    found = lo.solve(*granted(scene, target, printed))
     assert found.status != "infeasible", [one.text for one in printed]
 
 

@@ -70,7 +70,7 @@ def test_a_hook_that_raises_stops_the_solve_too():
 
 
 def test_a_hook_that_only_watches_changes_nothing():
-    seen = []
+    seen: list[int] = []
     watched = lo.solve(lo.load("beatup"), on_iteration=seen.append)
     assert len(seen) >= 10
     assert watched.design == lo.solve(lo.load("beatup")).design

@@ -12,14 +12,11 @@ PROGRAM = toy.program(
 X = {"x": 1.0, "y": 3.0}
 
 
-def falls(slope=0.0, direction=None, **more):
-    given = {"level": 0, "prices": {}, "held": {}} | more
-    return Lagrangian(PROGRAM, X, **given).falls(direction or {"x": 1.0}, slope)
+def falls(slope=0.0, direction=None, prices=None, held=None):
+    return Lagrangian(PROGRAM, X, 0, prices or {}, held or {}).falls(direction or {"x": 1.0}, slope)
 
 
-@pytest.mark.parametrize(
-    ("price", "expected"), [(4.9, True), (5.1, False)]
-)
+@pytest.mark.parametrize(("price", "expected"), [(4.9, True), (5.1, False)])
 def test_prices_weigh_the_limits(price, expected):
     """f / 2 falls by 5 per unit of x, g rises by 1."""
     assert falls(prices={0: price}) == expected

@@ -1,6 +1,7 @@
 """Machines other than the source's: every answer judged by physics written out a second time."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,7 +224,7 @@ def random_scene(seed):
     front = np.array([dead_centres(l1, l2, l3, l4)[0]])
     M0 = float(J4 * motion(lengths, front)[2][0] * (rpm * math.pi / 30) ** 2 * draw(0.6, 1.5))
     mass, swing = 2 * J4 / l3**2, math.degrees(swing)
-    document = {
+    document: dict[str, dict[str, Any]] = {
         "problem": {"name": f"random-{seed}", "job": "beatup", "title": "random", "source": "drawn"},
         "operation": {"speed": f"{rpm!r} rpm", "M0": f"{M0!r} N*m"},
         "mechanism": {name: f"{value!r} m" for name, value in lengths.items()}

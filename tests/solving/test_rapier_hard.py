@@ -9,7 +9,7 @@ from rapier_by_hand import LENGTHS, OPERATION
 import loomopt as lo
 from loomopt.errors import BadInput
 
-HARD = {
+HARD: dict[str, dict[str, object]] = {
     "second crank of no length": {"mechanism.l4": "1e-6 mm", "bounds.l4": "1e-6 mm"},
     "second shaft on the sley's path": {
         "bounds.C0x": {"min": "100 mm", "max": "140 mm"},
@@ -28,7 +28,7 @@ HARD = {
 
 def granted(scene, relaxations, more):
     """Return the scene with relaxations granted, each `more` beyond, relative to the limit."""
-    changes = {}
+    changes: dict[str, object] = {}
     for relaxation in relaxations:
         name, side = relaxation.limit, relaxation.side
         outward = 1 if side == "max" else -1

@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import toy
 
+from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
 from loomopt.solving import search as searching
 from loomopt.solving.search import Candidate, Search, compared, judged, objectives, searched
@@ -30,7 +32,7 @@ def empty(**more):
 @pytest.fixture
 def certified(monkeypatch):
     """Return what is put before the certificate, and a way to say what it answers: by x, or for all."""
-    seen, answers = [], {}
+    seen, answers = [], dict[float | str, Any]()
 
     def certify(program, x, accuracy):
         seen.append(x["x"])
@@ -44,13 +46,13 @@ def certified(monkeypatch):
 @pytest.fixture
 def solved(monkeypatch):
     """Return the calls of the exchange, and the points it answers in order."""
-    calls, points = [], []
+    calls, points = [], list[Point]()
 
     def solve(program, start, settings, warm=None):
         calls.append((dict(start), settings.penalty, warm))
         return points.pop(0)
 
-    monkeypatch.setattr(searching.exchange, "solve", solve)
+    monkeypatch.setattr(exchange, "solve", solve)
     return calls, points
 
 

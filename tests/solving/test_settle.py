@@ -30,7 +30,7 @@ def test_of_all_common_factors_the_lengths_take_the_one_nearest_today(M0):
     answer = lo.solve(scene)
     machine, best = Machine(scene), None
     for factor in np.linspace(0.985, 1.015, 30_001):
-        scaled = answer.design | {name: factor * answer.design[name] for name in LENGTHS}
+        scaled = {**answer.design, **{name: factor * answer.design[name] for name in LENGTHS}}
         inside = all(scene.bounds[n].min - 1e-12 <= scaled[n] <= scene.bounds[n].max + 1e-12 for n in LENGTHS)
         if inside and (best is None or change(scene, scaled) < change(scene, best)):
             best = scaled

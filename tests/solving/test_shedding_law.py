@@ -8,6 +8,7 @@ import importlib
 import math
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ DIGITS = {
     ("14.5 mm", 16, True): 27323.257558294088,
 }
 UNEVEN = (100, 70, 130, 60)
-OTHERS = {
+OTHERS: dict[str, dict[str, Any]] = {
     "damped": {"C": 35},
     "a demand": {"N_min": 100},
     "damped, a demand, friction": {"C": 35, "N_min": 100, "F": 20},

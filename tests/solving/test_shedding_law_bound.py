@@ -15,7 +15,7 @@ from shedding_cases import CYCLOID, TRAVELS, freed, plain, product, programmed
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.packaged import problem_path
+from loomopt.packaged import problems
 
 study = importlib.import_module("shedding_law")
 UNEVEN = (100, 70, 130, 60)
@@ -137,7 +137,7 @@ def test_a_found_law_goes_round_by_file_and_as_the_scenes_own(cli, tmp_path):
         file.write_text(json.dumps(content), encoding="utf-8")
         again = answered(cli, "evaluate", *LAW, "--design", file)
         assert (again["design"], again["figures"]) == (found["design"], found["figures"])
-    text, scene = problem_path("shedding-printed-travel").read_text(encoding="utf-8"), tmp_path / "own.toml"
+    text, scene = problems()["shedding-printed-travel"].read_text(encoding="utf-8"), tmp_path / "own.toml"
     own = f'law = "spline"\nlaw_coefficients = {found["design"]["law"]}\n#'
     assert text.count('law = "cycloidal"') == 1
     scene.write_text(text.replace('law = "cycloidal"', own), encoding="utf-8")
