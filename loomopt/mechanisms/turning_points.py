@@ -15,9 +15,9 @@ SAMPLES = 720
 def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Number) -> Number:
     """Return the root near a hint that is right in float64, so that it moves with the design to second order.
 
-    rates(x): a function's value f, slope f' and bend f''. Halley's step, x − 2 f f'/(2 f'² − f f''): its error is of the
-    third order, so value, gradient and curvature with respect to the design are those of the root. One step of Newton
-    is right to first order only; two are right too, but where the design has moved far from the hint the second
+    rates(x): a function's value f, slope f' and bend f''. Halley's step, x − 2 f f'/(2 f'² − f f''): its error is of
+    the third order, so value, gradient and curvature with respect to the design are those of the root. One step of
+    Newton is right to first order only; two are right too, but where the design has moved far from the hint the second
     starts where the first has thrown it.
     """
     value, slope, bend = rates(hint)
