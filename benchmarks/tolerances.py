@@ -20,7 +20,6 @@ import harness
 from loomopt import tolerances
 from loomopt.jobs import registry
 from loomopt.nlp import exchange, options, transcribe
-from loomopt.nlp import point as points
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.program import reading
 from loomopt.program.program import Program
@@ -72,7 +71,7 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
     for first, *others in programs:
         near = None
         for program in (first, *others):
-            settings = Settings(penalty=points.PENALTY)
+            settings = Settings(penalty=tolerances.PENALTY)
             point = exchange.solve(program, exchange.starts(program, 1)[0], settings, near)
             sampler = sampler_at(program, point.x)
             iterations += point.iterations
