@@ -71,8 +71,8 @@ IPOPT_TOLERANCE, IPOPT_SLOPE, IPOPT_ITERATIONS = 1e-11, 1e-9, 300
 and where it gives up: no packaged target takes it a hundred iterations from its first start."""
 
 WARM_BARRIER, WARM_PUSH = 1e-8, 1e-10
-"""Barrier that a warm start begins with, which keeps a row of multiplier 1 so far from its bound, and how far a start is
-pushed inside: less than what IPOPT itself left."""
+"""Barrier that a warm start begins with, which keeps a row of multiplier 1 so far from its bound, and how far a start
+is pushed inside: less than what IPOPT itself left."""
 
 PENALTY = 1000.0
 """Weight of each earlier objective against the next, first try: more than a level's multiplier keeps it exactly [exact

@@ -111,14 +111,14 @@ def test_what_gives_way_begins_at_one_and_never_below_none():
 
 def test_bounds_that_may_give_way_are_none_but_a_positive_one_stays_positive():
     task = program()
-    variables = (Variable("x", 2.0, 4.0, 2.0, (2, 4)), Variable("y", -1.0, 1.0, 1.0, (0, 1)))
-    sides = [("x", -1, 2.0), ("x", 1, 4.0), ("y", -1, -1.0)]
+    variables = (Variable("x", 1.0, 4.0, 2.0, (2, 4)), Variable("y", -1.0, 1.0, 1.0, (0, 1)))
+    sides = [("x", -1, 1.0), ("x", 1, 4.0), ("y", -1, -1.0)]
     limits = tuple(Limit(n, sign, n, value, 1.0, "variable") for n, sign, value in sides)
     _, _, arguments, _ = put(replace(task, variables=variables, limits=limits), elastic=True)
-    assert arguments["lbx"][:2] == pytest.approx([1e-3, -np.inf])
+    assert arguments["lbx"][:2] == pytest.approx([0.5e-3, -np.inf])
     assert arguments["ubx"][:2] == pytest.approx([np.inf, 1.0])
     _, _, firm, _ = put(replace(task, variables=variables, limits=limits))
-    assert firm["lbx"] == pytest.approx([1.0, -1.0])
+    assert firm["lbx"] == pytest.approx([0.5, -1.0])
     assert firm["ubx"] == pytest.approx([2.0, 1.0])
 
 

@@ -186,6 +186,8 @@ def gives_up(monkeypatch, moved=0.0):
         ((("sum", 1, 4.0),), 2e-8, True),
         ((("sum", 1, 4.0),), 1e-6, False),
         ((("sum", 0, 4.0),), -1e-6, False),
+        ((("sum", 0, 4.0),), -2e-8, True),
+        ((("sum", 0, 4.0),), 0.0, True),
         ((("sum", 1, 4.0),), -1e-6, True),
         ((("circle", 1, 1.0),), 0.0, False),
         ((("circle", 1, 9.0),), 0.0, True),
