@@ -60,22 +60,23 @@ class Exact:
         directions = [[self.number(float(entry)) for entry in column] for column in basis.T]
         result = np.zeros((len(self.rows), width, width))
         base = self._values(self.base)
-        sides = [[self._values(self._along(d, sign * step)) for sign in (1, -1)] for d in directions]
-        for i, (ahead, behind) in enumerate(sides):
-            result[:, i, i] = [float((a - 2 * b + c) / step**2) for a, b, c in zip(ahead, base, behind, strict=True)]
+        along = [self._second(direction, base, step) for direction in directions]
+        for i in range(width):
+            result[:, i, i] = along[i]
             for j in range(i):
-                result[:, i, j] = result[:, j, i] = self._mixed(directions[i], directions[j], step)
+                # d'Hd of the sum of two directions holds their mixed derivative twice.
+                both = self._second([a + b for a, b in zip(directions[i], directions[j], strict=True)], base, step)
+                mixed = [float((a - b - c) / 2) for a, b, c in zip(both, along[i], along[j], strict=True)]
+                result[:, i, j] = result[:, j, i] = mixed
         for k, row in enumerate(self.rows):
             if row.node and not self._at_corner(row.node):
                 result[k] -= self._moving(k, row, row.node, directions, step)
         return result
 
-    def _mixed(self, one: Vector, other: Vector, step: Number) -> list[float]:
-        """Return each row's mixed second derivative along two directions."""
-        total = [a + b for a, b in zip(one, other, strict=True)]
-        apart = [a - b for a, b in zip(one, other, strict=True)]
-        corners = [self._values(self._along(way, sign * step)) for way in (total, apart) for sign in (1, -1)]
-        return [float((a + b - c - d) / (4 * step**2)) for a, b, c, d in zip(*corners, strict=True)]
+    def _second(self, direction: Vector, base: Sequence[Number], step: Number) -> list[Number]:
+        """Return each row's second derivative along a direction; base: the rows at the design itself."""
+        ahead, behind = (self._values(self._along(direction, sign * step)) for sign in (1, -1))
+        return [(a - 2 * b + c) / step**2 for a, b, c in zip(ahead, base, behind, strict=True)]
 
     def _along(self, direction: Vector, step: Number) -> Vector:
         return [x + step * d for x, d in zip(self.base, direction, strict=True)]
