@@ -309,7 +309,7 @@ TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1
 factor of the least error within which errors have stopped falling; factor of the middle slope within which slopes are
 one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 % (test_accuracy)."""
 
-SAME_OBJECTIVE, SAME_DESIGN = 1e-8, 1e-6
+REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 """Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
 which moves more than its objective does."""
 

@@ -251,3 +251,14 @@ def test_types_say_what_they_are():
     assert sum(spots.values()) <= MOST_ANY, spots
     scenes = [name for name, path in modules().items() if re.search(r"\bscene: Any\b", path.read_text("utf-8"))]
     assert scenes == []
+
+
+def test_every_tolerance_has_one_value_and_says_where_it_comes_from():
+    body = parsed(PACKAGE / "tolerances.py").body
+    assigned = [node for node in body if isinstance(node, ast.Assign)]
+    names = [n.id for node in assigned for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
+    assert len(set(names)) == len(names)
+    for node in assigned:
+        after = body[body.index(node) + 1]
+        said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        assert said, f"{names} of line {node.lineno}: nothing is said of it"

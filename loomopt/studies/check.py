@@ -14,7 +14,7 @@ from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
-from loomopt.tolerances import SAME_DESIGN, SAME_OBJECTIVE
+from loomopt.tolerances import REPRODUCED_DESIGN, REPRODUCED_OBJECTIVE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,7 +136,7 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
             if str(new) != str(old):
                 found.append(f"{name}: {new}, reference {old}")
             continue
-        allowed = SAME_OBJECTIVE if name.split(" [")[0] in objectives else SAME_DESIGN
+        allowed = REPRODUCED_OBJECTIVE if name.split(" [")[0] in objectives else REPRODUCED_DESIGN
         size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
         if not abs(float(new) - float(old)) <= allowed * size:
             found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")
