@@ -9,6 +9,7 @@ from loomopt.solving import kkt
 from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers
 from loomopt.solving.rows import active_set
+from loomopt.tolerances import POSITIVE
 
 
 def at(program, x):
@@ -109,3 +110,20 @@ def test_of_a_sum_only_the_sum_is_held():
     none = kkt.system(at(both, XY)[0], 1, [multipliers(0.5, 0.5, 1.0, 0.0, 0.0)])
     assert none.held.tolist() == np.eye(5)[:4].tolist(), "where all is zero, all stays so"
     assert kkt.system(active, 1, [multipliers(0.0, 0.0, 0.0)]).held.shape == (0, 3)
+
+
+def test_a_row_binds_above_a_hundred_millionth():
+    assert POSITIVE == 1e-8
+    assert multipliers(POSITIVE, 1.1e-8, -1.1e-8, 0.0).positive == {1, 2}
+
+
+def test_multipliers_are_normalised_to_pieces_that_weigh_one_together():
+    """A slope that is left takes its share of the sum: here 0.5 of the first group, 0.25 of the second."""
+    groups = ((1, 2), (3,))
+    system = kkt.System(groups, (0,), (), np.zeros((0, 4)))
+    found = multipliers(3.0, 0.1, 0.4, 0.25).normalised(system)
+    assert found == pytest.approx([3.0 / 0.375, 0.2, 0.8, 1.0])
+    bare = kkt.System((), (0, 1), (), np.zeros((0, 2)))
+    assert multipliers(3.0, 2.0).normalised(bare).tolist() == [3.0, 2.0]
+    empty = kkt.System(((1,),), (0,), (), np.zeros((0, 2)))
+    assert multipliers(3.0, 0.0).normalised(empty).tolist() == [3.0, 0.0], "no sum to share"

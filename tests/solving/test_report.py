@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import toy
 
-from loomopt.program.program import Objective
+from loomopt.program.program import Limit, Objective
 from loomopt.solving import report
 from loomopt.solving.solution import Clash, Relaxation
 from loomopt.solving.verdict import Binding, Certificate
@@ -163,3 +163,24 @@ def test_a_failure_passes_on_the_solvers_word_with_advice(status, said):
     answer = report.without_optimum("least", here, Clash(), {"status": status}, here, "Physics.")
     assert (answer.status, answer.explanation) == ("failed", "")
     assert answer.message == f"The solver failed ({status}): {said}"
+
+
+# Limits that bear another name than what they read -----------------------------------------------------------------
+
+
+def named(family, name, row, sign, value):
+    """Return the findings of one limit at x = 2, y = 3, whose name is not its row's."""
+    program = toy.program("xy", ROWS, WAVES)
+    limit = Limit(name, sign, row, value, 1.0, family)
+    job = toy.ToyJob(replace(program, limits=(limit,)))
+    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
+    return [(each.name, each.value, each.ok) for each in found]
+
+
+def test_a_whole_cycle_limit_may_bear_its_own_name():
+    assert named("cycle", "top", "w", 1, 2.5) == [("top", pytest.approx(2.0), True)]
+
+
+def test_a_bound_of_a_variable_that_the_design_does_not_name_is_not_told():
+    assert named("variable", "helper", "x", 1, 1.0) == []
+    assert named("variable", "x", "x", 1, 1.0) == [("x", 2.0, False)]

@@ -280,3 +280,41 @@ def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
     points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
     found = searched(empty(), 1, 0, near, None)
     assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)
+
+
+# To the last number -----------------------------------------------------------------------------------------------
+
+
+def test_objectives_that_differ_by_just_as_much_as_is_one_optimum_are_one():
+    assert compared(candidate(0.0, 1.0), candidate(SAME_OBJECTIVE, 0.0)) == 1
+
+
+def test_of_several_candidates_the_last_says_whether_a_stronger_weight_led_on(certified, solved):
+    """The other two were reached; the one solved again was not, so that the best stays as it was."""
+    answers = certified[1]
+    calls, points = solved
+    answers["all"] = gave_way(stationarity=1.0)
+    points.append(Point({"x": 9.0, "y": 0.0}, "Maximum_Iterations_Exceeded", False))
+    found = judged(empty(candidates=(candidate(1, x=1.0), candidate(2, x=2.0), candidate(3, x=3.0))))
+    assert len(calls) == 1
+    assert len(found.candidates) == 4
+    assert found.best.x["x"] == 1.0
+
+
+def test_a_variable_that_a_step_does_not_name_stays():
+    assert searching._stepped(PROGRAM, {"x": 1.0, "y": 2.0}, {"x": 0.5}) == {"x": 1.5, "y": 2.0}
+
+
+def test_an_empty_search_has_spent_no_time():
+    nothing = empty()
+    assert (nothing.built, nothing.solved, nothing.certified, nothing.candidates) == (0.0, 0.0, 0.0, ())
+
+
+def test_time_of_solves_is_summed(certified, solved, monkeypatch):
+    clock = iter([10.0, 10.25, 20.0, 20.5, 30.0, 31.0])
+    monkeypatch.setattr(searching.time, "perf_counter", lambda: next(clock))
+    points = solved[1]
+    points += [Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.125) for _ in range(2)]
+    twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
+    assert (twice.solved, twice.built) == (0.75, 0.25)
+    assert searching._certified(twice, twice.candidates[0]).certified == 1.0

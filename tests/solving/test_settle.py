@@ -7,7 +7,7 @@ from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
 from loomopt.program.program import Move, Wish
-from loomopt.solving.settle import goal_of, settle, wished
+from loomopt.solving.settle import goal_of, settle, unchanging, wished
 
 
 def slide(goal, low=-100.0, high=100.0):
@@ -210,3 +210,35 @@ def test_a_peak_is_compared_all_round_not_by_its_height():
 def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, told):
     program = toy.program("xy", FLAT, moves=(slide(0.5 + 1e-7),), sizes={"y": size})
     assert bool(settle(program, {"x": 1.0, "y": 0.5})[1]) == told
+
+
+# To the last number -----------------------------------------------------------------------------------------------
+
+
+def test_a_wish_that_can_be_met_is_met_to_the_last_bit():
+    assert 0.51 + 1.0 * (2.56 - 0.51) != 2.56, "a sum would miss it by rounding"
+    assert slid(FLAT, 2.56, y=0.51)[0] == 2.56
+
+
+@pytest.mark.parametrize(("change", "same"), [(1e-10, True), (1.1e-10, False), (-1e-10, True), (-1.1e-10, False)])
+def test_a_limit_that_is_touched_may_change_by_next_to_nothing(change, same):
+    rows = FLAT | {"h": lambda v: change * (v["y"] == 9.0)}
+    program = toy.program("xy", rows, limits=(("h", 1, 0.0),), moves=(slide(1.0, 0.5, 9.0),))
+    assert bool(unchanging(program, {"x": 1.0, "y": 0.5})) == same
+
+
+@pytest.mark.parametrize(("short", "same"), [(1e-7, False), (1.1e-7, True)])
+def test_a_limit_counts_as_touched_within_a_ten_millionth(short, same):
+    rows = FLAT | {"h": lambda v: (v["y"] == 9.0) * 1e-3 - short}
+    program = toy.program("xy", rows, limits=(("h", 1, 0.0),), moves=(slide(1.0, 0.5, 9.0),))
+    assert bool(unchanging(program, {"x": 1.0, "y": 0.5})) == same
+
+
+def test_a_limit_gives_way_by_rounding_only():
+    y, _ = slid(FLAT, 3.0, limits=(("y", 1, 2.0),))
+    assert y - 2.0 == pytest.approx(1e-12, rel=1e-2)
+
+
+def test_a_limit_that_is_touched_and_stays_where_it_is_does_not_change():
+    program = toy.program("xy", FLAT, limits=(("x", 1, 1.0),), moves=(slide(1.0, 0.5, 9.0),))
+    assert unchanging(program, {"x": 1.0 - 5e-8, "y": 0.5}) == [{"y": 1.0}]
