@@ -1,6 +1,7 @@
 """The search as steps on records: candidates in order, corrections, weights between levels, points that are alike."""
 
 import math
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -312,7 +313,7 @@ def test_an_empty_search_has_spent_no_time():
 
 def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     clock = iter([10.0, 10.25, 20.0, 20.5, 30.0, 31.0])
-    monkeypatch.setattr(searching.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
     points = solved[1]
     points += [Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.125) for _ in range(2)]
     twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})

@@ -1,0 +1,70 @@
+"""What the least relaxation is read from: prices of rows, sums of needs, and the worse of two rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import toy
+
+from loomopt.nlp.families import families
+from loomopt.nlp.point import Point
+from loomopt.solving import elastic
+from loomopt.solving.words import Words
+from loomopt.tolerances import NEEDED, PRICED
+
+WAVES = {"w": lambda m, v, phi: v["x"] + m.cos(phi), "z": lambda m, v, phi: v["x"] - 1 + m.cos(phi)}
+LIMITS = (("x", -1, 2.0), ("w", 1, 0.25), ("y", 1, 1.0), ("z", 1, 0.5))
+
+
+def program(limits=LIMITS):
+    return toy.program("xy", {"f": lambda v: v["x"] ** 2}, WAVES, limits=limits)
+
+
+def priced(made, prices):
+    point = Point({}, "", True, raw={"lam_g": np.array(prices)} if prices else {})
+    return elastic._priced(made, point, Words(toy.scene_of(toy.ToyJob(made))))
+
+
+def test_single_values_come_first_and_each_whole_cycle_limit_has_a_row_per_slot():
+    """x, y and the toy's own far limit; then three slots of each family of w and of z."""
+    made = program()
+    count = len(families(made, elastic=True))
+    slots = 3
+    none = [0.0] * (3 + slots * count)
+    assert priced(made, none) == ()
+    assert priced(made, [-1.0, *none[1:]]) == ("x >= 2",)
+    assert priced(made, [1.0, 1.0, *none[2:]]) == ("x >= 2", "y <= 1")
+    last = [*none[:-1], -1.0]
+    assert priced(made, last) == ("z <= 0.5",)
+    first = none.copy()
+    first[3] = 1.0
+    assert priced(made, first) == ("w <= 0.25",)
+    assert priced(made, [PRICED, PRICED * 1.001, *none[2:]]) == ("y <= 1",)
+
+
+def test_without_multipliers_nothing_has_a_price():
+    made = program()
+    assert priced(made, ()) == ()
+    cycles = tuple(limit for limit in made.limits if limit.family == "cycle")
+    assert priced(replace(made, limits=cycles), ()) == ()
+
+
+def test_needs_are_summed_in_natural_sizes():
+    made = toy.program("xy", limits=(("x", -1, 2.0), ("y", 1, 1.0)), sizes={"x": 4.0})
+    assert elastic._total(made, Point({}, "", True, relaxed={0: -2.0, 1: 3.0})) == 3.5
+    assert elastic._total(made, Point({}, "", True)) == 0.0
+
+
+def test_a_need_of_a_billionth_is_none_and_of_two_that_are_equal_the_first_counts():
+    made = toy.program("xy", limits=(("x", -1, 2.0), ("x", -1, 3.0), ("y", 1, 1.0), ("y", -1, 1.0)))
+    assert elastic._by_limit(made, {0: 0.5, 1: 0.5, 2: NEEDED, 3: 1.001 * NEEDED}) == {0: 0.5, 3: 1.001 * NEEDED}
+    sized = toy.program("xy", limits=(("x", -1, 2.0),), sizes={"x": 100.0})
+    assert elastic._by_limit(sized, {0: 99 * NEEDED}) == {}
+    assert elastic._by_limit(sized, {0: 101 * NEEDED}) == {0: 101 * NEEDED}
+
+
+@pytest.mark.parametrize(("name", "sign"), [("x", -1), ("w", 1)])
+def test_only_one_side_of_one_limit_gives_way(name, sign):
+    made = program((*LIMITS, ("x", 1, 9.0)))
+    kept = [(limit.name, limit.sign) for limit in elastic._only(made, name, sign).limits if limit.relaxable]
+    assert kept == [(name, sign)]
