@@ -170,7 +170,8 @@ def test_newtons_step_is_told_in_si_and_its_length_in_natural_sizes():
     found = certify(made, {"x": 4.0 + 4e-9, "y": 1e-9}, 1e-8)
     assert found.correction == pytest.approx({"x": -4e-9, "y": -1e-9}, rel=1e-6)
     assert found.step == pytest.approx(1e-9, rel=1e-6)
-    assert certify(made, {"x": 4.0, "y": 0.0}, 1e-8).step == 0.0
+    there = certify(made, {"x": 4.0, "y": 0.0}, 1e-8)
+    assert (there.step, there.correction) == (0.0, {})
 
 
 def test_what_is_no_number_is_no_certificate():
@@ -179,3 +180,26 @@ def test_what_is_no_number_is_no_certificate():
     assert (found.passed, found.minimum, found.unique) == (False, False, False)
     assert (found.feasibility, found.violation) == (float("inf"), float("inf"))
     assert found.reasons == ("a value or a slope is no number here (ZeroDivisionError)",)
+
+
+def test_a_level_after_one_that_settles_the_design_has_no_residual():
+    rows = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "g": lambda v: 3 * v["x"]}
+    found = certify(toy.program("xy", rows, objectives=("f", "g")), {"x": 0.0, "y": 0.0}, 1e-8)
+    assert found.passed
+    assert found.levels[1] == Level("g", 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("residual", "raises"), [(STATIONARY, True), (1.001 * STATIONARY, False)])
+def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, raises, monkeypatch):
+    def fails(*_):
+        raise ZeroDivisionError
+
+    first = Multipliers(np.zeros(4), residual)
+    monkeypatch.setattr(kkt, "solved", lambda *_: first)
+    monkeypatch.setattr(certificate, "_best", fails)
+    if raises:
+        with pytest.raises(ZeroDivisionError):
+            certificate._judged_level(local(), 0, [])
+    else:
+        found = certificate._judged_level(local(), 0, [])
+        assert (found.multipliers, found.curvature, found.level.stationarity) == (first, None, residual)

@@ -66,3 +66,23 @@ def test_the_nearest_direction_of_a_cone():
 
 def test_a_matrix_of_zeros_is_level():
     assert least_on_cone(np.zeros((2, 2)), np.array([[1.0, 0.0]])) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("left", "is_open"), [(0.9e-9, True), (1.1e-9, False)])
+def test_a_projection_that_leaves_more_than_a_billionth_of_slope_is_none(left, is_open, monkeypatch):
+    monkeypatch.setattr(cone, "nnls", lambda *_: np.array([1 - left]))
+    assert (onto_cone(np.array([1.0, -1.0]), np.array([[1.0, 0.0]])) is not None) == is_open
+
+
+@pytest.mark.parametrize(("length", "is_open"), [(0.9e-9, False), (1.1e-9, True)])
+def test_a_projection_shorter_than_a_billionth_is_the_tip(length, is_open):
+    """Of a direction longer than 1, a billionth of its length."""
+    slopes = np.array([[1.0, 0.0]])
+    assert (onto_cone(np.array([0.5, -length]), slopes) is not None) == is_open
+    assert (onto_cone(np.array([8.0, -8 * length]), slopes) is not None) == is_open
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_the_least_curvature_has_the_matrix_size(size):
+    hessian, slopes = drawn(3, 327)
+    assert least_on_cone(size * hessian, slopes) == pytest.approx(size * least_on_cone(hessian, slopes), rel=1e-6)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.nlp import exchange
 from loomopt.nlp.families import families
-from loomopt.nlp.point import Point
+from loomopt.nlp.point import Point, Settings
 from loomopt.solving import elastic
 from loomopt.solving.words import Words
 from loomopt.tolerances import NEEDED, PRICED
@@ -68,3 +69,24 @@ def test_only_one_side_of_one_limit_gives_way(name, sign):
     made = program((*LIMITS, ("x", 1, 9.0)))
     kept = [(limit.name, limit.sign) for limit in elastic._only(made, name, sign).limits if limit.relaxable]
     assert kept == [(name, sign)]
+
+
+@pytest.mark.parametrize(
+    ("sums", "count"),
+    [
+        ((0.0, NEEDED, NEEDED, 0.0), 3),
+        ((NEEDED, 0.0, 0.0, 0.0), 3),
+        ((0.0, 1.001 * NEEDED, 0.0, 0.0), 4),
+        ((1.001 * NEEDED, 0.0, 0.0, 0.0), 4),
+    ],
+)
+def test_sums_agree_to_a_billionth(monkeypatch, sums, count):
+    made, calls = toy.program("xy", limits=(("x", -1, 2.0),)), list[float]()
+
+    def solve(*_, **__):
+        calls.append(sums[len(calls)])
+        return Point({}, "", True, relaxed={0: calls[-1]})
+
+    monkeypatch.setattr(exchange, "solve", solve)
+    elastic._least(made, [{}] * 4, Settings())
+    assert len(calls) == count

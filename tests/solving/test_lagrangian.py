@@ -54,3 +54,9 @@ def test_what_has_no_value_does_not_fall():
     root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
     assert not Lagrangian(root, {"x": 0.0}, 0, {}, {}).falls({"x": -1.0}, 0.0)
     assert not Lagrangian(root, {"x": -1.0}, 0, {}, {}).falls({"x": 1.0}, 0.0)
+
+
+@pytest.mark.parametrize(("fall", "counts"), [(0.9e-12, False), (1.1e-12, True)])
+def test_a_fall_counts_above_a_trillionth(fall, counts):
+    """f / 2 falls by half the way along −y; the shorter probe is 3e-3 long."""
+    assert falls(direction={"y": -2 * fall / 3e-3}) == counts

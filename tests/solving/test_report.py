@@ -184,3 +184,9 @@ def test_a_whole_cycle_limit_may_bear_its_own_name():
 def test_a_bound_of_a_variable_that_the_design_does_not_name_is_not_told():
     assert named("variable", "helper", "x", 1, 1.0) == []
     assert named("variable", "x", "x", 1, 1.0) == [("x", 2.0, False)]
+
+
+@pytest.mark.parametrize(("excess", "ok"), [(0.9e-12, True), (1.1e-12, False)])
+def test_a_limit_of_a_small_quantity_is_held_to_its_size(excess, ok):
+    found = findings((("p", 1, 0.0),), {"x": excess, "y": 0.0}, sizes={"p": 1e-3})
+    assert found[0][4] == ok

@@ -132,3 +132,15 @@ def test_an_objective_is_zero_where_all_its_magnitudes_are():
         program = toy.program("xy", ROWS, objectives=(objective, "p + q"))
         assert active(program, {"x": 0.0, "y": 0.0}).zero == (True, False)
         assert active(program, {"x": 0.0, "y": 1.0}).zero == (False, False)
+
+
+def test_what_is_off_by_just_as_much_as_touches_touches():
+    assert active(limited(1, 0.0), {"x": -ACTIVE}).limits == 1
+    assert pieces("p, q", {"x": 0.0, "y": -ACTIVE}, ROWS) == [[("p", 1.0), ("q", 1.0)]]
+    level = {"w": lambda m, v, phi: -ACTIVE * (v["x"] == 0.5) + 0 * phi}
+    program = toy.program("x", {}, level, limits=(("w", 1, 0.0),), objectives=("x",), signed=True)
+    assert active(program, {"x": 0.5}).limits >= 1
+
+
+def test_a_magnitude_of_just_a_billionth_has_both_signs():
+    assert pieces("|p|", {"x": 1e-9, "y": 0.0}, ROWS) == [[("p", 1.0), ("p", -1.0)]]

@@ -242,3 +242,9 @@ def test_a_limit_gives_way_by_rounding_only():
 def test_a_limit_that_is_touched_and_stays_where_it_is_does_not_change():
     program = toy.program("xy", FLAT, limits=(("x", 1, 1.0),), moves=(slide(1.0, 0.5, 9.0),))
     assert unchanging(program, {"x": 1.0 - 5e-8, "y": 0.5}) == [{"y": 1.0}]
+
+
+@pytest.mark.parametrize(("end", "flat"), [(0.5, False), (0.5004, False), (0.5006, True), (0.6, True)])
+def test_a_way_must_be_flat_a_thousandth_beyond_the_design_and_no_farther(end, flat):
+    rows = {"f": lambda v: v["x"] ** 2 + max(0.0, v["y"] - end)}
+    assert slid(rows, 0.25)[0] == (0.25 if flat else 0.5)
