@@ -4,7 +4,8 @@
 
 A fixed random choice of small changes in loomopt/solving, loomopt/nlp and loomopt/tolerances.py is made one at a time,
 in a copy of the package, and the tests that mirror the changed file are run against it: tests/ROOM/test_FILE*.py (for a
-tolerance, those of every file that reads it). A mutant that no test notices survives, and is printed.
+tolerance, those of every file that reads it). A mutant that no test notices survives, and is printed. Tests that fail
+without any mutant would notice everything, so each is run on the files as they are first.
 """
 
 import argparse
@@ -16,7 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -137,14 +138,18 @@ def _assigned(mutant: Mutant) -> str:
 def noticed(mutant: Mutant) -> tuple[bool, str]:
     """Say whether the tests notice a mutant, and in which words."""
     mirrored = tests(mutant)
-    if not mirrored:
-        return False, "no test mirrors the file"
+    return failed(mirrored, mutant) if mirrored else (False, "no test mirrors the file")
+
+
+def failed(mirrored: Sequence[str], mutant: Mutant | None = None) -> tuple[bool, str]:
+    """Say whether tests fail on a copy of the package with a mutant, or with none, and in which words."""
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(TOP / "loomopt", Path(folder) / "loomopt", ignore=shutil.ignore_patterns("__pycache__"))
         for beside in ("problems", "results", "docs", "benchmarks", "tests", "pyproject.toml"):
             (Path(folder) / beside).symlink_to(TOP / beside)
-        place = Path(folder) / mutant.file
-        place.write_text(mutant.applied(place.read_text(encoding="utf-8")), encoding="utf-8")
+        if mutant:
+            place = Path(folder) / mutant.file
+            place.write_text(mutant.applied(place.read_text(encoding="utf-8")), encoding="utf-8")
         threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
         environment = {**os.environ, **threads, "PYTHONPATH": folder, "PYTHONDONTWRITEBYTECODE": "1"}
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *mirrored]
@@ -172,6 +177,10 @@ def main() -> None:
         return
     survivors = 0
     with concurrent.futures.ThreadPoolExecutor(asked.workers) as pool:
+        alone = list(dict.fromkeys(test for mutant in picked for test in tests(mutant)))
+        broken = [words for found, words in pool.map(lambda test: failed([test]), alone) if found]
+        if broken:
+            sys.exit("\n".join(["Without any mutant:", *broken]))
         for mutant, (found, words) in zip(picked, pool.map(noticed, picked), strict=True):
             survivors += not found
             print("noticed " if found else "SURVIVES", mutant, "|", words, flush=True)

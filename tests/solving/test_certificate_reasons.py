@@ -203,3 +203,9 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
     else:
         found = certificate._judged_level(local(), 0, [])
         assert (found.multipliers, found.curvature, found.level.stationarity) == (first, None, residual)
+
+
+@pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
+def test_by_what_the_whole_cycle_is_covered_is_told(bound, by):
+    here = local()
+    assert certificate._certificate(here, Cycle(0.0, bound), certificate.judged_levels(here), 1e-8).by == by

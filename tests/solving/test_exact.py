@@ -98,3 +98,17 @@ def test_a_peak_without_curvature_is_no_division_by_zero():
     exact, place = exact_at(toy.program("x", {}, waves, objectives=("peak w",)), {"x": 2.0})
     assert exact.gradients()[place["w"]] == pytest.approx([4.0], rel=1e-15)
     assert exact.curvatures(np.eye(1))[place["w"], 0, 0] == pytest.approx(2.0, rel=1e-14)
+
+
+def test_rows_are_off_their_bounds_by_what_they_exceed_and_pieces_as_large_as_they_are():
+    waves = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}
+    limits = (("w", 1, 1.0), ("y", -1, 2.0))
+    program = toy.program("xy", {}, waves, limits=limits, objectives=("peak w", "|y|"), sizes={"w": 4.0, "y": 2.0})
+    exact, _ = exact_at(program, {"x": 1 + 1e-7, "y": 2 - 1e-7})
+    values = [float(value) for value in exact._values(exact.base)]
+    ends = sum(row.limit is not None and row.node is not None for row in exact.rows)
+    assert ends == 3, "a cosine touches at both ends of the turn and at its middle"
+    assert values[:ends] == pytest.approx([1e-7 / 4] * ends, rel=1e-6)
+    assert values[ends] == pytest.approx(1e-7 / 2, rel=1e-6)
+    assert values[ends + 1 : -1] == pytest.approx([0.25] * ends, rel=1e-6)
+    assert values[-1] == pytest.approx(1.0, rel=1e-6)

@@ -190,3 +190,16 @@ def test_a_bound_of_a_variable_that_the_design_does_not_name_is_not_told():
 def test_a_limit_of_a_small_quantity_is_held_to_its_size(excess, ok):
     found = findings((("p", 1, 0.0),), {"x": excess, "y": 0.0}, sizes={"p": 1e-3})
     assert found[0][4] == ok
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_limit_may_be_missed_by_just_a_billionth(sign):
+    assert findings((("p", sign, 0.0),), {"x": sign * 1e-9, "y": 0.0})[0][4]
+
+
+@pytest.mark.parametrize(("excess", "ok"), [(0.9e-9, True), (1.1e-9, False)])
+def test_a_weighed_limit_is_held_to_a_billionth_of_one(excess, ok):
+    program = toy.program("xy", ROWS, WAVES)
+    job = toy.ToyJob(replace(program, limits=(Limit("p", 1, "p", 0.0, 50.0, "static", weight="y"),)))
+    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
+    assert [each.ok for each in found] == [ok]
