@@ -40,6 +40,7 @@ def test_a_row_that_touches_or_is_exceeded_is_active_and_an_equality_always(sign
     if touched:
         assert found.rows[0].excess == pytest.approx(expected, abs=1e-15)
         assert (found.rows[0].name, found.rows[0].reads, found.rows[0].place) == ("x", "x", 0)
+        assert (found.rows[0].sign, found.rows[0].scale, found.rows[0].node) == (1.0, 1.0, None)
 
 
 WAVES = {

@@ -62,6 +62,7 @@ def test_values_are_shown_as_the_scene_writes_them():
     assert words.shown("l1", 0.0305) == "3.05 cm"
     assert words.shown("theta", math.radians(2.2)) == "2.2 deg"
     assert words.shown("peak_torque", 88.68941349, 3) == "88.7 N*m"
+    assert words.shown("peak_torque", 88.68941349) == "88.6894 N*m"
     assert words.si("theta") == "rad"
 
 
