@@ -13,7 +13,7 @@ from loomopt.nlp.point import Point, Settings
 from loomopt.solving import search as searching
 from loomopt.solving.search import Candidate, Search, compared, judged, objectives, searched
 from loomopt.solving.verdict import Certificate, Level
-from loomopt.tolerances import MORE_STARTS, MOST_ALIKE, SAME_OBJECTIVE
+from loomopt.tolerances import FEASIBLE, MORE_STARTS, MOST_ALIKE, SAME_OBJECTIVE
 
 PROGRAM = toy.program("xy", {"f": lambda v: v["x"] ** 2, "g": lambda v: v["y"]}, objectives=("f", "g"))
 LEVELS = (Level("f", 0.0, 0.0, 0.0), Level("g", 0.0, 0.0, 0.0))
@@ -319,3 +319,36 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
     assert (twice.solved, twice.built) == (0.75, 0.25)
     assert searching._certified(twice, twice.candidates[0]).certified == 1.0
+
+
+@pytest.mark.parametrize(
+    ("slopes", "weak"),
+    [
+        ((1.0,), False),
+        ((1.0, 0.0), True),
+        ((0.0, 1.0), False),
+        ((0.0, 1.0, 0.0), True),
+        ((0.0, 0.0, 1.0), False),
+        ((), False),
+    ],
+)
+def test_all_levels_but_the_last_may_have_given_way(slopes, weak):
+    levels = tuple(Level("f", slope, 0.0, 0.0) for slope in slopes)
+    assert searching._too_weak(Settings(), replace(BAD, levels=levels)) == weak
+
+
+@pytest.mark.parametrize(("penalty", "weak"), [(1e5, True), (1.001e5, False)])
+def test_a_weight_grows_to_the_strongest_and_no_farther(penalty, weak):
+    assert searching._too_weak(replace(Settings(), penalty=penalty), gave_way(stationarity=1.0)) == weak
+
+
+@pytest.mark.parametrize(("held", "weak"), [(500.0, True), (499.9, False)])
+def test_a_weight_must_exceed_what_it_holds_twice(held, weak):
+    assert searching._too_weak(replace(Settings(), penalty=1000.0), gave_way(held=held)) == weak
+    first = replace(BAD, levels=(Level("f", 0.0, 0.0, 9e9), Level("g", 0.0, 0.0, 0.0)))
+    assert not searching._too_weak(Settings(), first), "what holds a level counts, not what the first one says"
+
+
+def test_a_step_that_leaves_limits_just_held_is_kept(certified):
+    best, _ = followed(certified, sloping(1e-5, -0.25), sloping(1e-8, 0.0, feasibility=FEASIBLE))
+    assert best.x["x"] == 0.75
