@@ -13,6 +13,7 @@ from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Critical, Local
+from loomopt.tolerances import FLAT
 
 
 def local_at(program, **x):
@@ -178,6 +179,13 @@ def sliding(bend):
 @pytest.mark.parametrize(("bend", "settled"), [(1.0, True), (1e-7, True), (4e-8, False), (0.0, False)])
 def test_what_is_left_beside_a_move_must_curve(bend, settled):
     assert curvature(sliding(bend), x=0.0, y=0.0, z=1.0).settled == settled
+
+
+@pytest.mark.parametrize(("bend", "settled"), [(FLAT, False), (1.001 * FLAT, True)])
+def test_what_is_left_beside_a_move_curves_by_more_than_none(bend, settled):
+    local = local_at(sliding(1.0), x=0.0, y=0.0, z=1.0)
+    basis = np.eye(3)[:, 1:]
+    assert second_order._settled_but_for_moves(local, 0, basis, np.diag([bend, 0.0])) == settled
 
 
 @pytest.mark.parametrize(("off", "is_open"), [(0.0, True), (0.9e-7, True), (1.1e-7, False)])

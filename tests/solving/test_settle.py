@@ -248,3 +248,9 @@ def test_a_limit_that_is_touched_and_stays_where_it_is_does_not_change():
 def test_a_way_must_be_flat_a_thousandth_beyond_the_design_and_no_farther(end, flat):
     rows = {"f": lambda v: v["x"] ** 2 + max(0.0, v["y"] - end)}
     assert slid(rows, 0.25)[0] == (0.25 if flat else 0.5)
+
+
+def test_a_bound_of_what_moves_is_no_limit_that_changes_and_any_other_is():
+    there, move = {"x": 1.0, "y": 9.0}, (slide(1.0, 0.5, 9.0),)
+    assert unchanging(toy.program("xy", FLAT, bounds={"y": (0.5, 9.0)}, moves=move), there) == [{"y": 1.0}]
+    assert unchanging(toy.program("xy", FLAT, limits=(("y", 1, 9.0),), moves=move), there) == []
