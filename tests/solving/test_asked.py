@@ -35,3 +35,9 @@ def test_the_default_target_is_the_jobs():
     assert target_name(SCENE, None) == target_name(SCENE, "least") == "least"
     with pytest.raises(BadInput, match="has no target most"):
         target_name(SCENE, "most")
+
+
+def test_as_many_as_ten_thousand_starts_are_allowed():
+    check_numbers(1e-8, 10_000)
+    with pytest.raises(BadInput, match="number of starts"):
+        check_numbers(1e-8, 10_001)

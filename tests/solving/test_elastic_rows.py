@@ -40,6 +40,7 @@ def test_single_values_come_first_and_each_whole_cycle_limit_has_a_row_per_slot(
     first = none.copy()
     first[3] = 1.0
     assert priced(made, first) == ("w <= 0.25",)
+    assert PRICED == 1e-6
     assert priced(made, [PRICED, PRICED * 1.001, *none[2:]]) == ("y <= 1",)
 
 

@@ -60,3 +60,16 @@ def test_what_has_no_value_does_not_fall():
 def test_a_fall_counts_above_a_trillionth(fall, counts):
     """f / 2 falls by half the way along −y; the shorter probe is 3e-3 long."""
     assert falls(direction={"y": -2 * fall / 3e-3}) == counts
+
+
+@pytest.mark.parametrize(("turn", "expected"), [(2.9e-3, False), (3.1e-3, True), (9.9e-3, True)])
+def test_the_shorter_probe_is_three_thousandths_long(turn, expected):
+    """The objective lies low up to a turn, and at a hundredth again."""
+    early = toy.program("x", {"f": lambda v: -1.0 if 0.0 < v["x"] < turn or v["x"] > 9.95e-3 else 0.0})
+    assert Lagrangian(early, {"x": 0.0}, 0, {}, {}).falls({"x": 1.0}, 0.0) == expected
+
+
+@pytest.mark.parametrize(("end", "expected"), [(9.9e-3, False), (1.01e-2, True)])
+def test_the_longer_probe_is_a_hundredth_long(end, expected):
+    pit = toy.program("x", {"f": lambda v: -1.0 if 0.0 < v["x"] < end else 0.0})
+    assert Lagrangian(pit, {"x": 0.0}, 0, {}, {}).falls({"x": 1.0}, 0.0) == expected

@@ -7,7 +7,7 @@ from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
 from loomopt.program.program import Move, Wish
-from loomopt.solving.settle import goal_of, settle, unchanging, wished
+from loomopt.solving.settle import _directions, _ends, goal_of, settle, unchanging, wished
 
 
 def slide(goal, low=-100.0, high=100.0):
@@ -259,3 +259,16 @@ def test_a_bound_of_what_moves_is_no_limit_that_changes_and_any_other_is():
 def test_a_way_is_followed_to_its_wish_and_not_to_where_limits_hold_again_beyond_it():
     rows = FLAT | {"h": lambda v: float(2.0 < v["y"] < 50.0)}
     assert slid(rows, 3.0, limits=(("h", 1, 0.5),))[0] == pytest.approx(2.0, abs=1e-11)
+
+
+def test_a_direction_ends_at_its_bounds_or_at_the_factors_they_allow():
+    axis, scale = a_move(), a_move("scale", along=("x", "y"), bounds=LENGTHY)
+    assert list(_ends(axis, {"y": 1.0}, {"y": 2.0})) == [{"y": 0.5}, {"y": 4.0}]
+    assert list(_ends(scale, {"x": 2.0, "y": 4.0}, {"x": 2.0, "y": 4.0})) == [
+        {"x": 1.0, "y": 2.0},
+        {"x": 2.5, "y": 5.0},
+    ]
+    assert list(_directions(scale, {"x": 2.0, "y": 4.0})) == [{"x": 2.0, "y": 4.0}]
+    assert list(_directions(scale, {"x": 0.0, "y": 0.0})) == []
+    endless = a_move(along=("x", "y"), bounds={"x": (0.0, np.inf), "y": (0.0, 1.0)})
+    assert list(_directions(endless, {"x": 2.0, "y": 0.5})) == [{"y": 1.0}]
