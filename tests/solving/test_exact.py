@@ -112,3 +112,16 @@ def test_rows_are_off_their_bounds_by_what_they_exceed_and_pieces_as_large_as_th
     assert values[ends] == pytest.approx(1e-7 / 2, rel=1e-6)
     assert values[ends + 1 : -1] == pytest.approx([0.25] * ends, rel=1e-6)
     assert values[-1] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_a_lopsided_extreme_bends_the_peak_by_its_own_curvature():
+    """Of x cos φ + y sin 2 φ; one-sided differences in φ would see the slope that Newton's step leaves."""
+    waves = {"w": lambda m, v, phi: v["x"] * m.cos(phi) + v["y"] * m.sin(2 * phi)}
+    x, y, phi = 1.0, 0.3, 0.4
+    for _ in range(20):
+        bend = -x * math.cos(phi) - 4 * y * math.sin(2 * phi)
+        phi -= (-x * math.sin(phi) + 2 * y * math.cos(2 * phi)) / bend
+    moves = np.array([-math.sin(phi), 2 * math.cos(2 * phi)])
+    program = toy.program("xy", {}, waves, objectives=("peak w",), signed=True)
+    exact, place = exact_at(program, {"x": x, "y": y})
+    assert exact.curvatures(np.eye(2))[place["w"]] == pytest.approx(-np.outer(moves, moves) / bend, rel=1e-11)
