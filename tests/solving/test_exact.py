@@ -115,7 +115,7 @@ def test_rows_are_off_their_bounds_by_what_they_exceed_and_pieces_as_large_as_th
 
 
 def test_a_lopsided_extreme_bends_the_peak_by_its_own_curvature():
-    """Of x cos φ + y sin 2 φ; one-sided differences in φ would see the slope that Newton's step leaves."""
+    """Of x cos φ + y sin 2 φ, whose third derivative in φ is not zero at its top."""
     waves = {"w": lambda m, v, phi: v["x"] * m.cos(phi) + v["y"] * m.sin(2 * phi)}
     x, y, phi = 1.0, 0.3, 0.4
     for _ in range(20):
