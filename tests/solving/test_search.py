@@ -306,11 +306,6 @@ def test_a_variable_that_a_step_does_not_name_stays():
     assert searching._stepped(PROGRAM, {"x": 1.0, "y": 2.0}, {"x": 0.5}) == {"x": 1.5, "y": 2.0}
 
 
-def test_an_empty_search_has_spent_no_time():
-    nothing = empty()
-    assert (nothing.built, nothing.solved, nothing.certified, nothing.candidates) == (0.0, 0.0, 0.0, ())
-
-
 def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     clock = iter([10.0, 10.25, 20.0, 20.5, 30.0, 31.0])
     monkeypatch.setattr(time, "perf_counter", lambda: next(clock))
