@@ -268,3 +268,18 @@ def test_no_more_random_starts_are_drawn_than_are_worth_it(monkeypatch):
     monkeypatch.setattr(exchange, "sampler_at", lambda program, x: drawn.append(x))
     assert exchange.starts(task, 3) == []
     assert len(drawn) == 1 + 200 * 3
+
+
+def test_iterations_are_those_of_all_rounds(monkeypatch):
+    told: list[int] = []
+
+    def counted(*arguments):
+        answer = ipopt.run(*arguments)
+        told.append(answer.iterations)
+        return answer
+
+    monkeypatch.setattr(exchange, "run", counted)
+    task = program(limits=(("circle", 1, 1.0),))
+    point = solved(task, polished=False)
+    assert len(told) > 2
+    assert point.iterations == sum(told)

@@ -171,3 +171,17 @@ def test_points_that_were_never_reached_are_no_neighbours():
     point = exchange.solve(task, task.starts[0], Settings(), warm=lost)
     assert point.reached
     assert point.iterations > 0
+
+
+def test_multipliers_of_bounds_keep_their_signs():
+    """Negative at a lower bound, as the solver's are: the next neighbour starts from them."""
+
+    def bounded(least):
+        task = program((), PEAK)
+        return replace(task, variables=(task.variables[0], replace(task.variables[1], lower=least)))
+
+    near, cold = solved(bounded(2.0)), solved(bounded(2.1))
+    found = followed(bounded(2.1), near)
+    assert found.x == pytest.approx(cold.x, abs=1e-9)
+    assert found.raw["lam_x"] == pytest.approx(cold.raw["lam_x"], abs=1e-6)
+    assert found.raw["lam_x"][1] < -0.1

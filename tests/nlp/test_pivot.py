@@ -240,6 +240,22 @@ def test_a_step_along_curvature_is_newton_s(monkeypatch):
     assert reach(stopped, call([0.1, 0.1], rows=2), bound([1, 0]), 5.0).x == pytest.approx([0.3, 0.3], abs=1e-12)
 
 
+def test_the_limit_whose_multiplier_is_brought_to_zero_first_gives_way(monkeypatch):
+    monkeypatch.setattr(pivot, "PIVOTS", 2)
+    for prices, expected in (((0.9, 0.2), [1, 0.5]), ((0.2, 0.9), [0.5, 1])):
+        nlp = programme([-price for price in prices], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 1.5])
+        found = reach(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
+        assert found.x == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_objective_s_curvature_has_weight_1(monkeypatch):
+    monkeypatch.setattr(pivot, "PIVOTS", 2)
+    nlp = curved([-1, -1], 2 * np.eye(2), [[-1, 0]], [0.0])
+    nlp.curvature = lambda x, p, weight, prices: 2 * weight * np.eye(2)
+    found = reach(nlp, call([0.5, 0.1], rows=1), bound([0]), 5.0)
+    assert found.x == pytest.approx([0.5, 0.5], abs=1e-12)
+
+
 def test_answers_followed_over_changes_of_what_binds_are_those_found_afresh():
     near = lo.solve(lo.load("beatup").set("operation.M0", "640 N*m"))
     limits = set()

@@ -34,26 +34,24 @@ def turned(angle, corners):
     return float((angle - begin) % TURN < (end - begin) % TURN)
 
 
-CORNERS = (0.4, 5.9)
-CYCLE = split(CORNERS, ("half",), lambda angle: (turned(angle, CORNERS),))
-
-
+@pytest.mark.parametrize("corners", [(0.4, 5.9), (5.9, 0.4)], ids=str)
 @pytest.mark.parametrize("piece", [0, 1])
 @pytest.mark.parametrize("u", [0.0, 0.25, 1.0])
-def test_a_node_is_read_as_it_was_written(piece, u):
+def test_a_node_is_read_as_it_was_written(corners, piece, u):
+    cycle = split(corners, ("half",), lambda angle: (turned(angle, corners),))
     node = NodeParameters(2, ("half", "datum"))
-    row = node.write(CYCLE, piece, u, 0.3)
+    row = node.write(cycle, piece, u, 0.3)
     assert len(row) == node.size == 8
-    read = node.read(row, CORNERS)
-    here = float(CYCLE.angles(np.array([piece]), np.array([u]))[0])
-    assert read.phi == pytest.approx(here, rel=1e-15)
-    assert read.switch == {"half": CYCLE.switch(piece)["half"], "datum": 0.0}
-    assert node.read_width(row, CORNERS) == pytest.approx(0.3 * np.diff(CYCLE.starts)[piece], rel=1e-14)
-    assert node.read_width(node.write(CYCLE, piece, u), CORNERS) == 0.0
-    moved = tuple(corner + 0.1 for corner in CORNERS)
+    read = node.read(row, corners)
+    here = float(cycle.angles(np.array([piece]), np.array([u]))[0])
+    assert read.phi == pytest.approx(here, rel=1e-14)
+    assert read.switch == {"half": cycle.switch(piece)["half"], "datum": 0.0}
+    assert node.read_width(row, corners) == pytest.approx(0.3 * np.diff(cycle.starts)[piece], rel=1e-14)
+    assert node.read_width(node.write(cycle, piece, u), corners) == 0.0
+    moved = tuple(corner + 0.1 for corner in corners)
     assert node.read(row, moved).phi == pytest.approx(here + 0.1, rel=1e-14)
-    wider = (CORNERS[0], CORNERS[1] + 0.1)
-    width = np.diff(CYCLE.starts)[piece] + (0.1 if piece == 0 else -0.1)
+    wider = (corners[0], corners[1] + 0.1)
+    width = np.diff(cycle.starts)[piece] + (0.1 if piece == 0 else -0.1)
     assert node.read_width(row, wider) == pytest.approx(0.3 * width, rel=1e-14)
 
 
