@@ -1,6 +1,5 @@
 """The mechanism with its effects at one instant, and the formulas that are read there: quantities, rows, integrals."""
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,26 +22,31 @@ class Instant:
 
     def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
         self.model, self.maths, self.given, self.node, self.event = model, maths, given, node, event
+        self._pose: Number = None
 
     @property
     def values(self) -> Values:
         """The scene's numbers and what follows from them, by name."""
         return self.given.values
 
-    @functools.cached_property
+    @property
     def pose(self) -> Number:
         """The mechanism's pose."""
-        kinematics = self.model.kinematics
-        if self.event:
-            return kinematics.still(self.maths, self.given, self.event, self.node.switch)
-        return kinematics.pose(self.maths, self.given, self.node)
+        # Not functools.cached_property: its lock costs as much as a node's own arithmetic.
+        if self._pose is None:
+            kinematics = self.model.kinematics
+            if self.event:
+                self._pose = kinematics.still(self.maths, self.given, self.event, self.node.switch)
+            else:
+                self._pose = kinematics.pose(self.maths, self.given, self.node)
+        return self._pose
 
-    @functools.cached_property
+    @property
     def force(self) -> Number:
         """Q, N or N·m: what the mechanism must supply at its output."""
         return balance.output_force(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
 
-    @functools.cached_property
+    @property
     def crank_torque(self) -> Number:
         """The torque on the crank, N·m."""
         return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)

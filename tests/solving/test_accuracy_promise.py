@@ -204,7 +204,7 @@ def test_no_more_is_computed_than_it_takes(name):
 def test_other_machines_cost_more_where_more_is_asked(name):
     counts = [solved(name, accuracy).solver["evaluations"] for accuracy in (*ASKED, BEST)]
     assert counts == sorted(counts)
-    assert counts[-1] > counts[0] or name == "pulse", "it has nothing that holds all round"
+    assert counts[-1] > counts[0] or name in ("pulse", "retrofit"), "they have nothing that holds all round"
 
 
 # Curves -------------------------------------------------------------------------------------------------------------

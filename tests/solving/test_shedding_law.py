@@ -216,6 +216,8 @@ def slope(sampled, piece, corner):
     for away in (0.0, 1e-4):
         node = Node(corner + inside * away * (end - start), switch)
         pose = sampled.model.instant(maths.FLOAT, sampled.given, node).pose
-        pull = -warp.force(maths.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], 0.0)
+        pull = -warp.force(
+            maths.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], switch["warp_tension"]
+        )
         found.append((pose.q, pull))
     return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])

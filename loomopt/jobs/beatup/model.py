@@ -166,6 +166,7 @@ ROWS: dict[str, Row] = {
 """Figures and rows of front dead centre and of the linkage as a whole, SI."""
 
 
+@functools.lru_cache(maxsize=64)
 def model(
     effects: tuple[Effect, ...],
     words: tuple[tuple[str, str, str], ...],

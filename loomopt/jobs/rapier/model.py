@@ -228,6 +228,7 @@ def match_mean(angles: tuple[float, ...], travels: tuple[float, ...]) -> Integra
     return Integral("match_mean_square", "match_rms", "miss_square", angles=angles, data=travels)
 
 
+@functools.lru_cache(maxsize=64)
 def model(
     effects: tuple[Effect, ...],
     words: tuple[tuple[str, str, str], ...],
