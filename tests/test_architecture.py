@@ -16,7 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
-    "maths errors frozen tolerances",
+    "maths errors frozen tolerances lazy",
     "units",
     "quantities",
     "schema files",

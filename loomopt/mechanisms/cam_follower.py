@@ -6,11 +6,11 @@ arm l is pivoted at the distance a from the cam's axis. Seen along the arm the c
 (a sin b, a cos b − l(1 + φ')): its first part never vanishes, so the cam stays on one side.
 """
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from loomopt.lazy import lazy
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
 
@@ -60,19 +60,19 @@ class Contact:
         """Angle between arm and centre line, rad."""
         return self._angle
 
-    @functools.cached_property
+    @lazy
     def _angle(self) -> Number:
         """Angle b between arm and centre line, rad."""
         return self.phi + self.follower.start_angle(self.maths)
 
-    @functools.cached_property
+    @lazy
     def _local(self) -> tuple[Number, Number]:
         """Tangent d(centre)/dθ, m: along the arm (from roller to pivot) and across it."""
         a, arm = self.follower.centre_distance, self.follower.arm
         b = self._angle
         return a * self.maths.sin(b), a * self.maths.cos(b) - arm * (1 + self.phi_1)
 
-    @functools.cached_property
+    @lazy
     def speed(self) -> Number:
         """Length of the tangent |d(centre)/dθ|, m."""
         along, across = self._local
@@ -104,7 +104,7 @@ class Contact:
         radius = self.follower.roller_radius
         return Vector(centre.x + radius * normal.x, centre.y + radius * normal.y)
 
-    @functools.cached_property
+    @lazy
     def pressure_angle(self) -> Number:
         """Angle, rad, between the common normal and the roller centre's path.
 
@@ -114,7 +114,7 @@ class Contact:
         along, across = self._local
         return self.maths.atan2(-across, along)
 
-    @functools.cached_property
+    @lazy
     def curvature(self) -> Number:
         """Signed curvature of the curve of the roller centre, 1/m; positive where convex: its centre on the cam's side.
 
@@ -126,7 +126,7 @@ class Contact:
         bent = a * (self.phi_1 * (a - arm * turning * cosine) + arm * self.phi_2 * sine)
         return turning / self.speed - bent / self.speed**3
 
-    @functools.cached_property
+    @lazy
     def profile_curvature(self) -> Number:
         """Signed curvature of the cam's surface, 1/m; the surface is undercut where curvature × roller radius ≥ 1."""
         return self.curvature / (1 - self.curvature * self.follower.roller_radius)

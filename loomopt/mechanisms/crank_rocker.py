@@ -4,10 +4,10 @@ Angles in rad from AD, derivatives with respect to φ; lengths in m (any one uni
 the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cranks and near dead centres.
 """
 
-import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number, numpy
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector
@@ -38,23 +38,23 @@ class Pose:
     lengths: Lengths
     phi: Number
 
-    @functools.cached_property
+    @lazy
     def crank(self) -> Vector:
         """Crank vector A→B, m."""
         return Vector(self.lengths.l1 * self.maths.cos(self.phi), self.lengths.l1 * self.maths.sin(self.phi))
 
-    @functools.cached_property
+    @lazy
     def dyad(self) -> dyad.Dyad:
         """Rod (link 1, B→C) and rocker (link 2, D→C)."""
         base = Vector(self.lengths.l4 - self.crank.x, -self.crank.y)
         return dyad.close(self.maths, base, self.lengths.l2, self.lengths.l3, self.lengths.side)
 
-    @functools.cached_property
+    @lazy
     def psi(self) -> Number:
         """Angle ψ of the rocker D→C from AD, rad."""
         return self.maths.atan2(self.dyad.link2.y, self.dyad.link2.x)
 
-    @functools.cached_property
+    @lazy
     def _rates(self) -> tuple[Number, Number]:
         return dyad.rates(self.dyad, Vector(self.crank.y, -self.crank.x))
 
@@ -63,12 +63,12 @@ class Pose:
         """ψ' = dψ/dφ."""
         return self._rates[1]
 
-    @functools.cached_property
+    @lazy
     def psi_2(self) -> Number:
         """ψ'' = d²ψ/dφ²."""
         return dyad.second_rate_2(self.dyad, self.crank, *self._rates, self.lengths.l2)
 
-    @functools.cached_property
+    @lazy
     def psi_3(self) -> Number:
         """Third derivative of ψ with respect to φ."""
         jerk, seconds = Vector(-self.crank.y, self.crank.x), (self.rod_2, self.psi_2)
@@ -79,24 +79,24 @@ class Pose:
         """First derivative of the rod's angle."""
         return self._rates[0]
 
-    @functools.cached_property
+    @lazy
     def rod_2(self) -> Number:
         """Second derivative of the rod's angle."""
         return dyad.second_rate_1(self.dyad, self.crank, *self._rates, self.lengths.l3)
 
-    @functools.cached_property
+    @lazy
     def obliquity(self) -> Number:
         """By how much the transmission angle at C falls short of a right angle, rad; negative where it exceeds."""
         dyad_at_c = self.dyad
         across = self.lengths.side * dyad_at_c.area4 / 2
         return self.maths.atan2(dyad.dot(dyad_at_c.link1, dyad_at_c.link2), across)
 
-    @functools.cached_property
+    @lazy
     def cos_crank_rod(self) -> Number:
         """Cosine of the angle from rod to crank."""
         return dyad.dot(self.crank, self.dyad.link1) / (self.lengths.l1 * self.lengths.l2)
 
-    @functools.cached_property
+    @lazy
     def sin_crank_rod(self) -> Number:
         """Sine of the angle from rod to crank."""
         rod, crank = self.dyad.link1, self.crank
@@ -146,43 +146,43 @@ class DeadCentres:
     maths: Maths
     lengths: Lengths
 
-    @functools.cached_property
+    @lazy
     def _areas(self) -> tuple[Number, Number]:
         """Four times the area of the triangle A C D, m², at the front and at the rear."""
         l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
         return dyad.heron(self.maths, l2 + l1, l3, l4), dyad.heron(self.maths, l2 - l1, l3, l4)
 
-    @functools.cached_property
+    @lazy
     def _at_crank(self) -> tuple[Number, Number]:
         """2 × distance × l4 × cosine of the angle at A, m², at the front and at the rear."""
         l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
         frame = (l4 - l3) * (l4 + l3)
         return (l2 + l1) ** 2 + frame, (l2 - l1) ** 2 + frame
 
-    @functools.cached_property
+    @lazy
     def _at_rocker(self) -> tuple[Number, Number]:
         """2 l3 l4 × cosine of the angle at D, m², at the front and at the rear."""
         l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
         squares = l3 * l3 + l4 * l4
         return squares - (l2 + l1) ** 2, squares - (l2 - l1) ** 2
 
-    @functools.cached_property
+    @lazy
     def _excess(self) -> Number:
         """l3² + l4² − l1² − l2², m²."""
         l1, l2, l3, l4 = self.lengths.l1, self.lengths.l2, self.lengths.l3, self.lengths.l4
         return l3 * l3 + l4 * l4 - l1 * l1 - l2 * l2
 
-    @functools.cached_property
+    @lazy
     def beta(self) -> Number:
         """Crank angle β of front dead centre."""
         return self.lengths.side * self.maths.atan2(self._areas[0], self._at_crank[0])
 
-    @functools.cached_property
+    @lazy
     def beta_r(self) -> Number:
         """Crank angle of rear dead centre less π."""
         return self.lengths.side * self.maths.atan2(self._areas[1], self._at_crank[1])
 
-    @functools.cached_property
+    @lazy
     def theta(self) -> Number:
         """θ = β − β_r, as one angle."""
         (front, rear), (at_front, at_rear) = self._areas, self._at_crank
@@ -190,7 +190,7 @@ class DeadCentres:
         sine = 4 * self.lengths.l1 * self.lengths.l2 * (self._excess * (at_front + at_rear) / total - total / 2)
         return self.lengths.side * self.maths.atan2(sine, front * rear + at_front * at_rear)
 
-    @functools.cached_property
+    @lazy
     def swing(self) -> Number:
         """ψ_s = |ψ(rear) − ψ(front)|, as one angle."""
         (front, rear), (at_front, at_rear) = self._areas, self._at_rocker
@@ -198,23 +198,23 @@ class DeadCentres:
         sine = 4 * self.lengths.l1 * self.lengths.l2 * (2 * self._excess**2 / total + total / 2)
         return self.maths.atan2(sine, front * rear + at_front * at_rear)
 
-    @functools.cached_property
+    @lazy
     def psi_front(self) -> Number:
         """ψ at front dead centre."""
         return self.lengths.side * self.maths.atan2(self._areas[0], -self._at_rocker[0])
 
-    @functools.cached_property
+    @lazy
     def psi_rear(self) -> Number:
         """ψ at rear dead centre."""
         return self.lengths.side * self.maths.atan2(self._areas[1], -self._at_rocker[1])
 
-    @functools.cached_property
+    @lazy
     def psi_2_front(self) -> Number:
         """ψ'' at front dead centre: l1 (l1+l2)/(l2 l3 sin μ), the sine written through the triangle's area."""
         l1, l2 = self.lengths.l1, self.lengths.l2
         return self.lengths.side * 2 * l1 * (l2 + l1) ** 2 / (l2 * self._areas[0])
 
-    @functools.cached_property
+    @lazy
     def psi_2_rear(self) -> Number:
         """ψ'' at rear dead centre."""
         l1, l2 = self.lengths.l1, self.lengths.l2
@@ -227,7 +227,7 @@ class Still(Pose):
 
     centres: "DeadCentres"
 
-    @functools.cached_property
+    @lazy
     def dyad(self) -> dyad.Dyad:
         """Rod, in line with the crank, and rocker, from the triangle A C D."""
         cos, sin, sides = self.maths.cos(self.phi), self.maths.sin(self.phi), self.lengths
@@ -235,11 +235,11 @@ class Still(Pose):
         rocker = Vector(self.crank.x + rod.x - sides.l4, self.crank.y + rod.y)
         return dyad.Dyad(rod, rocker, 2 * (rod.x * rocker.y - rod.y * rocker.x))
 
-    @functools.cached_property
+    @lazy
     def _rates(self) -> tuple[Number, Number]:
         return -self.lengths.l1 / self.lengths.l2, 0
 
-    @functools.cached_property
+    @lazy
     def psi_2(self) -> Number:
         """ψ'' = l1 (l1 + l2)/(l2 l3 sin μ)."""
         return self.centres.psi_2_front

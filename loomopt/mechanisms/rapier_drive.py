@@ -6,9 +6,9 @@ centre, counter-clockwise. Five-bar C0 C D B2 B0: crank l4 turns the other way a
 link l5 = CD; l6 = B2D carries the gear sector; B2 on the sley at radius l3p, angle φ3 + α. Lengths in m, angles in rad.
 """
 
-import functools
 from dataclasses import dataclass
 
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker, dyad
 from loomopt.mechanisms.crank_rocker import Lengths
@@ -76,17 +76,17 @@ class Sley:
     mirror: int = 1
     sense: int = 1
 
-    @functools.cached_property
+    @lazy
     def lengths(self) -> Lengths:
         """The four-bar as a crank-rocker on its own side."""
         return sley_lengths(self.dimensions, self.mirror)
 
-    @functools.cached_property
+    @lazy
     def centres(self) -> crank_rocker.DeadCentres:
         """Its dead centres, angles from A0→B0."""
         return crank_rocker.dead_centres(self.maths, self.lengths)
 
-    @functools.cached_property
+    @lazy
     def stand(self) -> Stand:
         """How it stands: at front dead centre the sley is at φ30."""
         frame_angle = self.dimensions.phi30 - self.centres.psi_front
@@ -111,14 +111,14 @@ class Pose:
     stand: Stand
     phi1: Number
 
-    @functools.cached_property
+    @lazy
     def four_bar(self) -> crank_rocker.Pose:
         """The sley four-bar, its derivatives with respect to its own crank angle."""
         stand = self.stand
         lengths = sley_lengths(self.dimensions, stand.mirror)
         return crank_rocker.Pose(self.maths, lengths, stand.sense * self.phi1 + stand.beta)
 
-    @functools.cached_property
+    @lazy
     def phi3(self) -> Number:
         """Angle of the sley B0B1 from x."""
         return self.stand.frame_angle + self.four_bar.psi
@@ -138,42 +138,42 @@ class Pose:
         """Third derivative of φ3."""
         return self.stand.sense * self.four_bar.psi_3
 
-    @functools.cached_property
+    @lazy
     def carrier(self) -> Vector:
         """Vector B0→B2, m."""
         d = self.dimensions
         return polar(self.maths, d.l3p, self.phi3 + d.alpha)
 
-    @functools.cached_property
+    @lazy
     def second_crank(self) -> Vector:
         """Vector C0→C, m."""
         d = self.dimensions
         return polar(self.maths, d.l4, d.phi40 - 2 * self.stand.sense * self.phi1)
 
-    @functools.cached_property
+    @lazy
     def base(self) -> Vector:
         """Vector C→B2, m: what links l5 and l6 have to span."""
         d, carrier, crank = self.dimensions, self.carrier, self.second_crank
         return Vector(carrier.x - d.C0x - crank.x, carrier.y - d.C0y - crank.y)
 
-    @functools.cached_property
+    @lazy
     def dyad(self) -> dyad.Dyad:
         """Links l5 (C→D) and l6 (B2→D)."""
         d = self.dimensions
         return dyad.close(self.maths, self.base, d.l5, d.l6, -self.stand.mirror)
 
-    @functools.cached_property
+    @lazy
     def relative(self) -> Vector:
         """The driving link l6 as seen from B0→B2: (cos, sin) of its angle, scaled."""
         return between(self.carrier, self.dyad.link2)
 
-    @functools.cached_property
+    @lazy
     def _base_1(self) -> Vector:
         rate, turn = self.phi3_1, 2 * self.stand.sense
         carrier, crank = self.carrier, self.second_crank
         return Vector(-rate * carrier.y - turn * crank.y, rate * carrier.x + turn * crank.x)
 
-    @functools.cached_property
+    @lazy
     def _base_2(self) -> Vector:
         rate, second = self.phi3_1, self.phi3_2
         carrier, crank = self.carrier, self.second_crank
@@ -182,7 +182,7 @@ class Pose:
             second * carrier.x - rate * rate * carrier.y + 4 * crank.y,
         )
 
-    @functools.cached_property
+    @lazy
     def _base_3(self) -> Vector:
         rate, turn = self.phi3_1, 8 * self.stand.sense
         along, across = -3 * rate * self.phi3_2, self.phi3_3 - rate**3
@@ -192,31 +192,31 @@ class Pose:
             along * carrier.y + across * carrier.x - turn * crank.x,
         )
 
-    @functools.cached_property
+    @lazy
     def rates(self) -> tuple[Number, Number]:
         """First derivatives of the angles of links l5 and l6."""
         return dyad.rates(self.dyad, self._base_1)
 
-    @functools.cached_property
+    @lazy
     def phi6_2(self) -> Number:
         """Second derivative of φ6."""
         return dyad.second_rate_2(self.dyad, self._base_2, *self.rates, self.dimensions.l5)
 
-    @functools.cached_property
+    @lazy
     def _seconds(self) -> tuple[Number, Number]:
         return dyad.second_rate_1(self.dyad, self._base_2, *self.rates, self.dimensions.l6), self.phi6_2
 
-    @functools.cached_property
+    @lazy
     def phi63_1(self) -> Number:
         """First derivative of φ63 = φ6 − φ3."""
         return self.rates[1] - self.phi3_1
 
-    @functools.cached_property
+    @lazy
     def phi63_2(self) -> Number:
         """Second derivative of φ63."""
         return self.phi6_2 - self.phi3_2
 
-    @functools.cached_property
+    @lazy
     def phi63_3(self) -> Number:
         """Third derivative of φ63."""
         third = dyad.third_rate_2(self.dyad, self._base_3, self.rates, self._seconds, self.dimensions.l5)
@@ -227,13 +227,13 @@ class Pose:
         change = between(front, self.relative)
         return self.maths.atan2(change.y, change.x)
 
-    @functools.cached_property
+    @lazy
     def obliquity(self) -> Number:
         """By how much the angle at D between l5 and l6 falls short of a right angle, rad; negative where it exceeds."""
         angle = between(self.dyad.link1, self.dyad.link2)
         return self.maths.atan2(angle.x, -self.stand.mirror * angle.y)
 
-    @functools.cached_property
+    @lazy
     def joints(self) -> dict[str, Vector]:
         """Every joint by the paper's name, m, from B0."""
         d, along = self.dimensions, polar(self.maths, 1, self.stand.frame_angle)

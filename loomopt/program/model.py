@@ -12,6 +12,7 @@ from loomopt import balance, cycle
 from loomopt.balance import Acting, Given
 from loomopt.cycle import Cycle, Floats, Node, Where
 from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number, numpy
 from loomopt.owned import label, owned
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
@@ -46,7 +47,7 @@ class JobModel:
     known: frozenset[str] = frozenset()
     cases: tuple[tuple[str, ...], ...] = ()
 
-    @functools.cached_property
+    @lazy
     def key(self) -> Hashable:
         """What distinguishes this model's formulas from another's."""
         means = tuple((mean.name, len(mean.angles)) for mean in self.integrals)
@@ -54,22 +55,22 @@ class JobModel:
         own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
         return own, self.effects, self.words, self.known, self.cases
 
-    @functools.cached_property
+    @lazy
     def loads(self) -> tuple[Acting, ...]:
         """What acts in the balance, in order."""
         return tuple(effect for effect in self.effects if isinstance(effect, Load | State))
 
-    @functools.cached_property
+    @lazy
     def checks(self) -> tuple[Check[Any], ...]:
         """Effects that take no part in the balance."""
         return tuple(effect for effect in self.effects if isinstance(effect, Check))
 
-    @functools.cached_property
+    @lazy
     def called(self) -> frozenset[str]:
         """What the effects read beside the mechanism's lengths: numbers, and events of the motion."""
         return frozenset(name for effect in self.effects for name in effect.reads)
 
-    @functools.cached_property
+    @lazy
     def labels(self) -> dict[str, str]:
         """Full name of every number of the effects' tables → what a designer calls it."""
         return {owned(effect, key): label(effect, key) for effect in self.effects for key in effect.own.model_fields}
@@ -78,7 +79,7 @@ class JobModel:
         """Return the words of an effect's table by key."""
         return {key: word for name, key, word in self.words if name == effect}
 
-    @functools.cached_property
+    @lazy
     def known_in(self) -> tuple[Where, ...]:
         """The pieces where all loads are known; empty for all of the cycle."""
         loads = [load for load in self.loads if isinstance(load, Load)]
@@ -86,7 +87,7 @@ class JobModel:
 
     # Quantities and rows.
 
-    @functools.cached_property
+    @lazy
     def _quantities(self) -> dict[str, Quantity]:
         found = dict(self.own_quantities)
         for prefix, group in self.kinematics.groups.items():
@@ -97,7 +98,7 @@ class JobModel:
                 found[name] = Quantity(functools.partial(_of_check, check, name))
         return found
 
-    @functools.cached_property
+    @lazy
     def _rows(self) -> dict[str, Row]:
         found = dict(self.own_rows)
         for prefix, group in self.kinematics.groups.items():
@@ -111,17 +112,17 @@ class JobModel:
         known = not self.known or self.known.issuperset(row.needs)
         return known and (not row.event or any(load.acts == "output" for load in self.loads))
 
-    @functools.cached_property
+    @lazy
     def events_read(self) -> tuple[str, ...]:
         """Events at which rows stand; then those of further cases."""
         return self._events + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._events)
 
-    @functools.cached_property
+    @lazy
     def _events(self) -> tuple[str, ...]:
         """Events at which rows of one case stand."""
         return tuple(dict.fromkeys(row.event for row in self._rows.values() if row.event))
 
-    @functools.cached_property
+    @lazy
     def _cased(self) -> dict[str, tuple[str, int]]:
         """Name of a quantity, row, switch or event at a further case → (its own name, the case's place)."""
         names = (*self._quantities, *self._rows, *self._single, *self._events)
@@ -132,12 +133,12 @@ class JobModel:
         """Whole-cycle quantities whose largest |value| is a figure."""
         return tuple(name for name, quantity in self._quantities.items() if quantity.figure)
 
-    @functools.cached_property
+    @lazy
     def signed(self) -> frozenset[str]:
         """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
         return self._of_kind("signed")
 
-    @functools.cached_property
+    @lazy
     def bounded(self) -> frozenset[str]:
         """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
         return self._of_kind("bounded")
@@ -155,7 +156,7 @@ class JobModel:
         means = {each for mean in self.integrals for each in (mean.name, mean.root)}
         return self._cased.get(name, (name, 0))[0] in {*self._rows, *means}
 
-    @functools.cached_property
+    @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
         """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
         found = {
@@ -202,19 +203,19 @@ class JobModel:
         loads = [load for load in self.loads if load.name in gone]
         return pose, balance.total([term for _, term in balance.terms(maths, loads, pose, given, switch)])
 
-    @functools.cached_property
+    @lazy
     def _single(self) -> tuple[str, ...]:
         """Names of the switches of one case."""
         arcs = (*self.kinematics.arcs, *self.arcs)
         cornered = [load.name for load in self.loads if isinstance(load, Load) and load.corners]
         return (*(arc.name for arc in arcs), *cornered)
 
-    @functools.cached_property
+    @lazy
     def switches(self) -> tuple[str, ...]:
         """Names of what has corners in the cycle: the motion's arcs, the job's, then loads'; then of further cases."""
         return self._single + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._single)
 
-    @functools.cached_property
+    @lazy
     def formula_switches(self) -> frozenset[str]:
         """Switches whose change changes a formula, not only what limits speak of."""
         arcs = {arc.name for arc in self.arcs}

@@ -7,6 +7,7 @@ import numpy as np
 
 from loomopt.balance import Given, total
 from loomopt.cycle import Cycle, Floats, Node, Pieces
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit
@@ -82,7 +83,7 @@ class Reading(Rows):
         super().__init__(model, maths, given, stills)
         self.cycle = cycle
 
-    @functools.cached_property
+    @lazy
     def starts(self) -> list[Number]:
         """Crank angles, rad, where the pieces begin, the last one turn after the first."""
         return self.cycle.begins(self.model.corners(self.maths, self.given), self.maths.pi)

@@ -10,6 +10,7 @@ import numpy as np
 from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
+from loomopt.lazy import lazy
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
@@ -83,12 +84,12 @@ class Sampler:
         self.cycle: Cycle = model.split(maths.FLOAT, self.given)
         self._extremes: dict[str, list[Extreme]] = {}
 
-    @functools.cached_property
+    @lazy
     def corner_count(self) -> int:
         """Number of declared corners."""
         return len(self.cycle.order)
 
-    @functools.cached_property
+    @lazy
     def stills(self) -> Stills:
         """The switches just before each event that a row stands at, by event and name."""
         found = {}
@@ -97,12 +98,12 @@ class Sampler:
             found[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
         return found
 
-    @functools.cached_property
+    @lazy
     def static(self) -> dict[str, float]:
         """Figures that need one position only."""
         return self.model.static(maths.FLOAT, self.given, self.stills)
 
-    @functools.cached_property
+    @lazy
     def figures(self) -> dict[str, float]:
         """Static figures, the model's means over parts of the cycle, and their roots."""
         means = [name for integral in self.model.integrals for name in (integral.name, integral.root)]
@@ -113,7 +114,7 @@ class Sampler:
         values = {name: system.number(value) for name, value in {**self.values, **self.hints}.items()}
         return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
 
-    @functools.cached_property
+    @lazy
     def _rows(self) -> "_SampledRows":
         return _SampledRows(self)
 
@@ -188,7 +189,7 @@ class Sampler:
             found += self._spikes(name)
         return sorted(found, key=lambda extreme: -extreme.height)
 
-    @functools.cached_property
+    @lazy
     def singular(self) -> tuple[float, ...]:
         """Crank angles, rad, where the mechanism comes very near to a singular position."""
         return self.model.singular(self.given)
@@ -213,7 +214,7 @@ class Sampler:
             values = self.model.quantity(maths.numpy(), self.given, name, node)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
-    @functools.cached_property
+    @lazy
     def _ends(self) -> tuple[Pieces, Pieces]:
         """Where pieces begin and end in the sampler's own grid."""
         counts = np.array(self._counts(self.samples))

@@ -13,6 +13,7 @@ from loomopt import balance
 from loomopt.balance import Given
 from loomopt.cycle import Node, Where
 from loomopt.effects.kinds import Effect, Load, Motion
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program.kinematics import Arcs, Group, four_bar
@@ -37,12 +38,12 @@ class ReedPose(Motion):
         """−ψ, rad."""
         return -self.joints.psi
 
-    @functools.cached_property
+    @lazy
     def q1(self) -> Number:
         """−ψ'."""
         return -self.joints.psi_1
 
-    @functools.cached_property
+    @lazy
     def q2(self) -> Number:
         """−ψ''."""
         return -self.joints.psi_2
@@ -77,7 +78,7 @@ class FrontPose(Motion):
         """−ψ''."""
         return -self.values["centres"].psi_2_front
 
-    @functools.cached_property
+    @lazy
     def joints(self) -> crank_rocker.Pose:
         """The linkage with crank and rod stretched."""
         return crank_rocker.front_pose(self.maths, self.values["lengths"], self.values["centres"])
@@ -95,7 +96,7 @@ class CrankRocker:
     arcs: tuple[Arcs, ...] = ()
     breaks: frozenset[str] = frozenset()
 
-    @functools.cached_property
+    @lazy
     def groups(self) -> Mapping[str, Group]:
         """The dyad of rod and rocker: it comes nearest to folding and stretching at φ = 0 and π."""
         found = four_bar(

@@ -14,6 +14,7 @@ from loomopt import maths as systems
 from loomopt.balance import Given
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Effect, Motion
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import rapier_drive, turning_points
 from loomopt.mechanisms.dyad import Vector, dot
@@ -47,22 +48,22 @@ class HeadPose(Motion):
         """Crank angle φ1, rad."""
         return self.joints.phi1
 
-    @functools.cached_property
+    @lazy
     def q(self) -> Number:
         """S, m [Hong17, eq 1]."""
         return self.joints.dimensions.travel * self.joints.phi63(self.front)
 
-    @functools.cached_property
+    @lazy
     def q1(self) -> Number:
         """S', m/rad."""
         return self.joints.dimensions.travel * self.joints.phi63_1
 
-    @functools.cached_property
+    @lazy
     def q2(self) -> Number:
         """S'', m/rad²."""
         return self.joints.dimensions.travel * self.joints.phi63_2
 
-    @functools.cached_property
+    @lazy
     def q3(self) -> Number:
         """Third derivative of S, m/rad³."""
         return self.joints.dimensions.travel * self.joints.phi63_3
@@ -96,7 +97,7 @@ class RapierDrive:
     arcs: tuple[Arcs, ...] = ()
     breaks: frozenset[str] = frozenset()
 
-    @functools.cached_property
+    @lazy
     def groups(self) -> Mapping[str, Group]:
         """The five-bar's dyad, and that of the sley four-bar."""
         sley = four_bar(

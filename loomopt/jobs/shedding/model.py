@@ -14,6 +14,7 @@ from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.effects.shedding import FramePose as Frame
+from loomopt.lazy import lazy
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
@@ -80,27 +81,27 @@ class FramePose(Motion):
         """Cam angle θ, rad."""
         return self.theta
 
-    @functools.cached_property
+    @lazy
     def lowered(self) -> Number:
         """X/h, exactly 1 and 0 in the dwells."""
         return self.maths.choose(self.segment, (self.law.s, 1, self.law.s, 0))
 
-    @functools.cached_property
+    @lazy
     def q(self) -> Number:
         """X, m."""
         return self.travel * self.lowered
 
-    @functools.cached_property
+    @lazy
     def q1(self) -> Number:
         """X', m/rad."""
         return self.travel * self.law.s1 * self.rate
 
-    @functools.cached_property
+    @lazy
     def q2(self) -> Number:
         """X'', m/rad²."""
         return self.travel * self.law.s2 * self.rate**2
 
-    @functools.cached_property
+    @lazy
     def q3(self) -> Number:
         """Third derivative of X, m/rad³."""
         return self.travel * self.law.s3 * self.rate**3
@@ -134,12 +135,12 @@ class CamFrame:
         """None: a cam has no singular position that its follower's check lets pass."""
         return {}
 
-    @functools.cached_property
+    @lazy
     def segments(self) -> tuple[int, ...]:
         """The segments that are there."""
         return tuple(k for k, there in enumerate((True, self.dwells[0], True, self.dwells[1])) if there)
 
-    @functools.cached_property
+    @lazy
     def arcs(self) -> tuple[Arcs, ...]:
         """The segments, and the law's pieces."""
         return (
@@ -151,7 +152,7 @@ class CamFrame:
         begins = (0, *(given.values[f"begin.{name}"] for name in ("far", "return", "near")))
         return tuple(begins[k] for k in self.segments)
 
-    @functools.cached_property
+    @lazy
     def breaks(self) -> frozenset[str]:
         """The half open shed, where it is one of the law's own breaks."""
         return frozenset((HALF_OPEN,) if self.law.symmetric and Fraction(1, 2) in self.law.breaks else ())
