@@ -1,4 +1,4 @@
-"""The number systems one formula runs in: float, NumPy arrays, CasADi symbols, mpmath digits, SymPy, Arb's balls.
+"""The number systems one formula runs in: float, NumPy arrays, jets, CasADi symbols, mpmath, SymPy, balls.
 
 A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
 integers, so it is written once. Each system is imported only when it is asked for.
@@ -55,6 +55,14 @@ def numpy() -> Maths:
         return np.take_along_axis(stacked, np.broadcast_to(places, stacked.shape[1:])[None], axis=0)[0]
 
     return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64, choose)
+
+
+@functools.cache
+def jets() -> Maths:
+    """Forward derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
+    from loomopt import jets
+
+    return Maths("jets", jets.sin, jets.cos, jets.sqrt, jets.atan2, math.pi, float, jets.chosen)
 
 
 @functools.cache

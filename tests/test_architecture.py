@@ -16,6 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
+    "jets",
     "maths errors frozen tolerances lazy",
     "units",
     "quantities",

@@ -1,7 +1,8 @@
 """The certificate: is this design a proven local optimum of its target? Computed apart from the solver.
 
-One KKT system per level, on gradients of the true extremes in 40 digits, with multipliers of its own (non-negative
-least squares). A limit with a positive multiplier at one level is an equality of free sign at the next.
+One KKT system per level, on gradients of the true extremes, with multipliers of its own (non-negative least squares). A
+limit with a positive multiplier at one level is an equality of free sign at the next. Gradients come by jets; where a
+figure that decides is too near its threshold for floats, all is judged again in 40 digits.
 """
 
 import math
@@ -15,7 +16,9 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt, second_order
 from loomopt.solving.bounded import between_points, cycle_rows, judged
+from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.exact import Exact
+from loomopt.solving.forward import Forward
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.prices import priced
 from loomopt.solving.rows import active_set
@@ -23,7 +26,10 @@ from loomopt.solving.second_order import Curvature, Local
 from loomopt.solving.verdict import Binding, Certificate, Level
 from loomopt.tolerances import (
     COMPLEMENTARY,
+    DOUBT,
     FEASIBLE,
+    FLAT,
+    JET_ERROR,
     LARGEST_PRICE,
     LARGEST_VARIABLE,
     POSITIVE,
@@ -49,19 +55,29 @@ class Cycle:
 
 
 def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
-    """Return the certificate of variables x (SI) as an optimum of the program's target."""
+    """Return the certificate of variables x (SI) as an optimum of the program's target.
+
+    By jets; by 40 digits where floats leave a verdict in doubt.
+    """
+    quick = certified(Forward, program, x, accuracy)
+    return quick if quick.clear else certified(Exact, program, x, accuracy)
+
+
+def certified(derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
+    """Return the certificate of variables x (SI) by one way to derivatives."""
     settings = Settings(accuracy)
     try:
         sampler = Sampler(program.model, {**program.parameters, **x}, settings.sampled)
         active = active_set(program, sampler)
-        exact = Exact(program, x, sampler, active.rows)
-        local = Local(program, x, sampler, active, exact, exact.gradients())
+        found = derivatives(program, x, sampler, active.rows)
+        local = Local(program, x, sampler, active, found, found.gradients())
         rows = cycle_rows(program)
         cycle = Cycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
         return _certificate(local, cycle, judged_levels(local), accuracy)
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         reason = f"a value or a slope is no number here ({type(error).__name__})"
-        return Certificate(False, (reason,), (), math.inf, math.inf, False, False)
+        by, clear = derivatives.by, issubclass(derivatives, Exact)
+        return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
 
 
 def judged_levels(local: Local) -> list[JudgedLevel]:
@@ -125,7 +141,7 @@ def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accu
     reasons = [*_amiss(local, feasibility), *_open(cycle, accuracy), *_not_least(levels)]
     curvatures = [each.curvature for each in levels if each.curvature]
     step = next((curvature.step for curvature in curvatures if len(curvature.step)), np.zeros(0))
-    moved = dict(zip(local.exact.names, map(float, step * local.scales), strict=True)) if len(step) else {}
+    moved = dict(zip(local.derivatives.names, map(float, step * local.scales), strict=True)) if len(step) else {}
     return Certificate(
         not reasons,
         tuple(reasons),
@@ -135,10 +151,28 @@ def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accu
         all(curvature.minimum for curvature in curvatures),
         curvatures[-1].unique if curvatures else True,
         tuple(_binding(local, levels)),
-        by="bounded" if cycle.bound == "proven" else "refined",
+        by=local.derivatives.by,
+        clear=isinstance(local.derivatives, Exact) or not _doubtful(local, levels),
+        whole_cycle="bounded" if cycle.bound == "proven" else "refined",
         correction=moved,
         step=float(np.abs(step).max(initial=0.0)),
     )
+
+
+def _doubtful(local: Local, levels: Sequence[JudgedLevel]) -> bool:
+    """Say whether floats leave a verdict in doubt: a figure near its threshold, or an error that reaches one."""
+    for each in levels:
+        level, of = each.level, np.abs(each.multipliers.of)
+        residuals = [level.stationarity / STATIONARY, level.complementarity / COMPLEMENTARY]
+        figures = [*residuals, level.price / LARGEST_PRICE, *(of / POSITIVE)]
+        error = JET_ERROR * float(of @ np.abs(local.gradients).max(axis=1, initial=1.0))
+        errors = [error / STATIONARY]
+        if each.curvature:
+            figures += list(each.curvature.figures)
+            errors.append(JET_ERROR * each.curvature.largest / FLAT)
+        if max(errors) >= 1.0 or any(1 / DOUBT < figure < DOUBT for figure in figures):
+            return True
+    return False
 
 
 def _amiss(local: Local, feasibility: float) -> Iterator[str]:

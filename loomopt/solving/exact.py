@@ -14,29 +14,26 @@ from loomopt.maths import Number
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
 from loomopt.tolerances import DIGITS, FIRST_STEP, NEWTON_SHIFT, SECOND_STEP
 
 Vector = Sequence[Number]
 
 
-class Exact:
-    """A program's rows around one design.
+class Exact(Derivatives):
+    """Derivatives by differences at 40 digits."""
 
-    x: variables, SI; all results are with respect to the variables that are not held, in their own scale.
-    """
+    by = "40 digits"
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
-        self.program, self.sampler, self.rows = program, sampler, tuple(rows)
+        super().__init__(program, x, sampler, rows)
         self.maths = maths.mpmath(DIGITS)
         number: Callable[[Any], Number] = self.maths.number
         self.number = number
-        self.names = [v.name for v in program.variables if v.name not in program.held]
-        held = {name: x[name] for name in program.held}
-        self.parameters = {n: number(value) for n, value in {**program.parameters, **held, **sampler.hints}.items()}
-        sizes = {v.name: v.scale for v in program.variables}
-        self.scales = [number(sizes[name]) for name in self.names]
-        self.base: Vector = [number(x[name]) / scale for name, scale in zip(self.names, self.scales, strict=True)]
+        self.parameters = {name: number(value) for name, value in self.known.items()}
+        self.scales = [number(size) for size in self.sizes]
+        self.base: Vector = [number(self.x[n]) / scale for n, scale in zip(self.names, self.scales, strict=True)]
         here = self._reading(self.base)
         self.u = {k: self._settled(row, row.node, here) for k, row in enumerate(self.rows) if row.node}
 
@@ -51,11 +48,7 @@ class Exact:
         return np.array(columns).T.reshape(len(self.rows), len(self.base))
 
     def curvatures(self, basis: Floats) -> Floats:
-        """Return (rows, k, k): second derivatives along the columns of basis (variables, k), by central differences.
-
-        At an interior extreme of the cycle, g_xx − g_xφ g_φx / g_φφ: the extreme moves with the design [Hettich and
-        Kortanek, Semi-infinite programming, SIAM Review 35 (1993), 380-429].
-        """
+        """Return (rows, k, k): second derivatives along the columns of basis (variables, k), by central differences."""
         step, width = self.number(SECOND_STEP), basis.shape[1]
         directions = [[self.number(float(entry)) for entry in column] for column in basis.T]
         result = np.zeros((len(self.rows), width, width))
@@ -69,7 +62,7 @@ class Exact:
                 mixed = [float((a - b - c) / 2) for a, b, c in zip(both, along[i], along[j], strict=True)]
                 result[:, i, j] = result[:, j, i] = mixed
         for k, row in enumerate(self.rows):
-            if row.node and not self._at_corner(row.node):
+            if row.node and not self.at_corner(row.node):
                 result[k] -= self._moving(k, row, row.node, directions, step)
         return result
 
@@ -105,16 +98,12 @@ class Exact:
     def _settled(self, row: Row, node: Extreme, here: Reading) -> Number:
         """Return u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
         u, step = self.number(node.u), self.number(SECOND_STEP)
-        if self._at_corner(node):
+        if self.at_corner(node):
             return u
         low, mid, high = (here.at(row.reads, node.piece, u + k * step) for k in (-1, 0, 1))
         bend = (high - 2 * mid + low) / step**2
         shift = -(high - low) / (2 * step * bend) if bend else self.number(0)
         return u + shift if abs(shift) < self.number(NEWTON_SHIFT) else u
-
-    def _at_corner(self, node: Extreme) -> bool:
-        """Say whether a node is the end of a piece; a cycle without corners has none."""
-        return node.u in (0.0, 1.0) and bool(self.sampler.cycle.order)
 
     def _moving(self, k: int, row: Row, node: Extreme, directions: Sequence[Vector], step: Number) -> Floats | float:
         """Return g_xφ g_φx / g_φφ of a row at an interior extreme, along each two directions; 0 where it is level."""

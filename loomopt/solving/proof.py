@@ -180,7 +180,7 @@ def proven(scene: Scene, target: str, answer: Solution) -> Solution:
     found = prove(scene, designs.flat(answer.design), target)
     assert answer.certificate is not None
     if found.passed:
-        return replace(answer, certificate=replace(answer.certificate, by="proven"))
+        return replace(answer, certificate=replace(answer.certificate, whole_cycle="proven"))
     reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
     certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
     message = f"A design was reached but not proven: {'; '.join(reasons)}."

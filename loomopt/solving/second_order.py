@@ -13,7 +13,7 @@ Lagrangian is read at a few steps along the line (`lagrangian`: what falls along
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
 from loomopt.solving.cone import least_on_cone
-from loomopt.solving.exact import Exact
+from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
@@ -37,14 +37,14 @@ class Local:
     x: Mapping[str, float]
     sampler: Sampler
     active: ActiveSet
-    exact: Exact
+    derivatives: Derivatives
     gradients: Floats
 
     @property
     def scales(self) -> Floats:
         """Natural sizes of the variables that slopes are with respect to."""
         sizes = {v.name: v.scale for v in self.program.variables}
-        return np.array([sizes[name] for name in self.exact.names])
+        return np.array([sizes[name] for name in self.derivatives.names])
 
 
 @dataclass(frozen=True)
@@ -61,18 +61,22 @@ class Curvature:
     falls: bool = False
     settled: bool = False
     step: Floats = field(default_factory=lambda: np.zeros(0))
+    figures: Floats = field(default_factory=lambda: np.zeros(0))
+    largest: float = 0.0
 
 
 @dataclass(frozen=True)
 class Critical:
     """What binding rows leave open: basis (variables, k) of the directions that none forbids.
 
-    back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis.
+    back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis;
+    figures: what was compared with a threshold, each over its own.
     """
 
     basis: Floats
     back: Floats
     slopes: Floats
+    figures: Floats = field(default_factory=lambda: np.zeros(0))
 
     def ways(self, line: Floats) -> list[Floats]:
         """Return the directions (variables) of a line, in the cone's basis, that touching rows leave open."""
@@ -94,13 +98,15 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
     jacobian = sums @ local.gradients
     left, sizes, rows = np.linalg.svd(jacobian)
-    rank = int(np.sum(sizes > RANK * max(1.0, sizes.max(initial=0.0))))
+    least = RANK * max(1.0, sizes.max(initial=0.0))
+    rank = int(np.sum(sizes > least))
     basis = rows[rank:].T
     excess = np.array([row.excess for row in active.rows])
     missed = sums @ np.where(np.isfinite(excess), excess, 0.0)
     back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
     slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
-    return Critical(basis, back, slopes[np.abs(slopes).max(axis=1, initial=0.0) > FLAT])
+    rises = np.abs(slopes).max(axis=1, initial=0.0)
+    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]))
 
 
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
@@ -110,18 +116,25 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
     slope = weights @ local.gradients
     if cone.basis.shape[1] == 0:
         step = _newton(cone, np.zeros((0, 0)), np.zeros(0), slope)
-        return Curvature(settled=True, step=step)
-    hessian = np.tensordot(weights, local.exact.curvatures(cone.basis), axes=1)
+        return Curvature(settled=True, step=step, figures=cone.figures)
+    bends = local.derivatives.curvatures(cone.basis)
+    hessian = np.tensordot(weights, bends, axes=1)
     values, vectors = np.linalg.eigh(hessian)
     curved = values > NEWTON_CURVED
-    step = _newton(cone, vectors[:, curved], values[curved], slope)
-    settled = bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian)
-    if values.min() < -FLAT and least_on_cone(hessian, cone.slopes) < -FLAT:
-        return Curvature(minimum=False, unique=False, settled=settled, step=step)
+    found = Curvature(
+        settled=bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian),
+        step=_newton(cone, vectors[:, curved], values[curved], slope),
+        figures=np.concatenate([cone.figures, np.abs(values) / FLAT]),
+        largest=float(np.abs(weights) @ np.abs(bends).max(axis=(1, 2), initial=1.0)),
+    )
+    if values.min() < -FLAT:
+        least = least_on_cone(hessian, cone.slopes)
+        found = replace(found, figures=np.append(found.figures, abs(least) / FLAT))
+        if least < -FLAT:
+            return replace(found, minimum=False, unique=False)
     unique = not any(cone.ways(vector) for vector in vectors.T[values <= FLAT])
     ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
-    falls = bool(ways) and _falls(local, level, multipliers, ways)
-    return Curvature(unique=unique, falls=falls, settled=settled, step=step)
+    return replace(found, unique=unique, falls=bool(ways) and _falls(local, level, multipliers, ways))
 
 
 def _lines(level: Floats) -> list[Floats]:
@@ -149,7 +162,7 @@ def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Flo
     """Say whether all but moves that change nothing is curved: then later levels have nothing to choose."""
     last = level == len(local.program.objectives) - 1
     moves = [] if last else settle.unchanging(local.program, local.x)
-    directions = [np.array([move.get(name, 0.0) for name in local.exact.names]) / local.scales for move in moves]
+    directions = [np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales for move in moves]
     inside = [basis.T @ way for way in (d / np.linalg.norm(d) for d in directions) if _is_open(basis, way)]
     if not inside:
         return False
@@ -174,7 +187,7 @@ def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats
     held = {k: held_multiplier(active, k, multipliers) for k in range(level)}
     weights = {k: weight for k, weight in held.items() if weight}
     lagrangian = Lagrangian(local.program, local.x, level, prices, weights)
-    found = (dict(zip(local.exact.names, map(float, way * local.scales), strict=True)) for way in ways)
+    found = (dict(zip(local.derivatives.names, map(float, way * local.scales), strict=True)) for way in ways)
     return any(lagrangian.falls(direction, multipliers.residual) for direction in found)
 
 

@@ -160,6 +160,7 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
     """Return the certificate as JSON data."""
     return {
         "passed": certificate.passed,
+        "by": certificate.by,
         "reasons": list(certificate.reasons),
         "levels": [
             {
@@ -170,7 +171,7 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
             for level in certificate.levels
         ],
         "feasibility": float(certificate.feasibility),
-        "whole_cycle": {"violation": float(certificate.violation), "by": certificate.by},
+        "whole_cycle": {"violation": float(certificate.violation), "by": certificate.whole_cycle},
         "minimum": certificate.minimum,
         "unique": certificate.unique,
         "settled": list(certificate.settled),

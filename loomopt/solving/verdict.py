@@ -44,7 +44,12 @@ class Certificate:
     minimum: bool
     unique: bool
     binding: tuple[Binding, ...] = ()
-    by: str = "refined"
+    by: str = "40 digits"
+    """Where its slopes come from: "jets" or "40 digits"."""
+    clear: bool = True
+    """Whether every figure that decides is far enough from its threshold for that."""
+    whole_cycle: str = "refined"
+    """How whole-cycle values are held between points: "refined", "bounded" or "proven"."""
     settled: tuple[str, ...] = field(default=())
     correction: Mapping[str, float] = field(default_factory=dict)
     """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""

@@ -105,26 +105,26 @@ def test_a_bound_is_undecided_when_the_boxes_run_out(monkeypatch):
     assert short.boxes < proven.boxes
     monkeypatch.setattr(bounded, "MOST_BOXES", 3)
     answer = lo.solve(lo.load("shedding"))
-    assert (answer.status, answer.certificate.by) == ("optimal", "refined")
+    assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "refined")
 
 
 @pytest.mark.parametrize("target", ["stiffness", "force", "speed"])
 @pytest.mark.parametrize("problem", ["shedding", "shedding-printed-travel"])
 def test_the_certificate_of_a_cam_is_bounded(problem, target):
     certificate = lo.solve(lo.load(problem), target).certificate
-    assert (certificate.passed, certificate.by) == (True, "bounded")
+    assert (certificate.passed, certificate.whole_cycle) == (True, "bounded")
 
 
 def test_the_certificate_of_a_free_law_is_bounded():
-    assert freed(plain.PAPER, 8).certificate.by == "bounded"
-    assert lo.solve(lo.load("shedding-static")).certificate.by == "bounded"
+    assert freed(plain.PAPER, 8).certificate.whole_cycle == "bounded"
+    assert lo.solve(lo.load("shedding-static")).certificate.whole_cycle == "bounded"
 
 
 def test_what_has_no_series_is_refined_only():
     """The linkages, whose angles need atan2, and a cam whose pressure angle is limited too."""
     answers = [lo.solve(lo.load(problem)) for problem in ("beatup", "rapier")]
     answers.append(lo.solve(lo.load("shedding").set("limits.pressure_angle_max.max", "45 deg")))
-    assert [answer.certificate.by for answer in answers] == ["refined"] * 3
+    assert [answer.certificate.whole_cycle for answer in answers] == ["refined"] * 3
     assert all(answer.certificate.passed for answer in answers)
 
 
@@ -173,7 +173,7 @@ def test_a_spike_between_the_samples_is_refuted_and_the_certificate_says_so(wave
     assert certificate.violation <= ACCURACY, "the dense scan misses it too"
     assert not certificate.passed
     assert certificate.reasons == ("a whole-cycle value is exceeded somewhere between refined points",)
-    assert certificate.by == "refined"
+    assert certificate.whole_cycle == "refined"
 
 
 def test_the_angle_of_the_spike_is_found():
@@ -185,7 +185,7 @@ def test_the_angle_of_the_spike_is_found():
 
 def test_without_the_spike_the_same_design_passes():
     status, certificate = said(smooth)
-    assert (status, certificate.passed, certificate.by) == ("proven", True, "bounded")
+    assert (status, certificate.passed, certificate.whole_cycle) == ("proven", True, "bounded")
 
 
 def test_a_spike_downward_does_not_count_where_only_the_highest_value_does():
@@ -195,7 +195,7 @@ def test_a_spike_downward_does_not_count_where_only_the_highest_value_does():
 
 def test_a_wave_that_is_not_declared_to_run_on_balls_is_left_undecided():
     status, certificate = said(spiked, bounded=False)
-    assert (status, certificate.passed, certificate.by) == ("undecided", True, "refined")
+    assert (status, certificate.passed, certificate.whole_cycle) == ("undecided", True, "refined")
 
 
 # Balls enclose ---------------------------------------------------------------------------------------------------

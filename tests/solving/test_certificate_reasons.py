@@ -9,8 +9,9 @@ import toy
 
 from loomopt.program.sampling import Sampler
 from loomopt.solving import certificate, kkt, second_order
-from loomopt.solving.certificate import Cycle, JudgedLevel, certify
+from loomopt.solving.certificate import Cycle, JudgedLevel, certified, certify
 from loomopt.solving.exact import Exact
+from loomopt.solving.forward import Forward
 from loomopt.solving.kkt import Multipliers
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Curvature, Local
@@ -208,4 +209,23 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
 @pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
 def test_by_what_the_whole_cycle_is_covered_is_told(bound, by):
     here = local()
-    assert certificate._certificate(here, Cycle(0.0, bound), certificate.judged_levels(here), 1e-8).by == by
+    assert certificate._certificate(here, Cycle(0.0, bound), certificate.judged_levels(here), 1e-8).whole_cycle == by
+
+
+def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():
+    """Slope 2 x of x² + y² at x: far below or above the threshold of 1e-6 jets say it, near it 40 digits do."""
+    bowl = toy.program("xy", {"f": lambda v: v["x"] ** 2 + v["y"] ** 2})
+    cases = (0.0, "jets", True), (2e-7, "40 digits", True), (8e-7, "40 digits", False), (1e-3, "jets", False)
+    for x, by, passed in cases:
+        found = certify(bowl, {"x": x, "y": 0.0}, 1e-8)
+        assert (found.by, found.clear, found.passed) == (by, True, passed)
+
+
+def test_where_floats_have_no_slope_40_digits_have_one():
+    """√x at 0: jets have no number there; a difference of 40 digits says that it can still rise, not fall."""
+    root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
+    quick, found = certified(Forward, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
+    assert (quick.passed, quick.clear, quick.by) == (False, False, "jets")
+    assert "no number" in quick.reasons[0]
+    assert (found.passed, found.clear, found.by) == (False, True, "40 digits")
+    assert "can still fall" in found.reasons[0]
