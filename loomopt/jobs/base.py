@@ -16,7 +16,7 @@ from loomopt.program import numbers
 from loomopt.program.curves import STEPS, Columns, curves
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
@@ -92,7 +92,7 @@ class Job(abc.ABC):
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
         """Return a design ready to be sampled."""
-        return Sampler(self.model(scene, design), self.numbers_of(scene, design))
+        return sampled(self.model(scene, design), self.numbers_of(scene, design))
 
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()

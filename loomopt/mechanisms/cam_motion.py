@@ -15,7 +15,7 @@ from loomopt.schema import Values
 PREFIX = "law_"
 
 
-class CamLaw(Protocol):
+class CamLaw(Hashable, Protocol):
     """s(u) with its derivatives; u is the share of the rise, piece the data that says which formula holds."""
 
     @property

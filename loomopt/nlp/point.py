@@ -8,7 +8,7 @@ from typing import Any
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
+from loomopt.program.sampling import Extreme, Sampler, sampled
 from loomopt.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, ROUNDING, SAMPLED, SAMPLES
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
@@ -80,7 +80,7 @@ class Point:
 def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES) -> Sampler | None:
     """Return the design's sampler, or None where the linkage has no real position."""
     try:
-        sampler = Sampler(program.model, {**program.parameters, **x}, samples)
+        sampler = sampled(program.model, {**program.parameters, **x}, samples)
         return sampler if all(map(math.isfinite, sampler.static.values())) else None
     except (ValueError, ZeroDivisionError, FloatingPointError):
         return None

@@ -25,7 +25,7 @@ Stills = Mapping[str, Values]
 """Event → the switches just before it, by name."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JobModel:
     """A mechanism with the effects a scene calls for.
 

@@ -1,17 +1,19 @@
 """The speed up to which a quantity keeps its bound, where loads are quadratic in the speed at every crank angle."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from loomopt.cycle import Floats
+from loomopt.cycle import Floats, Node
+from loomopt.maths import numpy
 from loomopt.program.model import JobModel
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, Tally, sampled
 
 AT_REST = 1e-12
 """Share of the largest value by which one at rest may miss its bound: rounding."""
-NEWTON, CONVERGED = 30, 1e-15
+NEWTON, CONVERGED = 30, 1e-8
+"""Newton's steps at most, and the share after which there is none left to take: the next would be its square."""
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float) -> float:
@@ -21,21 +23,25 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     with the refined largest value. 0 where the bound is broken at rest.
     """
     unit = float(values["speed"])
-    still = Sampler(model, {**values, "speed": 0.0})
-    pieces, u = still.grid()
-
-    def room_at(speed: float) -> Floats:
-        return -Sampler(model, {**values, "speed": speed}).at(name, pieces, u)
-
-    rest, ahead, back = room_at(0.0), room_at(unit), room_at(-unit)
-    rounding = AT_REST * float(np.abs(np.concatenate([rest, ahead])).max())
+    at_rest = sampled(model, {**values, "speed": 0.0})
+    nodes = at_rest.node(*at_rest.grid())
+    rest, ahead, back = -_at_speeds(at_rest, name, nodes, (0.0, unit, -unit))
+    rounding = AT_REST * float(np.abs([rest, ahead]).max())
     spare = rest + most
     if spare.min() < -rounding:
         return 0.0
     square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
     shares = _first_roots(square, linear, np.maximum(spare, 0.0), rounding)
     share = float(shares.min())
-    return math.inf if math.isinf(share) else _settled(model, values, name, most, unit * share)
+    return math.inf if math.isinf(share) else _settled(at_rest, name, most, unit * share)
+
+
+def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]) -> Floats:
+    """Return (speeds, nodes): a quantity at each of several speeds, rad/s."""
+    values = {**at_rest.values, **at_rest.hints, "speed": np.array(speeds)[:, None]}
+    found = at_rest.model.quantity(numpy(), at_rest.model.given(numpy(), values), name, nodes)
+    Tally.positions += found.size
+    return np.broadcast_to(found, (len(speeds), len(nodes.phi)))
 
 
 def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float) -> Floats:
@@ -47,14 +53,13 @@ def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float)
     return np.where(falls, root, np.inf)
 
 
-def _settled(model: JobModel, values: Mapping[str, float], name: str, most: float, speed: float) -> float:
+def _settled(at_rest: Sampler, name: str, most: float, speed: float) -> float:
     """Return the speed, rad/s, where the refined largest value is `most`, from one nearby."""
     for _ in range(NEWTON):
-        sampler = Sampler(model, {**values, "speed": speed})
-        top = sampler.extremes(name)[0]
-        node = np.array([top.piece]), np.array([top.u])
-        ends = [float(Sampler(model, {**values, "speed": w}).at(name, *node)[0]) for w in (0.0, 2 * speed)]
-        slope = (ends[1] - ends[0]) / (2 * speed)
+        top = sampled(at_rest.model, {**at_rest.values, "speed": speed}).extremes(name)[0]
+        node = at_rest.node(np.array([top.piece]), np.array([top.u]))
+        still, twice = _at_speeds(at_rest, name, node, (0.0, 2 * speed)).ravel().tolist()
+        slope = (twice - still) / (2 * speed)
         if not slope > 0.0:
             break
         step = (most - top.value) / slope

@@ -13,7 +13,7 @@ import numpy as np
 
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import sampled
 from loomopt.solving import kkt, second_order
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.derivatives import Derivatives
@@ -67,7 +67,7 @@ def certified(derivatives: type[Derivatives], program: Program, x: Mapping[str, 
     """Return the certificate of variables x (SI) by one way to derivatives."""
     settings = Settings(accuracy)
     try:
-        sampler = Sampler(program.model, {**program.parameters, **x}, settings.sampled)
+        sampler = sampled(program.model, {**program.parameters, **x}, settings.sampled)
         active = active_set(program, sampler)
         found = derivatives(program, x, sampler, active.rows)
         local = Local(program, x, sampler, active, found, found.gradients())

@@ -7,9 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from loomopt.jobs import registry
+from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
-from loomopt.nlp.point import Settings, sampler_at
-from loomopt.program.sampling import Tally
+from loomopt.nlp.point import Point, Settings, sampler_at
+from loomopt.program.program import Program
+from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
 from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
@@ -30,10 +32,12 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
 
     Raises BadInput for a design that does not assemble.
     """
-    job = registry.of(scene)
-    full = {**job.today(scene), **(design or {})}
-    program = job.program(scene, target or scene.schema.default_target)
-    return report.evaluation(scene, job, program, full)
+    return _evaluated(scene, registry.of(scene), target or scene.schema.default_target, design or {})
+
+
+def _evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:
+    """Return figures and limits of a design (SI; what it does not name stays today's)."""
+    return report.evaluation(scene, job, job.program(scene, target), {**job.today(scene), **design})
 
 
 def solve(
@@ -57,15 +61,18 @@ def solve(
     on_start: called with each start's number and how many there are.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
+    forget()
     began, evaluated = time.perf_counter(), Tally.positions
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
     check_numbers(accuracy, starts)
     imported = _import_solver()
-    search = Search(job, job.program(scene, target), Settings(accuracy, callback=_callback(on_iteration)))
-    same = near is not None and near.point is not None and near.point.structure == search.program.structure
-    search = searched(search, starts, seed, near.point if near and same else None, on_start)
-    search, answer = _answer(scene, target, search, seed)
+    begun = time.perf_counter()
+    program = job.program(scene, target)
+    made = time.perf_counter() - begun
+    settings = Settings(accuracy, callback=_callback(on_iteration))
+    search = solve_program(program, job, settings, starts, seed, near.point if near else None, on_start)
+    search, answer, reported = _answer(scene, target, search, seed)
     for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
@@ -73,9 +80,27 @@ def solve(
     solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error
-    seconds = {"import_s": imported, "build_s": search.built, "solve_s": search.solved - search.built}
-    seconds |= {"certify_s": search.certified, "total_s": time.perf_counter() - began}
-    return replace(answer, solver=solver, time=seconds)
+    seconds = {"import_s": imported, "build_s": made + search.built, "solve_s": search.solved - search.built}
+    seconds |= {"settle_s": search.settled, "certify_s": search.certified, "report_s": reported}
+    return replace(answer, solver=solver, time=seconds | {"total_s": time.perf_counter() - began})
+
+
+def solve_program(
+    program: Program,
+    job: Job,
+    settings: Settings,
+    starts: int = 1,
+    seed: int = 0,
+    near: Point | None = None,
+    on_start: Callable[[int, int], None] | None = None,
+) -> Search:
+    """Return how far a search for a program's certified optimum comes; no scene is read, nothing is said in words.
+
+    near: where a neighbour's solve ended, to start warm from; one of another structure is left alone. The rest is as
+    in `solve`. Raises KeyboardInterrupt on Ctrl-C.
+    """
+    same = near is not None and near.structure == program.structure
+    return searched(Search(job, program, settings), starts, seed, near if same else None, on_start)
 
 
 def _import_solver() -> float:
@@ -95,14 +120,17 @@ def _callback(on_iteration: Callable[[int], None] | None) -> Any:
     return IterationCallback(on_iteration)
 
 
-def _answer(scene: Scene, target: str, search: Search, seed: int) -> tuple[Search, Solution]:
-    """Return the solution, or the reason there is none, and the search with what was tried for that."""
+def _answer(scene: Scene, target: str, search: Search, seed: int) -> tuple[Search, Solution, float]:
+    """Return the solution, or the reason there is none; the search with what was tried for that; seconds of saying."""
     clash = Clash()
     if search.best is None:
         search, clash = _least_relaxation(scene, search, seed)
+    began = time.perf_counter()
     if search.best is None:
-        return search, _without(scene, target, search, clash)
-    return search, _with(scene, target, search, search.best)
+        answer = _without(scene, target, search, clash)
+    else:
+        answer = _with(scene, target, search, search.best)
+    return search, answer, time.perf_counter() - began
 
 
 def _least_relaxation(scene: Scene, search: Search, seed: int) -> tuple[Search, Clash]:
@@ -126,10 +154,10 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
     if points:
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
-    before = report.evaluation(scene, job, program, job.today(scene))
+    today = functools.partial(_evaluated, scene, job, target, {})
     design = job.design(program, clash.x) if clash.x else job.today(scene)
     here = report.evaluation(scene, job, program, design)
-    return report.without_optimum(target, here, clash, solver, before, job.explain(scene, clash.limits))
+    return report.without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
 
 
 def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
@@ -137,9 +165,9 @@ def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
     job, program, point = search.job, search.program, best.candidate.point
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
     solver |= {"status": point.status, "iterations": point.iterations}
-    before = report.evaluation(scene, job, program, job.today(scene))
+    today = functools.partial(_evaluated, scene, job, target, {})
     here = report.evaluation(scene, job, program, job.design(program, best.x))
-    answer = report.with_optimum(job, scene, target, here, best.certificate, solver, before)
+    answer = report.with_optimum(job, scene, target, here, best.certificate, solver, today)
     return replace(answer, point=point, optima=_optima(search))
 
 

@@ -1,6 +1,6 @@
 """From a judged design to what a person and a script read."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from loomopt import designs
@@ -13,6 +13,9 @@ from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, 
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
 from loomopt.tolerances import FEASIBLE
+
+Today = Callable[[], Evaluation]
+"""Evaluates today's machine."""
 
 
 def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
@@ -68,7 +71,7 @@ def with_optimum(
     here: Evaluation,
     certificate: Certificate,
     solver: Mapping[str, Any],
-    before: Evaluation,
+    today: Today,
 ) -> Solution:
     """Return the answer of a design that was reached: optimal if certified, else uncertified."""
     prices = _prices(Words(scene), certificate)
@@ -87,7 +90,7 @@ def with_optimum(
         binding=prices,
         certificate=certificate,
         solver=solver,
-        before=before,
+        today=today,
     )
 
 
@@ -114,7 +117,7 @@ def without_optimum(
     here: Evaluation,
     found: Clash,
     solver: Mapping[str, Any],
-    before: Evaluation,
+    today: Today,
     explanation: str = "",
 ) -> Solution:
     """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
@@ -139,5 +142,5 @@ def without_optimum(
         clash=found.limits,
         explanation=explanation if found.relaxations else "",
         solver=solver,
-        before=before,
+        today=today,
     )

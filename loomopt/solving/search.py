@@ -52,7 +52,7 @@ class Search:
     """How far a search has come.
 
     settings: those of the next solve; candidates: of every solve, in order; best: the best that was reached, judged;
-    built, solved, certified: seconds of making NLPs, of solves with that, and of certificates.
+    built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of certificates.
     """
 
     job: Job
@@ -62,6 +62,7 @@ class Search:
     best: Judged | None = None
     built: float = 0.0
     solved: float = 0.0
+    settled: float = 0.0
     certified: float = 0.0
 
     @property
@@ -174,27 +175,29 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
 
 def _certified(search: Search, candidate: Candidate) -> Search:
     """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
-    began, accuracy = time.perf_counter(), search.settings.accuracy
-    x, certificate = _settled(search, candidate.point.x)
+    accuracy = search.settings.accuracy
+    search, x, certificate = _settled(search, candidate.point.x)
     for _ in range(CORRECTIONS):
         precise = max(min(PRECISE, accuracy), ROUNDING)
         close = certificate.residual <= precise and certificate.error <= accuracy
         if not certificate.correction or close:
             break
-        moved, better = _settled(search, _stepped(search.program, x, certificate.correction))
+        search, moved, better = _settled(search, _stepped(search.program, x, certificate.correction))
         if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
             break
         x, certificate = moved, better
-    spent = time.perf_counter() - began
-    return replace(search, best=Judged(candidate, x, certificate), certified=search.certified + spent)
+    return replace(search, best=Judged(candidate, x, certificate))
 
 
-def _settled(search: Search, x: Mapping[str, float]) -> tuple[dict[str, float], Certificate]:
-    """Return x (SI) after the silent levels, and its certificate."""
-    job, program = search.job, search.program
+def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, float], Certificate]:
+    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate."""
+    job, program, began = search.job, search.program, time.perf_counter()
     settled, said = settle(program, job.tidy(program, x))
+    at = time.perf_counter()
     exact = job.values(program, job.design(program, settled))
-    return settled, replace(certify(program, exact, search.settings.accuracy), settled=said)
+    certificate = replace(certify(program, exact, search.settings.accuracy), settled=said)
+    certified = search.certified + time.perf_counter() - at
+    return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

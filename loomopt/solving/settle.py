@@ -10,7 +10,7 @@ import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Limit, Move, Program, Wish
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import sampled
 from loomopt.tolerances import ACTIVE, BEYOND, GIVES_WAY, MOVED, SETTLE_BISECTIONS, SETTLE_NODES, UNCHANGED
 
 Numbers = Mapping[str, float]
@@ -131,7 +131,7 @@ def is_flat(program: Program, x: Numbers, goal: Numbers) -> bool:
 
 def _objectives(program: Program, x: Numbers) -> Floats:
     """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
-    sampler = Sampler(program.model, {**program.parameters, **x})
+    sampler = sampled(program.model, {**program.parameters, **x})
     pieces, u = sampler.grid(SETTLE_NODES)
     parts = []
     for objective in program.objectives:
@@ -161,6 +161,6 @@ def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
 
 def _excesses(program: Program, x: Numbers) -> list[float]:
     """Return by how much every limit is exceeded, in its natural size; an equality how far it is missed."""
-    sampler = Sampler(program.model, {**program.parameters, **x})
+    sampler = sampled(program.model, {**program.parameters, **x})
     found = [(limit, sampler.excess(limit)) for limit in program.limits]
     return [abs(excess) if limit.sign == 0 else excess for limit, excess in found]

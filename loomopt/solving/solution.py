@@ -1,11 +1,12 @@
 """What a solve or an evaluation says: plain data, ready for JSON."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt.frozen import freeze
+from loomopt.lazy import lazy
 from loomopt.solving.verdict import Certificate
 
 ADVICE = {
@@ -119,14 +120,19 @@ class Solution(Evaluation):
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
-    before: Evaluation | None = None
-    """Today's machine."""
+    today: Callable[[], Evaluation] | None = None
+    """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
     """Where the solver stood: what a neighbour's solve can start from."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
         freeze(self, "design", "figures", "units", "solver", "time")
+
+    @lazy
+    def before(self) -> Evaluation | None:
+        """Today's machine, evaluated when it is first read."""
+        return self.today() if self.today else None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""

@@ -1,11 +1,13 @@
 """The engine on toys: what its answer says of the solver, of starts, of other optima and of what stands in the way."""
 
+from dataclasses import replace
+
 import pytest
 import toy
 
 from loomopt.nlp import exchange
-from loomopt.nlp.point import Point
-from loomopt.solving import engine
+from loomopt.nlp.point import Point, Settings
+from loomopt.solving import engine, report
 from loomopt.solving.solution import Clash
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
@@ -24,7 +26,9 @@ def test_a_solved_toy_says_how():
     assert (answer.solver["starts"], answer.solver["starts_at_best"], answer.solver["accuracy"]) == (1, 1, 1e-8)
     assert answer.solver["iterations"] >= 1
     assert answer.solver["error_estimate"] == answer.certificate.error
-    assert list(answer.time) == ["import_s", "build_s", "solve_s", "certify_s", "total_s"]
+    assert list(answer.time) == [
+        "import_s", "build_s", "solve_s", "settle_s", "certify_s", "report_s", "total_s",
+    ]  # fmt: skip
     assert all(seconds >= 0.0 for seconds in answer.time.values())
     assert answer.time["total_s"] >= sum(seconds for name, seconds in answer.time.items() if name != "total_s")
     assert answer.before.design == {"x": 0.5, "y": 0.5}
@@ -113,3 +117,24 @@ def test_the_callback_counts_iterations():
     toy.solve(toy.program("xy", VALLEYS), on_iteration=seen.append)
     assert seen[:3] == [0, 1, 2]
     assert engine._callback(None) is None
+
+
+def test_a_program_is_solved_without_its_scene():
+    program = toy.program("xy", BOWL)
+    found = engine.solve_program(program, toy.ToyJob(program), Settings())
+    assert found.passed
+    assert found.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
+    again = engine.solve_program(program, toy.ToyJob(program), Settings(), near=found.candidates[0].point)
+    assert (again.passed, len(again.candidates)) == (True, 1)
+    other = replace(found.candidates[0].point, structure="another")
+    assert engine.solve_program(program, toy.ToyJob(program), Settings(), near=other).candidates[0].point.iterations > 0
+
+
+def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):
+    answer = toy.solve(toy.program("xy", BOWL))
+    asked = []
+    monkeypatch.setattr(report, "evaluation", lambda *_: asked.append(1))
+    assert asked == []
+    assert answer.before is None
+    assert answer.before is None
+    assert asked == [1]

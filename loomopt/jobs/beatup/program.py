@@ -13,7 +13,7 @@ from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
 from loomopt.tolerances import NO_MASS
@@ -73,7 +73,7 @@ class _Sizes:
 
     def __init__(self, scene: Scene, known: Mapping[str, float], limited: Bounds) -> None:
         physics = model(scene, known)
-        sampler = Sampler(physics, known, SAMPLES)
+        sampler = sampled(physics, known, SAMPLES)
         resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
         front = sampler.static.get("M3_fdc", 0.0)
         self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler

@@ -18,7 +18,7 @@ from loomopt.maths import Maths, Number
 from loomopt.mechanisms.turning_points import crossing
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.scenes import Scene
 
 SAMPLES = 720
@@ -92,7 +92,7 @@ def _pose(sampler: Sampler, system: Maths, phi: Number) -> Motion:
 
 def follow(model: JobModel, values: Numbers) -> Mapping[str, float]:
     """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
-    reading = read(Sampler(model, values))
+    reading = read(sampled(model, values))
     found = {"phi_stroke": reading.phi_stroke}
     return found | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
 

@@ -16,7 +16,7 @@ from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import bound_limits, demanded, distinct, ends, inside, numbers
 from loomopt.program.program import Limit, Move, Objective, Program, Variable
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
 
@@ -59,7 +59,7 @@ def program(scene: Scene, target: str) -> Program:
     _demand_figures(scene)
     physics = model(scene, target, _reads_effects(scene))
     kept = [name for name in scene.schema.targets[target].needs if name in known]
-    sampler = Sampler(physics, {DWELL: 1.0, "phi_stroke": 0.0, **known})
+    sampler = sampled(physics, {DWELL: 1.0, "phi_stroke": 0.0, **known})
     labels = scene_numbers.labels(scene)
     free = {scene.full(name): bound.free for name, bound in scene.bounds.items()}
     variables = [_variable(name, limited[name], known, labels.get(name, "")) for name in limited if free.get(name)]

@@ -269,6 +269,7 @@ def law_rows(law: CamLaw) -> dict[str, Row]:
     return found | {f"law_pull_{k}": reads(law.knot("a", k), -1) for k in range(1, n)}
 
 
+@functools.lru_cache(maxsize=64)
 def model(
     law: CamLaw,
     dwells: tuple[bool, bool],

@@ -22,7 +22,7 @@ from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
-from loomopt.program.sampling import Sampler
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.speeds import speed_reached
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
@@ -98,7 +98,7 @@ class _Task:
             self.known |= named_knots(start)
         self.physics = model(scene, self.law)
         self.limited = scene_numbers.bounds(scene, self.known)
-        self.sampler = Sampler(self.physics, self.known)
+        self.sampler = sampled(self.physics, self.known)
         most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
         self.sizes = _Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
         needed = {key for effect in scene.active for key in effect.needs}

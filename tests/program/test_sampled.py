@@ -1,0 +1,57 @@
+"""Samplers that are kept: one for a design, whoever asks for it, and none from one solve to the next."""
+
+import math
+
+import pytest
+
+import loomopt as lo
+from loomopt.jobs import registry
+from loomopt.program import sampling
+from loomopt.program.sampling import KEPT, Sampler, sampled
+
+SCENE = lo.load("beatup")
+JOB = registry.of(SCENE)
+VALUES = JOB.numbers(SCENE)
+MODEL = JOB.model(SCENE)
+
+
+def test_the_same_design_is_sampled_once():
+    sampling.forget()
+    first = sampled(MODEL, VALUES)
+    assert sampled(MODEL, dict(reversed(VALUES.items()))) is first
+    assert sampled(MODEL, VALUES, 360) is not first
+    assert sampled(MODEL, {**VALUES, "l1": math.nextafter(VALUES["l1"], 1.0)}) is not first
+    sampling.forget()
+    assert sampled(MODEL, VALUES) is not first
+
+
+def test_a_zero_of_the_other_sign_is_another_design():
+    plus, minus = (sampled(MODEL, {**VALUES, "m4e": zero}) for zero in (0.0, -0.0))
+    assert plus is not minus
+    assert math.copysign(1.0, minus.values["m4e"]) == -1.0
+
+
+def test_what_is_kept_is_what_would_be_sampled():
+    kept, fresh = sampled(MODEL, VALUES), Sampler(MODEL, VALUES)
+    assert kept.values == VALUES
+    assert kept.figures == fresh.figures
+    assert kept.extremes("peak_torque") == fresh.extremes("peak_torque")
+
+
+def test_no_more_are_kept_than_one_start_looks_at():
+    sampling.forget()
+    first = sampled(MODEL, VALUES)
+    for k in range(KEPT):
+        sampled(MODEL, {**VALUES, "m4e": 1.0 + k})
+    assert sampled(MODEL, VALUES) is not first
+
+
+def test_positions_evaluated_do_not_depend_on_the_solve_before():
+    counts = {lo.solve(SCENE).solver["evaluations"] for _ in range(3)}
+    assert len(counts) == 1
+
+
+def test_what_does_not_assemble_is_refused_each_time():
+    for _ in range(2):
+        with pytest.raises((ValueError, ZeroDivisionError)):
+            sampled(MODEL, {**VALUES, "l2": 1e-6})
