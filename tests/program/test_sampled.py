@@ -54,4 +54,4 @@ def test_positions_evaluated_do_not_depend_on_the_solve_before():
 def test_what_does_not_assemble_is_refused_each_time():
     for _ in range(2):
         with pytest.raises((ValueError, ZeroDivisionError)):
-            sampled(MODEL, {**VALUES, "l2": 1e-6})
+            sampled(MODEL, {**VALUES, "l1": 10.0})
