@@ -15,6 +15,7 @@ from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number, numpy
 from loomopt.owned import label, owned
+from loomopt.program import formulas
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics
 from loomopt.schema import Values
@@ -92,10 +93,10 @@ class JobModel:
         found = dict(self.own_quantities)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.quantities.items():
-                found[prefix + name] = Quantity(functools.partial(_of_group, formula), figure=False)
+                found[prefix + name] = Quantity(functools.partial(formulas.of_group, formula), figure=False)
         for check in self.checks:
             for name in check.quantities:
-                found[name] = Quantity(functools.partial(_of_check, check, name))
+                found[name] = Quantity(functools.partial(formulas.of_check, check, name))
         return found
 
     @lazy
@@ -103,9 +104,11 @@ class JobModel:
         found = dict(self.own_rows)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.rows.items():
-                found[name if name in group.margins else prefix + name] = Row(functools.partial(_of_design, formula))
+                found[name if name in group.margins else prefix + name] = Row(
+                    functools.partial(formulas.of_design, formula)
+                )
         for check in self.checks:
-            found |= {name: Row(functools.partial(_row_of, check, name)) for name in check.rows}
+            found |= {name: Row(functools.partial(formulas.row_of, check, name)) for name in check.rows}
         return {name: row for name, row in found.items() if self._sufficed(row)}
 
     def _sufficed(self, row: Row) -> bool:
@@ -274,10 +277,26 @@ class JobModel:
 
     def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
         """Return a whole-cycle quantity, SI, at a node."""
-        if name in self._cased:
-            name, k = self._cased[name]
-            given, node = given.cases[k], Node(node.phi, self._switch_of(node.switch, k))
-        return self._quantities[name].formula(Instant(self, maths, given, node))
+        plain, case = self._cased.get(name, (name, -1))
+        return self._quantities[plain].formula(self._instant(maths, given, node, case))
+
+    def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
+        """Return what reads whole-cycle quantities by name, SI, at a node whose pose is computed once for all."""
+        instants: dict[int, Instant] = {}
+
+        def quantity(name: str) -> Number:
+            plain, case = self._cased.get(name, (name, -1))
+            if case not in instants:
+                instants[case] = self._instant(maths, given, node, case)
+            return self._quantities[plain].formula(instants[case])
+
+        return quantity
+
+    def _instant(self, maths: Maths, given: Given, node: Node, case: int) -> Instant:
+        """Return the mechanism at a node; case: -1 for the first."""
+        if case < 0:
+            return Instant(self, maths, given, node)
+        return Instant(self, maths, given.cases[case], Node(node.phi, self._switch_of(node.switch, case)))
 
     def _switch_of(self, switch: Values, case: int) -> Values:
         own = {name: switch[cased(name, case + 1)] for name in self._single if cased(name, case + 1) in switch}
@@ -325,19 +344,3 @@ class _Cornered(NamedTuple):
 def cased(name: str, case: int) -> str:
     """Return the name of a number, quantity, row, switch or event at a further case, counted from 1."""
     return f"{name} [case {case}]"
-
-
-def _of_group(formula: Callable[..., Number], at: Instant) -> Number:
-    return formula(at.maths, at.given, at.node.phi, lambda: at.pose)
-
-
-def _of_check(check: Check[Any], name: str, at: Instant) -> Number:
-    return check.quantities[name](at.maths, at.pose, at.values, at.given.own[check.name])
-
-
-def _of_design(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
-    return formula(at.maths, at.values)
-
-
-def _row_of(check: Check[Any], name: str, at: Instant) -> Number:
-    return check.rows[name](at.maths, at.values, at.given.own[check.name])

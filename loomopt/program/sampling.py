@@ -3,7 +3,7 @@
 import functools
 import math
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.lazy import lazy
+from loomopt.maths import Number
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
@@ -150,6 +151,18 @@ class Sampler:
                 result[part] = self.model.quantity(maths.numpy(), self.given, name, node)
         return result
 
+    def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
+        """Return several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
+        found = {name: np.empty(u.shape) for name in names}
+        Tally.positions += len(u) * len(found)
+        for begin in range(0, len(u), CHUNK):
+            part = slice(begin, begin + CHUNK)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                read = self.model.together(maths.numpy(), self.given, self.node(pieces[part], u[part]))
+                for name, values in found.items():
+                    values[part] = read(name)
+        return found
+
     def node(self, pieces: Pieces, u: Floats) -> Node:
         """Return nodes (pieces, u) with their crank angles, rad, and switches."""
         return Node(self.cycle.angles(pieces, u), self.cycle.switch(pieces))
@@ -176,7 +189,7 @@ class Sampler:
 
     def _find_extremes(self, name: str) -> list[Extreme]:
         pieces, u = self.grid()
-        values = self.at(name, pieces, u)
+        values = self._sampled(name)
         size = self.heights(name, values)
         if not np.all(np.isfinite(size)):
             return [Extreme(0, 0.0, float("inf"))]
@@ -189,6 +202,19 @@ class Sampler:
         if self.singular:
             found += self._spikes(name)
         return sorted(found, key=lambda extreme: -extreme.height)
+
+    def _sampled(self, name: str) -> Floats:
+        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
+        pieces, u = self.grid()
+        if len(u) > CHUNK:
+            return self.at(name, pieces, u)
+        Tally.positions += len(u)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.array(np.broadcast_to(self._on_grid(name), u.shape), dtype=np.float64)
+
+    @lazy
+    def _on_grid(self) -> Callable[[str], Number]:
+        return self.model.together(maths.numpy(), self.given, self.node(*self.grid()))
 
     @lazy
     def singular(self) -> tuple[float, ...]:

@@ -134,9 +134,10 @@ def cycle_rows(program: Program) -> list[CycleRow]:
 def between_points(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> float:
     """Return by how much an independent dense scan exceeds the refined peaks, relative to the row's size."""
     pieces, u = sampler.grid(points)
+    values = sampler.together(list(dict.fromkeys(name for name, _, _ in rows)), pieces, u)
     worst = 0.0
     for name, scale, where in rows:
         on = sampler.cycle.on(where)[pieces]
-        highest = float(sampler.heights(name, sampler.at(name, pieces[on], u[on])).max(initial=-np.inf))
+        highest = float(sampler.heights(name, values[name][on]).max(initial=-np.inf))
         worst = max(worst, (highest - sampler.peak(name, where)) / scale)
     return worst
