@@ -115,7 +115,7 @@ def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple
     curvature = second_order.judged(local, place, system, first)
     if curvature.minimum and curvature.unique:
         return first, curvature
-    for k in (k for k in system.inequalities if first.of[k] > POSITIVE):
+    for k in kkt.replaceable(local.gradients, system, first, STATIONARY):
         other = kkt.solved(local.gradients, system.without(k))
         if other.residual <= STATIONARY:
             found = second_order.judged(local, place, system, other)

@@ -4,6 +4,7 @@ An objective is a sum of groups, each the largest of its smooth pieces: its subg
 by multipliers that sum to 1. A limit or an earlier objective that binds is an equality of free sign at later levels.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -100,6 +101,30 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
 
 def solved(gradients: Floats, system: System) -> Multipliers:
     """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
+    matrix, target, columns = _equations(gradients, system)
+    weights = nnls(matrix, target)
+    return Multipliers(weights @ columns, float(np.abs(matrix @ weights - target).max()))
+
+
+def replaceable(gradients: Floats, system: System, found: Multipliers, most: float) -> list[int]:
+    """Return the inequalities with a multiplier without which others might leave a residual of at most `most`.
+
+    Two solutions y, z have ‖A (y − z)‖ ≥ σ ‖y − z‖, σ the least singular value of the slopes A: without a row of
+    multiplier y_k what is left is no less than σ y_k less what y leaves.
+    """
+    matrix, _, columns = _equations(gradients, system)
+    once = matrix[:, : len(columns) - len(system.equalities) - len(system.held)]
+    sizes = np.linalg.svd(once, compute_uv=False)
+    least = float(sizes[-1]) if len(sizes) == once.shape[1] else 0.0
+    reach = math.sqrt(len(matrix)) * (found.residual + most)
+    return [k for k in system.inequalities if found.of[k] > POSITIVE and least * found.of[k] <= reach]
+
+
+def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, Floats]:
+    """Return the slopes to be balanced, by column, what they must add up to, and the rows each column is made of.
+
+    What has a free sign stands twice, its opposites last.
+    """
     count, size = gradients.shape
     unit = np.eye(count)
     one_sided = [unit[k] for k in (*system.pieces, *system.inequalities)]
@@ -108,5 +133,4 @@ def solved(gradients: Floats, system: System) -> Multipliers:
     norms = [np.isin(np.arange(count), group).astype(float) for group in system.groups]
     matrix = np.vstack([gradients.T @ columns.T, np.array(norms) @ columns.T])
     target = np.concatenate([np.zeros(size), np.ones(len(norms))])
-    weights = nnls(matrix, target)
-    return Multipliers(weights @ columns, float(np.abs(matrix @ weights - target).max()))
+    return matrix, target, columns

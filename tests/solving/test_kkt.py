@@ -7,9 +7,9 @@ import toy
 from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt
 from loomopt.solving.exact import Exact
-from loomopt.solving.kkt import Multipliers
+from loomopt.solving.kkt import Multipliers, System, replaceable, solved
 from loomopt.solving.rows import active_set
-from loomopt.tolerances import POSITIVE
+from loomopt.tolerances import POSITIVE, STATIONARY
 
 
 def at(program, x):
@@ -127,3 +127,22 @@ def test_multipliers_are_normalised_to_pieces_that_weigh_one_together():
     assert multipliers(3.0, 2.0).normalised(bare).tolist() == [3.0, 2.0]
     empty = kkt.System(((1,),), (0,), (), np.zeros((0, 2)))
     assert multipliers(3.0, 0.0).normalised(empty).tolist() == [3.0, 0.0], "no sum to share"
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
+    """Of rows that depend on each other some can stand for others; of independent ones none, however small its price."""
+    rng = np.random.default_rng(seed)
+    rows, size = int(rng.integers(2, 7)), int(rng.integers(2, 6))
+    slopes = rng.normal(size=(rows, size)) * 10.0 ** rng.integers(-3, 4, (rows, 1))
+    prices = 10.0 ** rng.integers(-4, 2, rows)
+    gradients = np.vstack([slopes, -prices @ slopes])
+    one = System(((rows,),), tuple(range(rows)), (), np.zeros((0, rows + 1)))
+    found = solved(gradients, one)
+    named = replaceable(gradients, one, found, STATIONARY)
+    without = [
+        k for k in range(rows) if found.of[k] > POSITIVE and solved(gradients, one.without(k)).residual <= STATIONARY
+    ]
+    assert set(without) <= set(named)
+    if rows <= size and np.linalg.svd(gradients[:rows], compute_uv=False)[-1] * prices.min() > 1e-4:
+        assert named == []

@@ -78,14 +78,18 @@ def peaks(model: JobModel) -> dict[str, str]:
 
 def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-    physics, static = sampled.model, sampled.static
-    found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
+    found: dict[str, float | None] = {name: sampled.static.get(name) for name in scene.schema.figures}
+    for name, quantity in peaks(sampled.model).items():
+        found[name] = sampled.peak(quantity) * (-1 if quantity == "concavity" else 1)
+    return found | contact(scene, sampled)
+
+
+def contact(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
+    """Return the figures of the cam force, SI, and the speed up to which the roller stays on the cam."""
+    physics = sampled.model
+    found: dict[str, float | None] = {"contact_max": sampled.peak("cam_force")}
     lifts = [extreme for where in physics.known_in or (None,) for extreme in sampled.extremes("lift", where)]
     found["contact_min"], found["contact_angle"] = _least(lifts, sampled)
-    for name, quantity in CYCLE.items():
-        if quantity in physics.quantities:
-            found[name] = sampled.peak(quantity) * (-1 if quantity == "concavity" else 1)
-    found |= {name: sampled.peak(name) for check in physics.checks for name in check.quantities}
     found["contact_speed"] = None
     if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
         speed = speed_reached(physics, sampled.values, "lift", -scene.operation["N_min"])

@@ -6,12 +6,11 @@ from typing import Any
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
-from loomopt.jobs.shedding.model import follower, moving
+from loomopt.jobs.shedding.model import contact, moving
 from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
-from loomopt.mechanisms.cam_follower import Contact
 from loomopt.mechanisms.cam_motion import Spline, knots
 from loomopt.program.curves import Columns
-from loomopt.program.instant import Formula, Instant
+from loomopt.program.instant import Formula
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
@@ -70,18 +69,13 @@ class Shedding(Job):
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum is worth, and one on today's spring."""
-        now = self.figures(scene, self.today(scene))
+        now = designs.contact(scene, self.sampler(scene, self.today(scene)))
         return designs.say(scene, now, bool(self.model(scene).known_in), target, figures)
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
         after: dict[str, Formula] = {}
         if sampler.model.has_quantity("curvature"):
-
-            def contact(at: Instant) -> Contact:
-                found: Contact = at.pose.contact(follower(at.values))
-                return found
-
             after = {
                 "pressure_angle [rad]": lambda at: contact(at).pressure_angle,
                 "curvature [1/m]": lambda at: contact(at).curvature,

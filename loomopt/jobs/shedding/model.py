@@ -217,7 +217,8 @@ def follower(values: Values) -> Follower:
     return Follower(**{name: values[name] for name in FOLLOWER})
 
 
-def _contact(at: Instant) -> Contact:
+def contact(at: Instant) -> Contact:
+    """Return roller and cam at an instant."""
     found: Contact = at.pose.contact(follower(at.values))
     return found
 
@@ -234,10 +235,10 @@ QUANTITIES: dict[str, Quantity] = {
     "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }
 FOLLOWED: dict[str, Quantity] = {
-    "pressure_angle": Quantity(lambda at: _contact(at).pressure_angle),
-    "curvature": Quantity(lambda at: _contact(at).curvature, signed=True),
-    "concavity": Quantity(lambda at: -_contact(at).curvature, signed=True),
-    "arm_angle": Quantity(lambda at: _contact(at).angle, figure=False),
+    "pressure_angle": Quantity(lambda at: contact(at).pressure_angle),
+    "curvature": Quantity(lambda at: contact(at).curvature, signed=True),
+    "concavity": Quantity(lambda at: -contact(at).curvature, signed=True),
+    "arm_angle": Quantity(lambda at: contact(at).angle, figure=False),
 }
 """Quantities of the frame, and of the cam where the scene gives its dimensions, SI; forces count with their sign."""
 
