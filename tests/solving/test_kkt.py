@@ -131,7 +131,7 @@ def test_multipliers_are_normalised_to_pieces_that_weigh_one_together():
 
 @pytest.mark.parametrize("seed", range(40))
 def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
-    """Of rows that depend on each other some can stand for others; of independent ones none, however small its price."""
+    """Of rows that depend on each other some can stand for others; of independent ones none."""
     rng = np.random.default_rng(seed)
     rows, size = int(rng.integers(2, 7)), int(rng.integers(2, 6))
     slopes = rng.normal(size=(rows, size)) * 10.0 ** rng.integers(-3, 4, (rows, 1))
