@@ -1,4 +1,7 @@
-"""Every number that decides a verdict, a stop or a step: where it comes from, and what depends on it."""
+"""Every number that decides a verdict, a stop or a step: where it comes from, and what depends on it.
+
+What is one job's, or one mechanism's own, stands in its file.
+"""
 
 ASSEMBLY_MARGIN = 1.001
 """Factor to spare by which every dyad's triangle must close at both ends (assembly margins of all jobs)."""
@@ -56,6 +59,14 @@ than a fifth above them. Share by which rows on a level may differ: a thousand r
 
 SAME_ROW = 1e-9
 """rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
+
+TURN_SAMPLES, CROSSING_STEPS, CROSSING_WIDTH = 720, 200, 4e-16
+"""Samples between which a motion's turn is sought, as many as an extreme; secants and halvings of what brackets it (a
+third of them halve: 66 are past any float), and the share of an angle that two neighbouring floats are apart."""
+
+SPEED_AT_REST, SPEED_STEPS, SPEED_MET = 1e-12, 30, 1e-8
+"""Largest speed that keeps a bound: share of the largest value by which one at rest may miss it, for rounding; Newton's
+steps at most, and the share of the speed after which there is none left to take: the next would be its square."""
 
 START_ROOM = 0.01
 """Share of a bound's width that a start keeps from its ends: IPOPT would push it there."""

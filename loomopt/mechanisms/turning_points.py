@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.maths import Number
+from loomopt.tolerances import CROSSING_STEPS, CROSSING_WIDTH, TURN_SAMPLES
 
 Floats = NDArray[np.float64]
-SAMPLES = 720
 
 
 def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Number) -> Number:
@@ -29,7 +29,7 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
 
     None where it never does, or where the motion has no real position somewhere.
     """
-    angles = np.linspace(0.0, 2 * np.pi, SAMPLES + 1)
+    angles = np.linspace(0.0, 2 * np.pi, TURN_SAMPLES + 1)
     with np.errstate(invalid="ignore", divide="ignore"):
         slopes = np.asarray(slope(angles), dtype=np.float64)
     if not np.all(np.isfinite(slopes)):
@@ -49,9 +49,9 @@ def turns(slope: Callable[[Floats], Any]) -> list[float]:
 def crossing(excess: Callable[[float], float], low: float, high: float) -> float:
     """Return where a function that is not positive at `low` and positive at `high` crosses zero, to rounding."""
     at_low, at_high = excess(low), excess(high)
-    for turn in range(200):
+    for turn in range(CROSSING_STEPS):
         width = high - low
-        if width <= 4e-16 * max(1.0, abs(high)) or at_low == 0.0 == at_high:
+        if width <= CROSSING_WIDTH * max(1.0, abs(high)) or at_low == 0.0 == at_high:
             break
         secant = low - at_low * width / (at_high - at_low) if at_high != at_low else (low + high) / 2
         middle = (low + high) / 2 if turn % 3 == 2 or not low < secant < high else secant

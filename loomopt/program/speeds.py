@@ -9,11 +9,8 @@ from loomopt.cycle import Floats, Node
 from loomopt.maths import numpy
 from loomopt.program.model import JobModel
 from loomopt.program.sampling import Sampler, Tally, sampled
+from loomopt.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
 
-AT_REST = 1e-12
-"""Share of the largest value by which one at rest may miss its bound: rounding."""
-NEWTON, CONVERGED = 30, 1e-8
-"""Newton's steps at most, and the share after which there is none left to take: the next would be its square."""
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float) -> float:
@@ -26,7 +23,7 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     at_rest = sampled(model, {**values, "speed": 0.0})
     nodes = at_rest.node(*at_rest.grid())
     rest, ahead, back = -_at_speeds(at_rest, name, nodes, (0.0, unit, -unit))
-    rounding = AT_REST * float(np.abs([rest, ahead]).max())
+    rounding = SPEED_AT_REST * float(np.abs([rest, ahead]).max())
     spare = rest + most
     if spare.min() < -rounding:
         return 0.0
@@ -55,7 +52,7 @@ def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float)
 
 def _settled(at_rest: Sampler, name: str, most: float, speed: float) -> float:
     """Return the speed, rad/s, where the refined largest value is `most`, from one nearby."""
-    for _ in range(NEWTON):
+    for _ in range(SPEED_STEPS):
         top = sampled(at_rest.model, {**at_rest.values, "speed": speed}).extremes(name)[0]
         node = at_rest.node(np.array([top.piece]), np.array([top.u]))
         still, twice = _at_speeds(at_rest, name, node, (0.0, 2 * speed)).ravel().tolist()
@@ -64,6 +61,6 @@ def _settled(at_rest: Sampler, name: str, most: float, speed: float) -> float:
             break
         step = (most - top.value) / slope
         speed += step
-        if abs(step) <= CONVERGED * speed:
+        if abs(step) <= SPEED_MET * speed:
             break
     return speed
