@@ -12,7 +12,6 @@ from loomopt.program.sampling import Sampler, Tally, sampled
 from loomopt.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
 
 
-
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float) -> float:
     """Return the speed, rad/s, up to which a signed quantity stays at most `most`, SI; infinite where it always does.
 
