@@ -200,6 +200,8 @@ def _frozen(nodes: Sequence[Sequence[Extreme]]) -> Nodes:
 def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
     """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
     own = [start for start in (_started(program, x) for x in program.starts) if start]
+    if len(own) >= count:
+        return own
     generator = np.random.default_rng(seed)
     drawn: list[dict[str, float]] = []
     for _ in range(DRAWS * count):

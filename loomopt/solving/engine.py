@@ -17,7 +17,6 @@ from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.prices import figure_of
-from loomopt.solving.proof import proven
 from loomopt.solving.search import Candidate, Judged, Search, compared, judged, searched, tried
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.words import Words
@@ -76,7 +75,7 @@ def solve(
     for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
-    answer = proven(scene, target, answer) if prove and answer.certificate else answer
+    answer = _proven(scene, target, answer) if prove and answer.certificate else answer
     solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error
@@ -101,6 +100,13 @@ def solve_program(
     """
     same = near is not None and near.structure == program.structure
     return searched(Search(job, program, settings), starts, seed, near if same else None, on_start)
+
+
+def _proven(scene: Scene, target: str, answer: Solution) -> Solution:
+    """Return the answer with every limit proven, or with what is not."""
+    from loomopt.solving.proof import proven
+
+    return proven(scene, target, answer)
 
 
 def _import_solver() -> float:
