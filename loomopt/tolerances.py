@@ -104,6 +104,10 @@ FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
 ELASTIC_SHARE = 1e-3
 """Share of a positive lower bound below which no relaxation goes: lengths stay positive."""
 
+FEW_CHOICES = 8
+"""Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
+slopes and curvatures dense. Named cam laws have five pieces at most."""
+
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
 """Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
 creep (tests/solving/test_infeasible.py)."""

@@ -59,30 +59,47 @@ class Spline:
 
     def at(self, maths: Maths, u: Number, piece: Number) -> Derivatives:
         """Return s(u) and its derivatives on interval `piece`."""
-        n = self.intervals
-        s, v, a, after = (maths.choose(piece, values) for values in (self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]))
-        share = n * u - piece
-        t, rise = share / n, after - a
-        return Derivatives(
-            s + t * (v + t * (a / 2 + rise * share / 6)),
-            v + t * (a + rise * share / 2),
-            a + rise * share,
-            n * rise,
-        )
+        columns = self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]
+        return cubic(self.intervals * u - piece, self.intervals, *(maths.choose(piece, values) for values in columns))
 
 
-def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
+def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number) -> Derivatives:
+    """Return s and its derivatives at a share of one of n equal intervals, from s, s', s'' at its beginning and s''
+    at its end.
+    """
+    t, rise = share / n, after - a
+    return Derivatives(
+        s + t * (v + t * (a / 2 + rise * share / 6)),
+        v + t * (a + rise * share / 2),
+        a + rise * share,
+        n * rise,
+    )
+
+
+Known = Sequence[Number | None]
+"""A number for each knot, None where it is not known."""
+
+
+def spline(maths: Maths, accelerations: Sequence[Number], heights: Known = (), slopes: Known = ()) -> Spline:
     """Return the spline that starts at rest with second derivatives a_0 … a_n at its evenly spaced knots.
 
     s and v are running sums, linear in the accelerations: with symbols for these, s(1) = 1 and s'(1) = 0 are linear.
+    heights, slopes: s and v at knots where they are known, from which the sums go on.
     """
     a = tuple(accelerations)
     n = len(a) - 1
     s, v = [maths.number(0.0)], [maths.number(0.0)]
-    for before, after in itertools.pairwise(a):
-        s.append(s[-1] + v[-1] / n + (2 * before + after) / (6 * n**2))
-        v.append(v[-1] + (before + after) / (2 * n))
+    height, slope = s[0], v[0]
+    for k, (before, after) in enumerate(itertools.pairwise(a), start=1):
+        s.append(height + slope / n + (2 * before + after) / (6 * n**2))
+        v.append(slope + (before + after) / (2 * n))
+        height, slope = _either(heights, k, s[-1]), _either(slopes, k, v[-1])
     return Spline(tuple(s), tuple(v), a)
+
+
+def _either(known: Known, place: int, found: Number) -> Number:
+    given = known[place] if known else None
+    return found if given is None else given
 
 
 def mirrored(half: Sequence[Number]) -> tuple[Number, ...]:

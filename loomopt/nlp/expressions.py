@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt import maths
 from loomopt.balance import Given, total
-from loomopt.cycle import Node
 from loomopt.maths import Number
+from loomopt.nlp.families import Family
+from loomopt.nlp.lifted import Lifts
+from loomopt.nlp.quantities import Quantities
 from loomopt.nlp.structure import Structure
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
@@ -16,12 +17,16 @@ from loomopt.schema import Values
 
 @dataclass(frozen=True)
 class Expressions:
-    """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0."""
+    """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
+
+    lifts: variables beside x that rows read.
+    """
 
     x: Any
     p: Any
     f: Any
     g: Any
+    lifts: Lifts
 
 
 def expressions(structure: Structure) -> Expressions:
@@ -32,70 +37,27 @@ def expressions(structure: Structure) -> Expressions:
     extra = ca.SX.sym("t", structure.extras)
     p = ca.SX.sym("p", structure.layout.size)
     built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(p))
-    rows = [*built.limits(), *built.pieces(), *built.cycle()]
-    return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows))
-
-
-class Quantities:
-    """Whole-cycle quantities, each traced once as a CasADi function of numbers, angle and switches, not once a node.
-
-    Numbers that follow from others at once (the corners' angles among them) are inputs too: all nodes share them.
-    """
-
-    def __init__(self, structure: Structure) -> None:
-        import casadi as ca
-
-        program, self.model = structure.program, structure.program.model
-        names = [*program.parameters, *structure.hints, *(v.name for v in program.variables)]
-        self.symbols = {name: ca.SX.sym(name) for name in names}
-        given = self.model.given(maths.casadi(), self.symbols)
-        self.derived = [_following(case) for case in (given, *given.cases)]
-        first, *others = (
-            Given({**case.values, **own}, case.own)
-            for case, own in zip((given, *given.cases), self.derived, strict=True)
-        )
-        self.given = Given(first.values, first.own, tuple(others))
-        self.phi, self.switch = ca.SX.sym("phi"), ca.SX.sym("switch", len(structure.node.switches))
-        self.switches = structure.node.switches
-        self._traced: dict[str, Any] = {}
-
-    def at(self, name: str, given: Given, phi: Number, switch: Values) -> Number:
-        """Return a quantity at a crank angle, rad."""
-        import casadi as ca
-
-        if name not in self._traced:
-            self._traced[name] = self._trace(name)
-        numbers = [given.values[key] for key in self.symbols]
-        for case, own in zip((given, *given.cases), self.derived, strict=True):
-            numbers += [case.values[key] for key in own]
-        return self._traced[name](ca.vertcat(*numbers), phi, ca.vertcat(*(switch[key] for key in self.switches)))
-
-    def _trace(self, name: str) -> Any:
-        import casadi as ca
-
-        switch = dict(zip(self.switches, ca.vertsplit(self.switch), strict=True))
-        value = self.model.quantity(maths.casadi(), self.given, name, Node(self.phi, switch))
-        numbers = [*self.symbols.values(), *(symbol for own in self.derived for symbol in own.values())]
-        return ca.Function("quantity", [ca.vertcat(*numbers), self.phi, self.switch], [value])
-
-
-def _following(case: Given) -> dict[str, Any]:
-    """Return a symbol for every number of a case that follows from others."""
-    import casadi as ca
-
-    known = case.values.items()
-    return {key: ca.SX.sym(key) for key, value in known if isinstance(value, ca.SX) and not value.is_symbolic()}
+    rows = [*built.limits(), *built.pieces(), *built.held(), *built.cycle()]
+    return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
 
 class NodeRows(Rows):
     """Rows in CasADi symbols; means are taken over nodes that are parameters."""
 
     def __init__(
-        self, structure: Structure, given: Given, stills: Mapping[str, Values], rules: Mapping[str, Sequence[Any]]
+        self,
+        structure: Structure,
+        lifts: Lifts,
+        given: Given,
+        stills: Mapping[str, Values],
+        rules: Mapping[str, Sequence[Any]],
     ) -> None:
-        super().__init__(structure.program.model, maths.casadi(), given, stills)
+        import casadi as ca
+
+        super().__init__(structure.program.model, lifts.maths, given, stills)
         self.corners = self.model.corners(self.maths, given)
-        self.shape, self.rules, self.quantities = structure.node, rules, Quantities(structure)
+        self.column = ca.vertcat(1, *self.corners)
+        self.shape, self.rules, self.quantities = structure.node, rules, Quantities(structure, lifts)
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
@@ -103,7 +65,10 @@ class NodeRows(Rows):
 
     def at(self, name: str, parameters: Sequence[Number]) -> Number:
         """Return a whole-cycle quantity at the node that parameters say, SI."""
-        return self.quantity(name, *self.shape.read(parameters, self.corners))
+        import casadi as ca
+
+        angle = ca.dot(ca.vertcat(*parameters[self.shape.angle]), self.column)
+        return self.quantity(name, angle, dict(zip(self.shape.switches, parameters[self.shape.places], strict=True)))
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, SI."""
@@ -119,6 +84,7 @@ class _Built:
     def __init__(self, structure: Structure, scaled: list[Any], extra: list[Any], vector: list[Any]) -> None:
         program, layout = structure.program, structure.layout
         self.structure, self.program, self.extra, self.vector = structure, program, extra, vector
+        self.lifts = Lifts([*scaled, *extra])
         sizes = layout.read(vector, "variable scale")
         values = dict(zip(program.parameters, layout.read(vector, "values"), strict=True))
         values |= dict(zip(structure.hints, layout.read(vector, "hints"), strict=True))
@@ -126,9 +92,17 @@ class _Built:
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
         rules = {name: layout.rows(vector, f"mean {name}") for name, _ in structure.points}
-        self.rows = NodeRows(structure, model.given(maths.casadi(), values), stills, rules)
+        self.rows = NodeRows(structure, self.lifts, self._given(values), stills, rules)
         self.bounds, self.limit_scales = layout.read(vector, "limit"), layout.read(vector, "limit scale")
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
+
+    def _given(self, values: Values) -> Given:
+        """Return the scene's numbers and what follows from them, lifted where one follows from the other."""
+        symbols = self.lifts.symbols(self.structure.recurrent)
+        given = self.program.model.given(self.lifts.maths, {**values, **symbols})
+        for name, symbol in symbols.items():
+            self.lifts.define(symbol, given.values[name])
+        return Given({**given.values, **symbols}, given.own, given.cases)
 
     def objective(self) -> Any:
         """Return the weighted sum of the objectives, or of what the limits give way."""
@@ -168,16 +142,31 @@ class _Built:
             found += [sign * self.rows.single(row) / scale - t for row in epigraph.rows for sign in signs]
         return found
 
+    def held(self) -> list[Any]:
+        """Return the rows of whole-cycle quantities at the stations of each family."""
+        layout, found = self.structure.layout, []
+        opened = [
+            dict(zip(self.structure.open_switches, row, strict=True)) for row in layout.rows(self.vector, "station")
+        ]
+        for k, family in enumerate(self.structure.families):
+            for sign, place in zip(layout.read(self.vector, f"sign {k}"), self.structure.held[k], strict=True):
+                corner, switch = self.structure.stations[place]
+                value = self.rows.quantity(family.row, self.rows.corners[corner], {**opened[place], **switch})
+                found.append(self._row(family, sign, value))
+        return found
+
     def cycle(self) -> list[Any]:
         """Return the rows of whole-cycle quantities, one for each slot."""
         found = []
         for k, family in enumerate(self.structure.families):
-            if family.epigraph >= 0:
-                bound = self.extra[family.epigraph]
-                scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
-            else:
-                scale = self.limit_scales[family.limit]
-                bound = self.bounds[family.limit] / scale + self.given_way(family.limit)
             for weight, sign, *parameters in self.structure.layout.rows(self.vector, f"family {k}"):
-                found.append(weight * (sign * self.rows.at(family.row, parameters) / scale - bound))
+                found.append(weight * self._row(family, sign, self.rows.at(family.row, parameters)))
         return found
+
+    def _row(self, family: Family, sign: Any, value: Any) -> Any:
+        """Return what a whole-cycle quantity exceeds, in its natural size."""
+        if family.epigraph >= 0:
+            scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
+            return sign * value / scale - self.extra[family.epigraph]
+        scale = self.limit_scales[family.limit]
+        return sign * value / scale - (self.bounds[family.limit] / scale + self.given_way(family.limit))

@@ -32,5 +32,5 @@ class Layout:
 
     def rows(self, vector: Any, name: str) -> list[list[Any]]:
         """Return the entries of a two-dimensional array, row by row."""
-        flat, width = self.read(vector, name), self.places[name][1][1]
-        return [flat[k : k + width] for k in range(0, len(flat), width)]
+        flat, (count, width) = self.read(vector, name), self.places[name][1]
+        return [flat[k * width : (k + 1) * width] for k in range(count)]

@@ -60,6 +60,21 @@ def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
+class Chain:
+    """Derived values of which each follows from a few before it: an NLP may have them for variables, and sparse rows.
+
+    roots: numbers they follow from in the end; values: their names, in order. Where a kinematics' `derived` is given
+    one of them, it reads that for those after it, and returns what it follows from all the same.
+    stations: where on the arcs' corners whole-cycle rows are likely to bind: switches of the motion's arcs, for each
+    corner in order. Nothing but loads may jump there.
+    """
+
+    roots: frozenset[str]
+    values: tuple[str, ...]
+    stations: tuple[Values, ...]
+
+
+@dataclass(frozen=True)
 class Arcs:
     """Stretches of the cycle that limits speak of; switch: as a load's, of its own corners' angles, rad."""
 
@@ -68,6 +83,8 @@ class Arcs:
     switch: Callable[[float, tuple[float, ...]], float]
     structure: Hashable = None
     """What distinguishes stretches of one name."""
+    chain: Chain | None = None
+    """What their formulas are made of, where that is a chain."""
 
 
 class Kinematics(Protocol):
