@@ -1,5 +1,6 @@
 """An NLP's objective and rows as CasADi expressions, read through the same rows as in every other number system."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from loomopt.maths import Number
 from loomopt.nlp.families import Family
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
-from loomopt.nlp.structure import Structure
+from loomopt.nlp.structure import NodeParameters, Structure
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
 from loomopt.schema import Values
@@ -37,7 +38,7 @@ def expressions(structure: Structure) -> Expressions:
     extra = ca.SX.sym("t", structure.extras)
     p = ca.SX.sym("p", structure.layout.size)
     built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(p))
-    rows = [*built.limits(), *built.pieces(), *built.held(), *built.cycle()]
+    rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
     return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
 
@@ -46,22 +47,25 @@ class NodeRows(Rows):
 
     def __init__(
         self,
-        structure: Structure,
-        lifts: Lifts,
-        given: Given,
+        shape: NodeParameters,
+        quantities: Quantities,
         stills: Mapping[str, Values],
         rules: Mapping[str, Sequence[Any]],
     ) -> None:
         import casadi as ca
 
-        super().__init__(structure.program.model, lifts.maths, given, stills)
-        self.corners = self.model.corners(self.maths, given)
+        super().__init__(quantities.model, quantities.lifts.maths, quantities.given, stills)
+        self.corners = self.model.corners(self.maths, self.given)
         self.column = ca.vertcat(1, *self.corners)
-        self.shape, self.rules, self.quantities = structure.node, rules, Quantities(structure, lifts)
+        self.shape, self.rules, self.quantities = shape, rules, quantities
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
-        return self.quantities.at(name, self.given, phi, switch)
+        return self.quantities.at(name, phi, switch)
+
+    def read(self, names: Sequence[str]) -> None:
+        """Read the figures and rows of the design that will be asked for, all at once."""
+        self._single |= self.model.static(self.maths, self.given, self.stills, names)
 
     def at(self, name: str, parameters: Sequence[Number]) -> Number:
         """Return a whole-cycle quantity at the node that parameters say, SI."""
@@ -92,17 +96,19 @@ class _Built:
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
         rules = {name: layout.rows(vector, f"mean {name}") for name, _ in structure.points}
-        self.rows = NodeRows(structure, self.lifts, self._given(values), stills, rules)
+        values |= self.lifts.symbols(structure.recurrent)
+        quantities = Quantities(model, values, self._given(values), structure.node.switches, self.lifts)
+        self.rows = NodeRows(structure.node, quantities, stills, rules)
         self.bounds, self.limit_scales = layout.read(vector, "limit"), layout.read(vector, "limit scale")
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
 
     def _given(self, values: Values) -> Given:
-        """Return the scene's numbers and what follows from them, lifted where one follows from the other."""
-        symbols = self.lifts.symbols(self.structure.recurrent)
-        given = self.program.model.given(self.lifts.maths, {**values, **symbols})
-        for name, symbol in symbols.items():
+        """Return the scene's numbers and what follows from them; lifted values stay what they are."""
+        given = self.program.model.given(self.lifts.maths, values)
+        lifted = {name: values[name] for name in self.structure.recurrent}
+        for name, symbol in lifted.items():
             self.lifts.define(symbol, given.values[name])
-        return Given({**given.values, **symbols}, given.own, given.cases)
+        return Given({**given.values, **lifted}, given.own, given.cases)
 
     def objective(self) -> Any:
         """Return the weighted sum of the objectives, or of what the limits give way."""
@@ -124,13 +130,19 @@ class _Built:
         more, less = self.extra[group : group + 2]
         return more - less if self.program.limits[place].sign == 0 else more
 
-    def limits(self) -> list[Any]:
-        """Return the rows of limits that are one row each."""
-        limits = self.program.limits
-        return [
-            self.rows.excess(limits[k], self.bounds[k]) / self.limit_scales[k] - self.given_way(k)
-            for k in self.structure.static
+    def limits(self) -> Any:
+        """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
+        import casadi as ca
+
+        limits, static = self.program.limits, self.structure.static
+        self.rows.read([limits[k].row for k in static])
+        columns = [
+            (self.rows.excess(limits[k], self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
         ]
+        excess, scales, ways = (
+            (ca.vertcat(*column) for column in zip(*columns, strict=True)) if columns else [ca.SX()] * 3
+        )
+        return excess / scales - ways
 
     def pieces(self) -> list[Any]:
         """Return the smooth pieces below epigraph variables: both signs of a magnitude, each value of several."""
@@ -143,16 +155,19 @@ class _Built:
         return found
 
     def held(self) -> list[Any]:
-        """Return the rows of whole-cycle quantities at the stations of each family."""
+        """Return the rows of whole-cycle quantities at the stations of each family, as a column for each."""
+        import casadi as ca
+
         layout, found = self.structure.layout, []
         opened = [
             dict(zip(self.structure.open_switches, row, strict=True)) for row in layout.rows(self.vector, "station")
         ]
         for k, family in enumerate(self.structure.families):
-            for sign, place in zip(layout.read(self.vector, f"sign {k}"), self.structure.held[k], strict=True):
-                corner, switch = self.structure.stations[place]
-                value = self.rows.quantity(family.row, self.rows.corners[corner], {**opened[place], **switch})
-                found.append(self._row(family, sign, value))
+            stations = [self.structure.stations[place] for place in self.structure.held[k]]
+            corners = [self.rows.corners[corner] for corner, _ in stations]
+            switches = [{**opened[place], **self.structure.stations[place].switch} for place in self.structure.held[k]]
+            values = map(self.rows.quantity, itertools.repeat(family.row), corners, switches)
+            found.append(self._rows(family, ca.vertcat(*layout.read(self.vector, f"sign {k}")), ca.vertcat(*values)))
         return found
 
     def cycle(self) -> list[Any]:
@@ -160,11 +175,11 @@ class _Built:
         found = []
         for k, family in enumerate(self.structure.families):
             for weight, sign, *parameters in self.structure.layout.rows(self.vector, f"family {k}"):
-                found.append(weight * self._row(family, sign, self.rows.at(family.row, parameters)))
+                found.append(weight * self._rows(family, sign, self.rows.at(family.row, parameters)))
         return found
 
-    def _row(self, family: Family, sign: Any, value: Any) -> Any:
-        """Return what a whole-cycle quantity exceeds, in its natural size."""
+    def _rows(self, family: Family, sign: Any, value: Any) -> Any:
+        """Return by how much a whole-cycle quantity exceeds its bound, in its natural size."""
         if family.epigraph >= 0:
             scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
             return sign * value / scale - self.extra[family.epigraph]

@@ -13,16 +13,37 @@ from loomopt import maths
 from loomopt.maths import Maths, Number
 from loomopt.tolerances import FEW_CHOICES
 
+Defined = tuple[Any, Any]
+"""A lifted variable and what it is worth."""
+
+
+def identity(value: Number) -> object:
+    """Return what two expressions share that are one, while they live, and two numbers that are equal."""
+    constant = isinstance(value, float | int) or value.is_constant()
+    return float(value) if constant else value.element_hash()
+
+
+def chosen(place: Number, values: Sequence[Number]) -> Number:
+    """Return the value at a place as every number system does, of many in one product."""
+    import casadi as ca
+
+    if isinstance(place, float | int) or len(values) <= FEW_CHOICES:
+        return maths.casadi().choose(place, values)
+    return ca.dot(place == ca.DM(range(len(values))), ca.vertcat(*values))
+
 
 class Lifts:
-    """Lifted variables as they are asked for while rows are written down; own: the NLP's other variables."""
+    """Lifted variables as they are asked for while rows are written down; own: the NLP's other variables.
+
+    named: values that follow one after the other; chosen: choices, after all of them.
+    """
 
     def __init__(self, own: Sequence[Any]) -> None:
         self.maths: Maths = replace(maths.casadi(), choose=self.choose)
+        self.named: list[Defined] = []
+        self.chosen: list[Defined] = []
         self._moving = list(own)
-        self.named: list[tuple[Any, Any]] = []
-        """Lifted values with what they are worth."""
-        self._chosen: dict[Any, tuple[Any, Any]] = {}
+        self._choices: dict[tuple[Any, ...], Defined] = {}
 
     def symbols(self, names: Sequence[str]) -> dict[str, Any]:
         """Return a symbol for each value that is lifted; `define` says what it is worth."""
@@ -32,27 +53,25 @@ class Lifts:
         self._moving += found.values()
         return found
 
-    def define(self, symbol: Any, definition: Any) -> None:
+    def define(self, symbol: Any, worth: Any) -> None:
         """Say what a lifted value is worth; each reads only those before it."""
-        self.named.append((symbol, definition))
+        self.named.append((symbol, worth))
 
     def choose(self, place: Number, values: Sequence[Number]) -> Number:
         """Return the value at a place as every number system does; a variable for one of many that the design moves."""
         import casadi as ca
 
-        if isinstance(place, float | int):
-            return values[int(place)]
-        if len(values) <= FEW_CHOICES:
-            return maths.casadi().choose(place, values)
-        options = ca.vertcat(*values)
-        key = ca.SX(place).element_hash(), *(each.element_hash() for each in ca.vertsplit(ca.SX(options)))
-        if key not in self._chosen:
-            chosen = ca.dot(place == ca.DM(range(len(values))), options)
-            moves = ca.depends_on(options, ca.vertcat(*self._moving))
-            self._chosen[key] = ca.SX.sym("chosen") if moves else chosen, chosen
-        return self._chosen[key][0]
+        if isinstance(place, float | int) or len(values) <= FEW_CHOICES:
+            return chosen(place, values)
+        key = place.element_hash(), *map(identity, values)
+        if key not in self._choices:
+            worth = chosen(place, values)
+            moves = ca.depends_on(worth, ca.vertcat(*self._moving))
+            self._choices[key] = ca.SX.sym("chosen") if moves else worth, worth
+            self.chosen += [self._choices[key]] if moves else []
+        return self._choices[key][0]
 
     @property
-    def defined(self) -> list[tuple[Any, Any]]:
-        """Every lifted variable with what it is worth, in an order in which each reads only those before it."""
-        return self.named + [pair for pair in self._chosen.values() if pair[0].is_symbolic()]
+    def defined(self) -> list[Defined]:
+        """All lifted variables, in an order in which each reads only those before it."""
+        return self.named + self.chosen

@@ -45,6 +45,7 @@ class Transcription:
                 "print_time": False,
                 "show_eval_warnings": False,
                 "calc_lam_p": False,
+                "no_nlp_grad": True,
                 "error_on_fail": False,
             }
             if callback is not None:

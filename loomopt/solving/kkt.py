@@ -101,12 +101,16 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
 def solved(gradients: Floats, system: System) -> Multipliers:
     """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
     count, size = gradients.shape
-    unit = np.eye(count)
-    one_sided = [unit[k] for k in (*system.pieces, *system.inequalities)]
-    free = [*(unit[k] for k in system.equalities), *system.held]
-    columns = np.array([*one_sided, *free, *(-each for each in free)]).reshape(-1, count)
     norms = [np.isin(np.arange(count), group).astype(float) for group in system.groups]
-    matrix = np.vstack([gradients.T @ columns.T, np.array(norms) @ columns.T])
+    slopes = np.vstack([gradients.T, np.array(norms).reshape(-1, count)])
+    one_sided, equal = [*system.pieces, *system.inequalities], list(system.equalities)
+    free = np.hstack([slopes[:, equal], slopes @ system.held.T])
+    matrix = np.hstack([slopes[:, one_sided], free, -free])
     target = np.concatenate([np.zeros(size), np.ones(len(norms))])
     weights = nnls(matrix, target)
-    return Multipliers(weights @ columns, float(np.abs(matrix @ weights - target).max()))
+    above, more, less = np.split(weights, [len(one_sided), len(one_sided) + free.shape[1]])
+    found = np.zeros(count)
+    found[one_sided] += above
+    found[equal] += (more - less)[: len(equal)]
+    found += (more - less)[len(equal) :] @ system.held
+    return Multipliers(found, float(np.abs(matrix @ weights - target).max()))
