@@ -20,6 +20,10 @@ SAMPLES, LEAST_SHARE = 720, 8
 """Samples of one turn from which extremes are refined at the usual accuracy, and the part of them that the narrowest
 piece gets. `loomopt accuracy` (refined points) is exact from 180 on today's machines; fourfold for sharper peaks."""
 
+LEAST_NODES = 8
+"""Nodes that the narrowest of many pieces gets at least: more than 16 pieces share twice the samples. A piece of a free
+cam law is one cubic, which the five points that refine an extreme hold exactly."""
+
 SAMPLED = ((1e-3, 180), (1e-6, 360))
 """Samples that are enough for a coarser accuracy: what refining misses at so many is far below it (same study)."""
 

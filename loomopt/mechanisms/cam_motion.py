@@ -6,16 +6,16 @@ import itertools
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Protocol
 
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
+from loomopt.mechanisms.turning_points import crossing
 from loomopt.schema import Values
 
 PREFIX = "law_"
 HALF = 0.5
-BISECTIONS = 60
 
 
 class CamLaw(Protocol):
@@ -153,7 +153,7 @@ class Column(Sequence[Number]):
         """Return them one after the other."""
         return map(self.values.__getitem__, self.names)
 
-    def __getitem__(self, place: Any) -> Any:
+    def __getitem__(self, place: Number) -> Number:
         """Return the value at a place."""
         return self.values[self.names[place]]
 
@@ -218,14 +218,15 @@ def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
 
 
 def middle(law: CamLaw, values: Values) -> tuple[float, float]:
-    """Return the u where a law of floats passes s = 1/2, and the number of its piece."""
-    breaks = [0.0, *map(float, law.breaks), 1.0]
-    piece = max(k for k, u in enumerate(breaks[:-1]) if law.at(FLOAT, values, u, k).s < HALF)
-    low, high = breaks[piece : piece + 2]
-    for _ in range(BISECTIONS):
-        between = (low + high) / 2
-        low, high = (between, high) if law.at(FLOAT, values, between, piece).s < HALF else (low, between)
-    return (low + high) / 2, float(piece)
+    """Return the u where a law of floats passes s = 1/2 for good, and the number of its piece."""
+    ends = (Fraction(0), *law.breaks, Fraction(1))
+    pieces = reversed(range(len(ends) - 1))
+    piece = next(k for k in pieces if law.at(FLOAT, values, float(ends[k]), k).s < HALF)
+
+    def above(u: float) -> float:
+        return float(law.at(FLOAT, values, u, piece).s) - HALF
+
+    return crossing(above, float(ends[piece]), float(ends[piece + 1])), float(piece)
 
 
 def _part(angle: Number, share: Number) -> Number:

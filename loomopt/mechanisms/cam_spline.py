@@ -5,7 +5,6 @@ u in [0, 1] is the share of the rise angle, s the share of the travel, both plai
 interval a cubic is its analytic continuation.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -88,18 +87,16 @@ def spline(maths: Maths, accelerations: Sequence[Number], heights: Known = (), s
     """
     a = tuple(accelerations)
     n = len(a) - 1
+    twice, sixth = 2 * n, 6 * n**2
     s, v = [maths.number(0.0)], [maths.number(0.0)]
     height, slope = s[0], v[0]
-    for k, (before, after) in enumerate(itertools.pairwise(a), start=1):
-        s.append(height + slope / n + (2 * before + after) / (6 * n**2))
-        v.append(slope + (before + after) / (2 * n))
-        height, slope = _either(heights, k, s[-1]), _either(slopes, k, v[-1])
+    for k in range(1, n + 1):
+        before, after = a[k - 1 : k + 1]
+        s.append(height + slope / n + (2 * before + after) / sixth)
+        v.append(slope + (before + after) / twice)
+        height = s[k] if not heights or heights[k] is None else heights[k]
+        slope = v[k] if not slopes or slopes[k] is None else slopes[k]
     return Spline(tuple(s), tuple(v), a)
-
-
-def _either(known: Known, place: int, found: Number) -> Number:
-    given = known[place] if known else None
-    return found if given is None else given
 
 
 def mirrored(half: Sequence[Number]) -> tuple[Number, ...]:

@@ -1,7 +1,6 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
-from loomopt.tolerances import CLOSER, LEAST_SHARE, SAMPLES
+from loomopt.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -83,6 +82,14 @@ class Sampler:
         self.given: Given = model.given(maths.FLOAT, {**values, **self.hints}) if self.hints else given
         self.cycle: Cycle = model.split(maths.FLOAT, self.given)
         self._extremes: dict[str, list[Extreme]] = {}
+
+    def moved(self, changes: Mapping[str, float]) -> "Sampler":
+        """Return the same design with other numbers, none of which moves a corner of the cycle."""
+        found = Sampler.__new__(Sampler)
+        found.model, found.values, found.samples = self.model, {**self.values, **changes}, self.samples
+        found.hints, found.cycle, found._extremes = self.hints, self.cycle, {}
+        found.given = self.model.given(maths.FLOAT, {**found.values, **self.hints})
+        return found
 
     @lazy
     def corner_count(self) -> int:
@@ -159,8 +166,9 @@ class Sampler:
 
     def _counts(self, samples: int) -> tuple[int, ...]:
         """Return how many nodes each piece has."""
-        widths = np.diff(self.cycle.starts).tolist()
-        return tuple(max(samples // LEAST_SHARE, math.ceil(samples * width / TURN)) + 1 for width in widths)
+        widths = np.diff(self.cycle.starts)
+        least = max(samples // max(LEAST_SHARE, len(widths) // 2), LEAST_NODES)
+        return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
 
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.

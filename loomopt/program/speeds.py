@@ -25,7 +25,7 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     pieces, u = still.grid()
 
     def room_at(speed: float) -> Floats:
-        return -Sampler(model, {**values, "speed": speed}).at(name, pieces, u)
+        return -still.moved({"speed": speed}).at(name, pieces, u)
 
     rest, ahead, back = room_at(0.0), room_at(unit), room_at(-unit)
     rounding = AT_REST * float(np.abs(np.concatenate([rest, ahead])).max())
@@ -35,7 +35,7 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
     shares = _first_roots(square, linear, np.maximum(spare, 0.0), rounding)
     share = float(shares.min())
-    return math.inf if math.isinf(share) else _settled(model, values, name, most, unit * share)
+    return math.inf if math.isinf(share) else _settled(still, name, most, unit * share)
 
 
 def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float) -> Floats:
@@ -47,13 +47,12 @@ def _first_roots(square: Floats, linear: Floats, spare: Floats, rounding: float)
     return np.where(falls, root, np.inf)
 
 
-def _settled(model: JobModel, values: Mapping[str, float], name: str, most: float, speed: float) -> float:
-    """Return the speed, rad/s, where the refined largest value is `most`, from one nearby."""
+def _settled(still: Sampler, name: str, most: float, speed: float) -> float:
+    """Return the speed, rad/s, where the refined largest value is `most`, from one nearby; still: at rest."""
     for _ in range(NEWTON):
-        sampler = Sampler(model, {**values, "speed": speed})
-        top = sampler.extremes(name)[0]
+        top = still.moved({"speed": speed}).extremes(name)[0]
         node = np.array([top.piece]), np.array([top.u])
-        ends = [float(Sampler(model, {**values, "speed": w}).at(name, *node)[0]) for w in (0.0, 2 * speed)]
+        ends = [float(still.moved({"speed": w}).at(name, *node)[0]) for w in (0.0, 2 * speed)]
         slope = (ends[1] - ends[0]) / (2 * speed)
         if not slope > 0.0:
             break
