@@ -115,11 +115,21 @@ class Spline:
         return tuple(values[f"{PREFIX}{k}"] for k in range(self.intervals + 1))
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return s, s' and s'' at the knots; a knot that `values` have is read for those after it."""
-        known = [tuple(map(values.get, self.knots[of])) for of in "sv"]
-        made = cam_spline.spline(maths, self.accelerations(values), *known)
-        columns = zip((self.knots[of] for of in "sva"), (made.s, made.v, made.a), strict=True)
-        return {name: value for names, column in columns for name, value in zip(names, column, strict=True)}
+        """Return s, s' and s'' at the knots; s and s' as they are where `values` have them."""
+        bends = dict(zip(self.knots["a"], self.accelerations(values), strict=True))
+        if self.recurrent[0] in values:
+            first = dict.fromkeys((self.knots["s"][0], self.knots["v"][0]), maths.number(0.0))
+            return bends | first | {name: values[name] for name in self.recurrent}
+        made = cam_spline.spline(maths, tuple(bends.values()))
+        columns = zip((*self.knots["s"], *self.knots["v"]), (*made.s, *made.v), strict=True)
+        return bends | dict(columns)
+
+    def followed(self, maths: Maths, values: Values) -> dict[str, Number]:
+        """Return s and s' at every knot from those at the knot before; values: with all of them."""
+        known = self.prepared(maths, values)
+        s, v, a = ([known[name] for name in self.knots[of]] for of in "sva")
+        steps = (cam_spline.after(self.intervals, *at) for at in zip(s, v, a, a[1:], strict=False))
+        return dict(zip(self.recurrent, itertools.chain.from_iterable(steps), strict=True))
 
     def knot(self, of: str, k: int) -> str:
         """Return the name of s, v or a (= s, s', s'') at a knot."""

@@ -75,28 +75,23 @@ def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number)
     )
 
 
-Known = Sequence[Number | None]
-"""A number for each knot, None where it is not known."""
-
-
-def spline(maths: Maths, accelerations: Sequence[Number], heights: Known = (), slopes: Known = ()) -> Spline:
+def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
     """Return the spline that starts at rest with second derivatives a_0 … a_n at its evenly spaced knots.
 
     s and v are running sums, linear in the accelerations: with symbols for these, s(1) = 1 and s'(1) = 0 are linear.
-    heights, slopes: s and v at knots where they are known, from which the sums go on.
     """
     a = tuple(accelerations)
-    n = len(a) - 1
-    twice, sixth = 2 * n, 6 * n**2
     s, v = [maths.number(0.0)], [maths.number(0.0)]
-    height, slope = s[0], v[0]
-    for k in range(1, n + 1):
-        before, after = a[k - 1 : k + 1]
-        s.append(height + slope / n + (2 * before + after) / sixth)
-        v.append(slope + (before + after) / twice)
-        height = s[k] if not heights or heights[k] is None else heights[k]
-        slope = v[k] if not slopes or slopes[k] is None else slopes[k]
+    for k in range(len(a) - 1):
+        height, slope = after(len(a) - 1, s[k], v[k], a[k], a[k + 1])
+        s.append(height)
+        v.append(slope)
     return Spline(tuple(s), tuple(v), a)
+
+
+def after(n: int, s: Number, v: Number, before: Number, end: Number) -> tuple[Number, Number]:
+    """Return s and s' at the end of one of n equal intervals, from s, s', s'' at its beginning and s'' at its end."""
+    return s + v / n + (2 * before + end) / (6 * n**2), v + (before + end) / (2 * n)
 
 
 def mirrored(half: Sequence[Number]) -> tuple[Number, ...]:

@@ -72,13 +72,16 @@ class Elimination:
         x, lam_f, lam_g = ca.vertcat(written.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.rows + self.count)
         g = ca.vertcat(written.g, z - worth)
         self.nlp = {"x": x, "p": written.p, "f": written.f, "g": g}
-        explicit, _ = ca.substitute_inplace([pair[0] for pair in lifted], [pair[1] for pair in lifted], [], False)
+        explicit, _ = ca.substitute_inplace(
+            [each.symbol for each in lifted], [each.worth for each in lifted], [], False
+        )
         self._start = ca.Function("start", [written.x, written.p], [ca.vertcat(*explicit)])
-        bend: Any = ca.triu(ca.hessian(lam_f * written.f + ca.dot(lam_g, g), x)[0])
-        first = len(written.lifts.named)
+        first = self.rows + len(written.lifts.named)
         # A choice reads many: alone, it does not spoil the colouring of the others' sparse rows.
-        parts = [written.g, z[:first] - worth[:first], *ca.vertsplit(z[first:] - worth[first:])]
+        parts = [g[: self.rows], g[self.rows : first], *ca.vertsplit(g[first:])]
         slopes = ca.vertcat(*(ca.jacobian(part, x) for part in parts))
+        curved = self.rows if not ca.depends_on(slopes[self.rows :, :], x) else self.rows + self.count
+        bend: Any = ca.triu(ca.hessian(lam_f * written.f + ca.dot(lam_g[:curved], g[:curved]), x)[0])
         self.functions = {
             "grad_f": ca.Function("nlp_grad_f", [x, written.p], [written.f, ca.gradient(written.f, x)]),
             "jac_g": ca.Function("nlp_jac_g", [x, written.p], [g, slopes]),

@@ -5,12 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt.balance import Given, total
+from loomopt.balance import total
 from loomopt.maths import Number
 from loomopt.nlp.families import Family
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
 from loomopt.nlp.structure import NodeParameters, Structure
+from loomopt.program.chains import followed
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
 from loomopt.schema import Values
@@ -37,7 +38,7 @@ def expressions(structure: Structure) -> Expressions:
     scaled = ca.SX.sym("x", len(structure.program.variables))
     extra = ca.SX.sym("t", structure.extras)
     p = ca.SX.sym("p", structure.layout.size)
-    built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(p))
+    built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), p)
     rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
     return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
@@ -67,27 +68,32 @@ class NodeRows(Rows):
         """Read the figures and rows of the design that will be asked for, all at once."""
         self._single |= self.model.static(self.maths, self.given, self.stills, names)
 
-    def at(self, name: str, parameters: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity at the node that parameters say, SI."""
+    def at(self, name: str, parameters: Any) -> Number:
+        """Return a whole-cycle quantity at the node that parameters (a column) say, SI."""
         import casadi as ca
 
-        angle = ca.dot(ca.vertcat(*parameters[self.shape.angle]), self.column)
-        return self.quantity(name, angle, dict(zip(self.shape.switches, parameters[self.shape.places], strict=True)))
+        switch = {key: parameters[self.shape.places.start + k] for k, key in enumerate(self.shape.switches)}
+        return self.quantity(name, ca.dot(parameters[self.shape.angle], self.column), switch)
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, SI."""
+        import casadi as ca
+
         rule = self.rules[integral.name]
-        widths = [self.shape.read_width(parameters, self.corners) for parameters in rule]
+        widths = [ca.dot(ca.vertcat(node[0], node[self.shape.width]), self.column) for node in rule]
         weighted = [width * self.at(integral.quantity, node) for width, node in zip(widths, rule, strict=True)]
         return total(weighted) / total(widths)
 
 
 class _Built:
-    """One NLP being written down; scaled, extra: its variables; vector: its parameters."""
+    """One NLP being written down; scaled, extra: its variables; column: its parameters."""
 
-    def __init__(self, structure: Structure, scaled: list[Any], extra: list[Any], vector: list[Any]) -> None:
-        program, layout = structure.program, structure.layout
-        self.structure, self.program, self.extra, self.vector = structure, program, extra, vector
+    def __init__(self, structure: Structure, scaled: list[Any], extra: list[Any], column: Any) -> None:
+        import casadi as ca
+
+        program, layout, vector = structure.program, structure.layout, ca.vertsplit(column[: structure.layout.nodes])
+        self.structure, self.program, self.extra = structure, program, extra
+        self.vector, self.column = vector, column
         self.lifts = Lifts([*scaled, *extra])
         sizes = layout.read(vector, "variable scale")
         values = dict(zip(program.parameters, layout.read(vector, "values"), strict=True))
@@ -95,20 +101,14 @@ class _Built:
         values |= {v.name: x * size for v, x, size in zip(program.variables, scaled, sizes, strict=True)}
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
-        rules = {name: layout.rows(vector, f"mean {name}") for name, _ in structure.points}
+        rules = {name: layout.columns(column, f"mean {name}") for name, _ in structure.points}
         values |= self.lifts.symbols(structure.recurrent)
-        quantities = Quantities(model, values, self._given(values), structure.node.switches, self.lifts)
+        self.lifts.define(followed(model, structure.names, self.lifts.maths, values))
+        given = model.given(self.lifts.maths, values)
+        quantities = Quantities(model, values, given, structure.node.switches, self.lifts)
         self.rows = NodeRows(structure.node, quantities, stills, rules)
         self.bounds, self.limit_scales = layout.read(vector, "limit"), layout.read(vector, "limit scale")
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
-
-    def _given(self, values: Values) -> Given:
-        """Return the scene's numbers and what follows from them; lifted values stay what they are."""
-        given = self.program.model.given(self.lifts.maths, values)
-        lifted = {name: values[name] for name in self.structure.recurrent}
-        for name, symbol in lifted.items():
-            self.lifts.define(symbol, given.values[name])
-        return Given({**given.values, **lifted}, given.own, given.cases)
 
     def objective(self) -> Any:
         """Return the weighted sum of the objectives, or of what the limits give way."""
@@ -174,8 +174,8 @@ class _Built:
         """Return the rows of whole-cycle quantities, one for each slot."""
         found = []
         for k, family in enumerate(self.structure.families):
-            for weight, sign, *parameters in self.structure.layout.rows(self.vector, f"family {k}"):
-                found.append(weight * self._rows(family, sign, self.rows.at(family.row, parameters)))
+            slots = self.structure.layout.columns(self.column, f"family {k}")
+            found += [slot[0] * self._rows(family, slot[1], self.rows.at(family.row, slot[2:])) for slot in slots]
         return found
 
     def _rows(self, family: Family, sign: Any, value: Any) -> Any:

@@ -66,14 +66,12 @@ class Quantities:
 
     def at(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a quantity at a crank angle, rad."""
-        import casadi as ca
 
         if name not in self._traced:
             self._traced[name] = self._trace(name)
         traced = self._traced[name]
         picked = [self.lifts.choose(switch[choice.switch], choice.options) for choice in traced.choices]
-        places = [switch[key] for key in self.switches]
-        return traced.function(traced.numbers, phi, ca.vertcat(*places), ca.vertcat(*picked))
+        return traced.function(traced.numbers, phi, *(switch[key] for key in self.switches), *picked)
 
     def _trace(self, name: str) -> _Traced:
         import casadi as ca
@@ -82,7 +80,7 @@ class Quantities:
         system = replace(maths.casadi(), choose=choices.choose)
         value = self.model.quantity(system, self._traces_of, name, Node(self.phi, self.switches))
         read = [each for each in ca.symvar(ca.SX(value)) if identity(each) in self._worth]
-        inputs = ca.vertcat(*read), self.phi, ca.vertcat(*self.switches.values()), ca.vertcat(*choices.symbols)
+        inputs = ca.vertcat(*read), self.phi, *self.switches.values(), *choices.symbols
         worth = ca.vertcat(*(self._worth[identity(each)] for each in read))
         return _Traced(ca.Function("quantity", list(inputs), [value]), worth, tuple(choices))
 

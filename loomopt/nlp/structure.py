@@ -40,6 +40,11 @@ class NodeParameters:
         return slice(1, 2 + self.corners)
 
     @property
+    def width(self) -> slice:
+        """Where the corners' coefficients in its width stand."""
+        return slice(2 + self.corners, 2 + 2 * self.corners)
+
+    @property
     def places(self) -> slice:
         """Where its switches stand."""
         return slice(2 + 2 * self.corners, self.size)
@@ -132,7 +137,12 @@ class Structure:
     @functools.cached_property
     def recurrent(self) -> tuple[str, ...]:
         """Derived values that follow one after the other, in order."""
-        return recurrent(self.program.model, [variable.name for variable in self.program.variables])
+        return recurrent(self.program.model, self.names)
+
+    @property
+    def names(self) -> list[str]:
+        """The design's variables."""
+        return [variable.name for variable in self.program.variables]
 
     @functools.cached_property
     def open_switches(self) -> tuple[str, ...]:
@@ -158,11 +168,13 @@ class Structure:
         layout.add("objective scale", len(program.objectives))
         for event in program.model.events_read:
             layout.add(f"still {event}", len(program.model.switches))
+        layout.add("station", len(self.stations), len(self.open_switches))
+        for k, places in enumerate(self.held):
+            layout.add(f"sign {k}", len(places))
+        layout.nodes = layout.size
         for name, count in self.points:
             layout.add(f"mean {name}", count, self.node.size)
-        layout.add("station", len(self.stations), len(self.open_switches))
         for k in range(len(self.families)):
-            layout.add(f"sign {k}", len(self.held[k]))
             layout.add(f"family {k}", self.slots, 2 + self.node.size)
         return layout
 

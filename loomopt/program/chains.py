@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from loomopt import maths
 from loomopt.balance import Given
+from loomopt.maths import Maths, Number
 from loomopt.program.kinematics import Chain
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
@@ -19,7 +20,13 @@ class Station(NamedTuple):
 
 def recurrent(model: JobModel, variables: Collection[str]) -> tuple[str, ...]:
     """Return the derived values that follow one after the other where these are the variables, in order."""
-    return tuple(name for chain in _chains(model, variables).values() for name in chain.values)
+    return tuple(name for chain in _chains(model, variables).values() for name in chain.names)
+
+
+def followed(model: JobModel, variables: Collection[str], system: Maths, values: Values) -> dict[str, Number]:
+    """Return what each of these values is worth by those before it; values: with all of them."""
+    chains = _chains(model, variables).values()
+    return {name: value for chain in chains for name, value in chain.follow(system, values).items()}
 
 
 def stations(model: JobModel, given: Given, variables: Collection[str]) -> tuple[Station, ...]:

@@ -63,14 +63,14 @@ def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
 class Chain:
     """Derived values of which each follows from a few before it: an NLP may have them for variables, and sparse rows.
 
-    roots: numbers they follow from in the end; values: their names, in order. Where a kinematics' `derived` is given
-    one of them, it reads that for those after it, and returns what it follows from all the same.
-    stations: where on the arcs' corners whole-cycle rows are likely to bind: switches of the motion's arcs, for each
-    corner in order. Nothing but loads may jump there.
+    roots: numbers they follow from in the end; follow(maths, values): each from roots and values before it, by name in
+    order; a kinematics' `derived` that is given them reads them. stations: for each of the arcs' corners in order the
+    switches of the motion's arcs there, where whole-cycle rows are likely to bind. Nothing but loads may jump there.
     """
 
     roots: frozenset[str]
-    values: tuple[str, ...]
+    names: tuple[str, ...]
+    follow: Callable[[Maths, Values], Mapping[str, Number]]
     stations: tuple[Values, ...]
 
 

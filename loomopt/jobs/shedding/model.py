@@ -154,7 +154,7 @@ class CamFrame:
             return None
         inner = range(1, self.law.intervals)
         stations = tuple({SEGMENT: float(segment), LAW: float(k)} for segment in (RISE, RETURN) for k in inner)
-        return Chain(frozenset(self.law.names), self.law.recurrent, stations)
+        return Chain(frozenset(self.law.names), self.law.recurrent, self.law.followed, stations)
 
     def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         begins = (0, *(given.values[f"begin.{name}"] for name in ("far", "return", "near")))
