@@ -6,6 +6,7 @@ taken on both sides along (I, Z), with the definitions' own multipliers ‚àíd_z‚Å
 Numerical Optimization, 2nd ed., section 15.3].
 """
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -76,10 +77,9 @@ class Elimination:
             [each.symbol for each in lifted], [each.worth for each in lifted], [], False
         )
         self._start = ca.Function("start", [written.x, written.p], [ca.vertcat(*explicit)])
-        first = self.rows + len(written.lifts.named)
-        # A choice reads many: alone, it does not spoil the colouring of the others' sparse rows.
-        parts = [g[: self.rows], g[self.rows : first], *ca.vertsplit(g[first:])]
-        slopes = ca.vertcat(*(ca.jacobian(part, x) for part in parts))
+        # A choice reads many: apart, they do not spoil the colouring of the others' sparse rows.
+        ends = 0, self.rows, self.rows + len(written.lifts.named), self.rows + self.count
+        slopes = ca.vertcat(*(ca.jacobian(g[i:j], x) for i, j in itertools.pairwise(ends)))
         curved = self.rows if not ca.depends_on(slopes[self.rows :, :], x) else self.rows + self.count
         bend: Any = ca.triu(ca.hessian(lam_f * written.f + ca.dot(lam_g[:curved], g[:curved]), x)[0])
         self.functions = {

@@ -38,7 +38,7 @@ def expressions(structure: Structure) -> Expressions:
     scaled = ca.SX.sym("x", len(structure.program.variables))
     extra = ca.SX.sym("t", structure.extras)
     p = ca.SX.sym("p", structure.layout.size)
-    built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), p)
+    built = _Built(structure, scaled, extra, p)
     rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
     return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
@@ -86,19 +86,19 @@ class NodeRows(Rows):
 
 
 class _Built:
-    """One NLP being written down; scaled, extra: its variables; column: its parameters."""
+    """One NLP being written down; scaled, extra: its variables; column: its parameters; all of them columns."""
 
-    def __init__(self, structure: Structure, scaled: list[Any], extra: list[Any], column: Any) -> None:
+    def __init__(self, structure: Structure, scaled: Any, extra: Any, column: Any) -> None:
         import casadi as ca
 
         program, layout, vector = structure.program, structure.layout, ca.vertsplit(column[: structure.layout.nodes])
-        self.structure, self.program, self.extra = structure, program, extra
+        self.structure, self.program, self.extra = structure, program, ca.vertsplit(extra)
         self.vector, self.column = vector, column
-        self.lifts = Lifts([*scaled, *extra])
-        sizes = layout.read(vector, "variable scale")
+        self.lifts = Lifts(ca.vertcat(scaled, extra))
+        sizes = ca.vertcat(*layout.read(vector, "variable scale"))
         values = dict(zip(program.parameters, layout.read(vector, "values"), strict=True))
         values |= dict(zip(structure.hints, layout.read(vector, "hints"), strict=True))
-        values |= {v.name: x * size for v, x, size in zip(program.variables, scaled, sizes, strict=True)}
+        values |= dict(zip(structure.names, ca.vertsplit(scaled * sizes), strict=True))
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
         rules = {name: layout.columns(column, f"mean {name}") for name, _ in structure.points}

@@ -43,11 +43,11 @@ class Lifts:
     named: values that follow one after the other; picked: choices, after all of them.
     """
 
-    def __init__(self, own: Sequence[Any]) -> None:
+    def __init__(self, own: Any) -> None:
         self.maths: Maths = replace(maths.casadi(), choose=self.choose)
         self.named: list[Lifted] = []
         self.picked: list[Lifted] = []
-        self._moving = list(own)
+        self._moving = own
         self._symbols: dict[str, Any] = {}
         self._choices: dict[tuple[object, ...], tuple[Any, list[Any]]] = {}
 
@@ -56,7 +56,7 @@ class Lifts:
         import casadi as ca
 
         self._symbols = {name: ca.SX.sym(name) for name in names}
-        self._moving += self._symbols.values()
+        self._moving = ca.vertcat(self._moving, *self._symbols.values())
         return self._symbols
 
     def define(self, worth: Mapping[str, Any]) -> None:
@@ -73,7 +73,7 @@ class Lifts:
         key = tuple(map(identity, kept))
         if key not in self._choices:
             found = chosen(place, kept[1:])
-            if ca.depends_on(found, ca.vertcat(*self._moving)):
+            if ca.depends_on(found, self._moving):
                 self.picked.append(Lifted(ca.SX.sym("chosen"), found))
                 found = self.picked[-1].symbol
             self._choices[key] = found, kept
