@@ -39,7 +39,7 @@ class Calls:
         """Return of each family the extremes that no row of a station holds: these need a node."""
         corners = stations(self.program.model, sampler.given, [v.name for v in self.program.variables])
         stood = Stood(corners, sampler.cycle)
-        rows = [set(held(corners, family)) for family in self.families]
+        rows = [set(held([corner.switch for corner in corners], family)) for family in self.families]
         pairs = zip(rows, extremes, strict=True)
         return [[e for e in of if stood.station(e) not in own] for own, of in pairs]
 

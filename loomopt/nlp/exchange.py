@@ -114,9 +114,9 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     sampler = calls.sampler(answer.x)
     if sampler is None:
         return Point(answer.x, "Invalid_Number_Detected", False, iterations)
-    nodes, raw, before = here.nodes, answer.raw, here.sampler.cycle
+    nodes, before = here.nodes, here.sampler.cycle
     if sampler.cycle.order != before.order:
-        nodes, raw = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes), {}
+        nodes = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes)
     peaks, violation = _frozen(calls.peaks(sampler)), 0.0
     if not calls.settings.uniform:
         violation = calls.violation(peaks, answer.extra)
@@ -124,7 +124,7 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
             (*of, *(e for e in top if calls.excess(family, e, answer.extra) > calls.settings.excess))
             for of, top, family in zip(nodes, calls.loose(sampler, peaks), calls.families, strict=True)
         )
-    after = _Place(answer.x, sampler, peaks, nodes, raw, answer.extra)
+    after = _Place(answer.x, sampler, peaks, nodes, answer.raw, answer.extra)
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
     return _Round(after, nlp, answer, reached, violation, iterations)
 

@@ -6,14 +6,23 @@ import numpy as np
 
 from loomopt.cycle import Cycle, Floats
 from loomopt.nlp.families import Family
-from loomopt.program.chains import Station
+from loomopt.program.chains import Station, station_switches
+from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.schema import Values
 
 
-def held(stations: Sequence[Station], family: Family) -> list[int]:
-    """Return the places of the stations where a family has a row."""
+def held(switches: Sequence[Values], family: Family) -> list[int]:
+    """Return the places of the stations, of these switches, where a family has a row."""
     on = family.where
-    return [k for k, station in enumerate(stations) if on is None or station.switch.get(on[0]) == on[1]]
+    return [k for k, switch in enumerate(switches) if on is None or switch.get(on[0]) == on[1]]
+
+
+def owners(program: Program, families: Sequence[Family], rows: int) -> list[int]:
+    """Return the place of the family that each of so many whole-cycle rows is of: rows of stations, then slots."""
+    switches = station_switches(program.model, [variable.name for variable in program.variables])
+    first = [k for k, family in enumerate(families) for _ in held(switches, family)]
+    return first + [k for k in range(len(families)) for _ in range((rows - len(first)) // len(families))]
 
 
 class Stood:

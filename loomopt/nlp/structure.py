@@ -153,7 +153,7 @@ class Structure:
     @functools.cached_property
     def held(self) -> list[list[int]]:
         """Of each family the places of the stations where it has a row."""
-        return [held(self.stations, family) for family in self.families]
+        return [held([station.switch for station in self.stations], family) for family in self.families]
 
     @functools.cached_property
     def layout(self) -> Layout:

@@ -32,11 +32,16 @@ def followed(model: JobModel, variables: Collection[str], system: Maths, values:
 def stations(model: JobModel, given: Given, variables: Collection[str]) -> tuple[Station, ...]:
     """Return the corners at which whole-cycle rows are likely to bind where these are the variables; given: floats."""
     first, found, chains = 0, [], _chains(model, variables)
-    for arc in model.kinematics.arcs:
+    for arc in model.kinematics.arcs if chains else ():
         if arc.name in chains:
             found += [Station(first + k, switch) for k, switch in enumerate(chains[arc.name].stations)]
         first += len(arc.corners(maths.FLOAT, given))
     return tuple(found)
+
+
+def station_switches(model: JobModel, variables: Collection[str]) -> list[Values]:
+    """Return the switches of these corners alone."""
+    return [switch for chain in _chains(model, variables).values() for switch in chain.stations]
 
 
 def _chains(model: JobModel, variables: Collection[str]) -> dict[str, Chain]:
