@@ -23,6 +23,10 @@ SAMPLES, LEAST_SHARE = 720, 8
 """Samples of one turn from which extremes are refined at the usual accuracy, and the part of them that the narrowest
 piece gets. `loomopt accuracy` (refined points) is exact from 180 on today's machines; fourfold for sharper peaks."""
 
+LEAST_NODES = 8
+"""Nodes that the narrowest of many pieces gets at least: more than 16 pieces share twice the samples. A piece of a free
+cam law is one cubic, which the five points that refine an extreme hold exactly."""
+
 SAMPLED = ((1e-3, 180), (1e-6, 360))
 """Samples that are enough for a coarser accuracy: what refining misses at so many is far below it (same study)."""
 
@@ -114,6 +118,10 @@ FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
 
 ELASTIC_SHARE = 1e-3
 """Share of a positive lower bound below which no relaxation goes: lengths stay positive."""
+
+FEW_CHOICES = 8
+"""Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
+slopes and curvatures dense. Named cam laws have five pieces at most."""
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
 """Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and

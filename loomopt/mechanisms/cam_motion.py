@@ -1,18 +1,21 @@
 """The cam law of a shedding scene: a named one, a free spline, or a table; each as one thing with pieces."""
 
+import bisect
 import functools
 import itertools
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from loomopt.maths import Maths, Number
+from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
+from loomopt.mechanisms.turning_points import crossing
 from loomopt.schema import Values
 
 PREFIX = "law_"
+HALF = 0.5
 
 
 class CamLaw(Hashable, Protocol):
@@ -95,6 +98,16 @@ class Spline:
         last = self.intervals // 2 if self.mirrored else self.intervals
         return tuple(f"{PREFIX}{k}" for k in range(1, last))
 
+    @functools.cached_property
+    def knots(self) -> dict[str, tuple[str, ...]]:
+        """The names of s, v and a (= s, s', s'') at the knots."""
+        return {of: tuple(self.knot(of, k) for k in range(self.intervals + 1)) for of in "sva"}
+
+    @property
+    def recurrent(self) -> tuple[str, ...]:
+        """The names of s and s' at the knots, each of which follows from those before it."""
+        return tuple(itertools.chain(*zip(self.knots["s"][1:], self.knots["v"][1:], strict=True)))
+
     def accelerations(self, values: Mapping[str, Number]) -> tuple[Number, ...]:
         """Return s'' at all knots."""
         if self.mirrored:
@@ -102,10 +115,21 @@ class Spline:
         return tuple(values[f"{PREFIX}{k}"] for k in range(self.intervals + 1))
 
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
-        """Return s, s' and s'' at the knots."""
-        made = cam_spline.spline(maths, self.accelerations(values))
-        columns = {"s": made.s, "v": made.v, "a": made.a}
-        return {self.knot(of, k): value for of, column in columns.items() for k, value in enumerate(column)}
+        """Return s, s' and s'' at the knots; s and s' as they are where `values` have them."""
+        bends = dict(zip(self.knots["a"], self.accelerations(values), strict=True))
+        if self.recurrent[0] in values:
+            first = dict.fromkeys((self.knots["s"][0], self.knots["v"][0]), maths.number(0.0))
+            return bends | first | {name: values[name] for name in self.recurrent}
+        made = cam_spline.spline(maths, tuple(bends.values()))
+        columns = zip((*self.knots["s"], *self.knots["v"]), (*made.s, *made.v), strict=True)
+        return bends | dict(columns)
+
+    def followed(self, maths: Maths, values: Values) -> dict[str, Number]:
+        """Return s and s' at every knot from those at the knot before; values: with all of them."""
+        known = self.prepared(maths, values)
+        s, v, a = ([known[name] for name in self.knots[of]] for of in "sva")
+        steps = (cam_spline.after(self.intervals, *at) for at in zip(s, v, a, a[1:], strict=False))
+        return dict(zip(self.recurrent, itertools.chain.from_iterable(steps), strict=True))
 
     def knot(self, of: str, k: int) -> str:
         """Return the name of s, v or a (= s, s', s'') at a knot."""
@@ -113,12 +137,35 @@ class Spline:
 
     def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
         """Return s and its derivatives at u."""
-        return self.made(values).at(maths, u, piece)
+        columns = (Column(values, names) for names in self._ends)
+        return cam_spline.cubic(
+            self.intervals * u - piece, self.intervals, *(maths.choose(piece, column) for column in columns)
+        )
 
-    def made(self, values: Values) -> cam_spline.Spline:
-        """Return the spline of prepared values."""
-        knots = range(self.intervals + 1)
-        return cam_spline.Spline(*(tuple(values[self.knot(of, k)] for k in knots) for of in "sva"))
+    @functools.cached_property
+    def _ends(self) -> tuple[tuple[str, ...], ...]:
+        """The names of s, v and a where pieces begin, and of a where they end."""
+        s, v, a = (self.knots[of] for of in "sva")
+        return s[:-1], v[:-1], a[:-1], a[1:]
+
+
+class Column(Sequence[Number]):
+    """Values by names in order, each read when it is asked for: a choice among them reads one."""
+
+    def __init__(self, values: Values, names: tuple[str, ...]) -> None:
+        self.values, self.names = values, names
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[Number]:
+        """Return them one after the other."""
+        return map(self.values.__getitem__, self.names)
+
+    def __getitem__(self, place: Number) -> Number:
+        """Return the value at a place."""
+        return self.values[self.names[place]]
 
 
 @dataclass(frozen=True)
@@ -170,7 +217,7 @@ def segment_at(present: tuple[int, ...], angle: float, corners: tuple[float, ...
 def piece_at(angle: float, corners: tuple[float, ...]) -> float:
     """Return the law's piece at a cam angle; corners: its breaks on the rise, then, mirrored, those on the return."""
     half = len(corners) // 2
-    return float(sum(angle >= c for c in corners[:half]) - sum(angle >= c for c in corners[half:]))
+    return float(bisect.bisect_right(corners[:half], angle) - bisect.bisect_right(corners[: half - 1 : -1], angle))
 
 
 def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
@@ -178,6 +225,18 @@ def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
     rise = [_part(values["rise"], share) for share in shares]
     back = [values["begin.near"] - _part(values["return"], share) for share in shares]
     return (*rise, *back)
+
+
+def middle(law: CamLaw, values: Values) -> tuple[float, float]:
+    """Return the u where a law of floats passes s = 1/2 for good, and the number of its piece."""
+    ends = (Fraction(0), *law.breaks, Fraction(1))
+    pieces = reversed(range(len(ends) - 1))
+    piece = next(k for k in pieces if law.at(FLOAT, values, float(ends[k]), k).s < HALF)
+
+    def above(u: float) -> float:
+        return float(law.at(FLOAT, values, u, piece).s) - HALF
+
+    return crossing(above, float(ends[piece]), float(ends[piece + 1])), float(piece)
 
 
 def _part(angle: Number, share: Number) -> Number:

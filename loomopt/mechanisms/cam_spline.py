@@ -5,7 +5,6 @@ u in [0, 1] is the share of the rise angle, s the share of the travel, both plai
 interval a cubic is its analytic continuation.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,16 +58,21 @@ class Spline:
 
     def at(self, maths: Maths, u: Number, piece: Number) -> Derivatives:
         """Return s(u) and its derivatives on interval `piece`."""
-        n = self.intervals
-        s, v, a, after = (maths.choose(piece, values) for values in (self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]))
-        share = n * u - piece
-        t, rise = share / n, after - a
-        return Derivatives(
-            s + t * (v + t * (a / 2 + rise * share / 6)),
-            v + t * (a + rise * share / 2),
-            a + rise * share,
-            n * rise,
-        )
+        columns = self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]
+        return cubic(self.intervals * u - piece, self.intervals, *(maths.choose(piece, values) for values in columns))
+
+
+def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number) -> Derivatives:
+    """Return s and its derivatives at a share of one of n equal intervals, from s, s', s'' at its beginning and s''
+    at its end.
+    """
+    t, rise = share / n, after - a
+    return Derivatives(
+        s + t * (v + t * (a / 2 + rise * share / 6)),
+        v + t * (a + rise * share / 2),
+        a + rise * share,
+        n * rise,
+    )
 
 
 def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
@@ -77,12 +81,17 @@ def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
     s and v are running sums, linear in the accelerations: with symbols for these, s(1) = 1 and s'(1) = 0 are linear.
     """
     a = tuple(accelerations)
-    n = len(a) - 1
     s, v = [maths.number(0.0)], [maths.number(0.0)]
-    for before, after in itertools.pairwise(a):
-        s.append(s[-1] + v[-1] / n + (2 * before + after) / (6 * n**2))
-        v.append(v[-1] + (before + after) / (2 * n))
+    for k in range(len(a) - 1):
+        height, slope = after(len(a) - 1, s[k], v[k], a[k], a[k + 1])
+        s.append(height)
+        v.append(slope)
     return Spline(tuple(s), tuple(v), a)
+
+
+def after(n: int, s: Number, v: Number, before: Number, end: Number) -> tuple[Number, Number]:
+    """Return s and s' at the end of one of n equal intervals, from s, s', s'' at its beginning and s'' at its end."""
+    return s + v / n + (2 * before + end) / (6 * n**2), v + (before + end) / (2 * n)
 
 
 def mirrored(half: Sequence[Number]) -> tuple[Number, ...]:

@@ -9,7 +9,9 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.nlp.families import Family, epigraphs, families
 from loomopt.nlp.point import Settings, sampler_at
+from loomopt.nlp.stations import Stood, held
 from loomopt.nlp.transcribe import Transcription, transcribe
+from loomopt.program.chains import stations
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.tolerances import ELASTIC_SHARE, FIRST_ROOM, FIRST_SHARE, FIRST_SLOTS
@@ -32,6 +34,14 @@ class Calls:
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
         """Return the local extremes of each family's quantity, largest first."""
         return [sampler.extremes(family.row, family.where) for family in self.families]
+
+    def loose(self, sampler: Sampler, extremes: Sequence[Sequence[Extreme]]) -> list[list[Extreme]]:
+        """Return of each family the extremes that no row of a station holds: these need a node."""
+        corners = stations(self.program.model, sampler.given, [v.name for v in self.program.variables])
+        stood = Stood(corners, sampler.cycle)
+        rows = [set(held([corner.switch for corner in corners], family)) for family in self.families]
+        pairs = zip(rows, extremes, strict=True)
+        return [[e for e in of if stood.station(e) not in own] for own, of in pairs]
 
     def transcribed(self, sampler: Sampler, nodes: Sequence[Sequence[Extreme]], warm: bool) -> Transcription:
         """Return the NLP with room for nodes of each family, its solver made; charges what had to be built."""

@@ -91,7 +91,7 @@ def solve(
 def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:
     """Return where the exchange begins: at the largest extremes of the start, or at a neighbour's nodes."""
     peaks = _frozen(calls.peaks(sampler))
-    nodes = warm.nodes if warm else tuple(of[:LEADING] for of in peaks)
+    nodes = warm.nodes if warm else tuple(tuple(of[:LEADING]) for of in calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
     raw = warm.raw if warm else {}
@@ -114,17 +114,17 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     sampler = calls.sampler(answer.x)
     if sampler is None:
         return Point(answer.x, "Invalid_Number_Detected", False, iterations)
-    nodes, raw, before = here.nodes, answer.raw, here.sampler.cycle
+    nodes, before = here.nodes, here.sampler.cycle
     if sampler.cycle.order != before.order:
-        nodes, raw = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes), {}
+        nodes = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes)
     peaks, violation = _frozen(calls.peaks(sampler)), 0.0
     if not calls.settings.uniform:
         violation = calls.violation(peaks, answer.extra)
         nodes = tuple(
             (*of, *(e for e in top if calls.excess(family, e, answer.extra) > calls.settings.excess))
-            for of, top, family in zip(nodes, peaks, calls.families, strict=True)
+            for of, top, family in zip(nodes, calls.loose(sampler, peaks), calls.families, strict=True)
         )
-    after = _Place(answer.x, sampler, peaks, nodes, raw, answer.extra)
+    after = _Place(answer.x, sampler, peaks, nodes, answer.raw, answer.extra)
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
     return _Round(after, nlp, answer, reached, violation, iterations)
 
@@ -155,7 +155,8 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
     prices = here.raw["lam_g"][-len(here.nodes) * slots :].reshape(len(here.nodes), slots)
     pairs = zip(here.nodes, prices, strict=True)
     binding = tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
-    point = Point(here.x, status, True, nodes=here.peaks, raw=here.raw, binding=binding)
+    loose = _frozen(calls.loose(here.sampler, here.peaks))
+    point = Point(here.x, status, True, nodes=loose, raw=here.raw, binding=binding)
     followed = follow(calls, replace(point, structure=calls.program.structure))
     return replace(followed, iterations=result.iterations) if followed else None
 

@@ -1,14 +1,17 @@
 """An NLP's objective and rows as CasADi expressions, read through the same rows as in every other number system."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt import maths
-from loomopt.balance import Given, total
-from loomopt.cycle import Node
+from loomopt.balance import total
 from loomopt.maths import Number
-from loomopt.nlp.structure import Structure
+from loomopt.nlp.families import Family
+from loomopt.nlp.lifted import Lifts
+from loomopt.nlp.quantities import Quantities
+from loomopt.nlp.structure import NodeParameters, Structure
+from loomopt.program.chains import followed
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
 from loomopt.schema import Values
@@ -16,12 +19,16 @@ from loomopt.schema import Values
 
 @dataclass(frozen=True)
 class Expressions:
-    """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0."""
+    """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
+
+    lifts: variables beside x that rows read.
+    """
 
     x: Any
     p: Any
     f: Any
     g: Any
+    lifts: Lifts
 
 
 def expressions(structure: Structure) -> Expressions:
@@ -31,102 +38,75 @@ def expressions(structure: Structure) -> Expressions:
     scaled = ca.SX.sym("x", len(structure.program.variables))
     extra = ca.SX.sym("t", structure.extras)
     p = ca.SX.sym("p", structure.layout.size)
-    built = _Built(structure, ca.vertsplit(scaled), ca.vertsplit(extra), ca.vertsplit(p))
-    rows = [*built.limits(), *built.pieces(), *built.cycle()]
-    return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows))
-
-
-class Quantities:
-    """Whole-cycle quantities, each traced once as a CasADi function of numbers, angle and switches, not once a node.
-
-    Numbers that follow from others at once (the corners' angles among them) are inputs too: all nodes share them.
-    """
-
-    def __init__(self, structure: Structure) -> None:
-        import casadi as ca
-
-        program, self.model = structure.program, structure.program.model
-        names = [*program.parameters, *structure.hints, *(v.name for v in program.variables)]
-        self.symbols = {name: ca.SX.sym(name) for name in names}
-        given = self.model.given(maths.casadi(), self.symbols)
-        self.derived = [_following(case) for case in (given, *given.cases)]
-        first, *others = (
-            Given({**case.values, **own}, case.own)
-            for case, own in zip((given, *given.cases), self.derived, strict=True)
-        )
-        self.given = Given(first.values, first.own, tuple(others))
-        self.phi, self.switch = ca.SX.sym("phi"), ca.SX.sym("switch", len(structure.node.switches))
-        self.switches = structure.node.switches
-        self._traced: dict[str, Any] = {}
-
-    def at(self, name: str, given: Given, phi: Number, switch: Values) -> Number:
-        """Return a quantity at a crank angle, rad."""
-        import casadi as ca
-
-        if name not in self._traced:
-            self._traced[name] = self._trace(name)
-        numbers = [given.values[key] for key in self.symbols]
-        for case, own in zip((given, *given.cases), self.derived, strict=True):
-            numbers += [case.values[key] for key in own]
-        return self._traced[name](ca.vertcat(*numbers), phi, ca.vertcat(*(switch[key] for key in self.switches)))
-
-    def _trace(self, name: str) -> Any:
-        import casadi as ca
-
-        switch = dict(zip(self.switches, ca.vertsplit(self.switch), strict=True))
-        value = self.model.quantity(maths.casadi(), self.given, name, Node(self.phi, switch))
-        numbers = [*self.symbols.values(), *(symbol for own in self.derived for symbol in own.values())]
-        return ca.Function("quantity", [ca.vertcat(*numbers), self.phi, self.switch], [value])
-
-
-def _following(case: Given) -> dict[str, Any]:
-    """Return a symbol for every number of a case that follows from others."""
-    import casadi as ca
-
-    known = case.values.items()
-    return {key: ca.SX.sym(key) for key, value in known if isinstance(value, ca.SX) and not value.is_symbolic()}
+    built = _Built(structure, scaled, extra, p)
+    rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
+    return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
 
 class NodeRows(Rows):
     """Rows in CasADi symbols; means are taken over nodes that are parameters."""
 
     def __init__(
-        self, structure: Structure, given: Given, stills: Mapping[str, Values], rules: Mapping[str, Sequence[Any]]
+        self,
+        shape: NodeParameters,
+        quantities: Quantities,
+        stills: Mapping[str, Values],
+        rules: Mapping[str, Sequence[Any]],
     ) -> None:
-        super().__init__(structure.program.model, maths.casadi(), given, stills)
-        self.corners = self.model.corners(self.maths, given)
-        self.shape, self.rules, self.quantities = structure.node, rules, Quantities(structure)
+        import casadi as ca
+
+        super().__init__(quantities.model, quantities.lifts.maths, quantities.given, stills)
+        self.corners = self.model.corners(self.maths, self.given)
+        self.column = ca.vertcat(1, *self.corners)
+        self.shape, self.rules, self.quantities = shape, rules, quantities
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
-        return self.quantities.at(name, self.given, phi, switch)
+        return self.quantities.at(name, phi, switch)
 
-    def at(self, name: str, parameters: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity at the node that parameters say, SI."""
-        return self.quantity(name, *self.shape.read(parameters, self.corners))
+    def read(self, names: Sequence[str]) -> None:
+        """Read the figures and rows of the design that will be asked for, all at once."""
+        self._single |= self.model.static(self.maths, self.given, self.stills, names)
+
+    def at(self, name: str, parameters: Any) -> Number:
+        """Return a whole-cycle quantity at the node that parameters (a column) say, SI."""
+        import casadi as ca
+
+        switch = {key: parameters[self.shape.places.start + k] for k, key in enumerate(self.shape.switches)}
+        return self.quantity(name, ca.dot(parameters[self.shape.angle], self.column), switch)
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, SI."""
+        import casadi as ca
+
         rule = self.rules[integral.name]
-        widths = [self.shape.read_width(parameters, self.corners) for parameters in rule]
+        widths = [ca.dot(ca.vertcat(node[0], node[self.shape.width]), self.column) for node in rule]
         weighted = [width * self.at(integral.quantity, node) for width, node in zip(widths, rule, strict=True)]
         return total(weighted) / total(widths)
 
 
 class _Built:
-    """One NLP being written down; scaled, extra: its variables; vector: its parameters."""
+    """One NLP being written down; scaled, extra: its variables; column: its parameters; all of them columns."""
 
-    def __init__(self, structure: Structure, scaled: list[Any], extra: list[Any], vector: list[Any]) -> None:
-        program, layout = structure.program, structure.layout
-        self.structure, self.program, self.extra, self.vector = structure, program, extra, vector
-        sizes = layout.read(vector, "variable scale")
+    def __init__(self, structure: Structure, scaled: Any, extra: Any, column: Any) -> None:
+        import casadi as ca
+
+        program, layout, vector = structure.program, structure.layout, ca.vertsplit(column[: structure.layout.nodes])
+        self.structure, self.program, self.extra = structure, program, ca.vertsplit(extra)
+        self.vector, self.column = vector, column
+        self.lifts = Lifts(ca.vertcat(scaled, extra))
+        sizes = ca.vertcat(*layout.read(vector, "variable scale"))
         values = dict(zip(program.parameters, layout.read(vector, "values"), strict=True))
         values |= dict(zip(structure.hints, layout.read(vector, "hints"), strict=True))
-        values |= {v.name: x * size for v, x, size in zip(program.variables, scaled, sizes, strict=True)}
+        values |= dict(zip(structure.names, ca.vertsplit(scaled * sizes), strict=True))
         names, model = program.model.switches, program.model
         stills = {e: dict(zip(names, layout.read(vector, f"still {e}"), strict=True)) for e in model.events_read}
-        rules = {name: layout.rows(vector, f"mean {name}") for name, _ in structure.points}
-        self.rows = NodeRows(structure, model.given(maths.casadi(), values), stills, rules)
+        rules = {name: layout.columns(column, f"mean {name}") for name, _ in structure.points}
+        values |= self.lifts.symbols(structure.recurrent)
+        self.lifts.define(followed(model, structure.names, self.lifts.maths, values))
+        given = model.given(self.lifts.maths, values)
+        quantities = Quantities(model, values, given, structure.node.switches, self.lifts)
+        self.rows = NodeRows(structure.node, quantities, stills, rules)
         self.bounds, self.limit_scales = layout.read(vector, "limit"), layout.read(vector, "limit scale")
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
 
@@ -150,13 +130,19 @@ class _Built:
         more, less = self.extra[group : group + 2]
         return more - less if self.program.limits[place].sign == 0 else more
 
-    def limits(self) -> list[Any]:
-        """Return the rows of limits that are one row each."""
-        limits = self.program.limits
-        return [
-            self.rows.excess(limits[k], self.bounds[k]) / self.limit_scales[k] - self.given_way(k)
-            for k in self.structure.static
+    def limits(self) -> Any:
+        """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
+        import casadi as ca
+
+        limits, static = self.program.limits, self.structure.static
+        self.rows.read([limits[k].row for k in static])
+        columns = [
+            (self.rows.excess(limits[k], self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
         ]
+        excess, scales, ways = (
+            (ca.vertcat(*column) for column in zip(*columns, strict=True)) if columns else [ca.SX()] * 3
+        )
+        return excess / scales - ways
 
     def pieces(self) -> list[Any]:
         """Return the smooth pieces below epigraph variables: both signs of a magnitude, each value of several."""
@@ -168,16 +154,34 @@ class _Built:
             found += [sign * self.rows.single(row) / scale - t for row in epigraph.rows for sign in signs]
         return found
 
+    def held(self) -> list[Any]:
+        """Return the rows of whole-cycle quantities at the stations of each family, as a column for each."""
+        import casadi as ca
+
+        layout, found = self.structure.layout, []
+        opened = [
+            dict(zip(self.structure.open_switches, row, strict=True)) for row in layout.rows(self.vector, "station")
+        ]
+        for k, family in enumerate(self.structure.families):
+            stations = [self.structure.stations[place] for place in self.structure.held[k]]
+            corners = [self.rows.corners[corner] for corner, _ in stations]
+            switches = [{**opened[place], **self.structure.stations[place].switch} for place in self.structure.held[k]]
+            values = map(self.rows.quantity, itertools.repeat(family.row), corners, switches)
+            found.append(self._rows(family, ca.vertcat(*layout.read(self.vector, f"sign {k}")), ca.vertcat(*values)))
+        return found
+
     def cycle(self) -> list[Any]:
         """Return the rows of whole-cycle quantities, one for each slot."""
         found = []
         for k, family in enumerate(self.structure.families):
-            if family.epigraph >= 0:
-                bound = self.extra[family.epigraph]
-                scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
-            else:
-                scale = self.limit_scales[family.limit]
-                bound = self.bounds[family.limit] / scale + self.given_way(family.limit)
-            for weight, sign, *parameters in self.structure.layout.rows(self.vector, f"family {k}"):
-                found.append(weight * (sign * self.rows.at(family.row, parameters) / scale - bound))
+            slots = self.structure.layout.columns(self.column, f"family {k}")
+            found += [slot[0] * self._rows(family, slot[1], self.rows.at(family.row, slot[2:])) for slot in slots]
         return found
+
+    def _rows(self, family: Family, sign: Any, value: Any) -> Any:
+        """Return by how much a whole-cycle quantity exceeds its bound, in its natural size."""
+        if family.epigraph >= 0:
+            scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
+            return sign * value / scale - self.extra[family.epigraph]
+        scale = self.limit_scales[family.limit]
+        return sign * value / scale - (self.bounds[family.limit] / scale + self.given_way(family.limit))

@@ -61,7 +61,7 @@ def follow(calls: Calls, warm: Point) -> Point | None:
         change = _Change(np.array([old.u for old, _ in become]), np.array([now.u - old.u for old, now in become]))
         if violation <= calls.settings.excess and change.largest <= SETTLED:
             return replace(point, iterations=0, violation=violation, built=calls.built)
-        nodes = _aimed(extremes, [now for _, now in become], change, last)
+        nodes = _aimed(calls.loose(sampler, extremes), [now for _, now in become], change, last)
         idle = 0 if change.largest < FOLLOW_PROGRESS * nearest else idle + 1
         if idle == FOLLOW_PATIENCE:
             return None

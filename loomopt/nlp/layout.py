@@ -9,11 +9,11 @@ from loomopt.cycle import Floats
 
 
 class Layout:
-    """Where each parameter stands in the NLP's parameter vector."""
+    """Where each parameter stands in the NLP's parameter vector: numbers, then nodes from `nodes` on."""
 
     def __init__(self) -> None:
         self.places: dict[str, tuple[int, tuple[int, ...]]] = {}
-        self.size = 0
+        self.size = self.nodes = 0
 
     def add(self, name: str, *shape: int) -> None:
         """Reserve room for an array."""
@@ -30,7 +30,12 @@ class Layout:
         begin, shape = self.places[name]
         return [vector[begin + k] for k in range(math.prod(shape))]
 
+    def columns(self, column: Any, name: str) -> list[Any]:
+        """Return the rows of a two-dimensional array in a column of CasADi's, each as a column."""
+        begin, (count, width) = self.places[name]
+        return [column[begin + k * width : begin + (k + 1) * width] for k in range(count)]
+
     def rows(self, vector: Any, name: str) -> list[list[Any]]:
         """Return the entries of a two-dimensional array, row by row."""
-        flat, width = self.read(vector, name), self.places[name][1][1]
-        return [flat[k : k + width] for k in range(0, len(flat), width)]
+        flat, (count, width) = self.read(vector, name), self.places[name][1]
+        return [flat[k * width : (k + 1) * width] for k in range(count)]

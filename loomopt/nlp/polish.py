@@ -58,7 +58,7 @@ def polish(
             return x, touching
         touching = [
             [e for e in of if calls.excess(family, e, extra) >= -TOUCHING]
-            for family, of in zip(calls.families, peaks, strict=True)
+            for family, of in zip(calls.families, calls.loose(sampler, peaks), strict=True)
         ]
         met_at = _newton(calls, sampler, x, extra, point, touching)
         if met_at is None:

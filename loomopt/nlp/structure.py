@@ -14,6 +14,8 @@ from loomopt.cycle import Cycle, Floats, Node, node_angle
 from loomopt.maths import Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.layout import Layout
+from loomopt.nlp.stations import Stood, held
+from loomopt.program.chains import Station, recurrent, stations
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import DATUM, quadrature
@@ -31,6 +33,21 @@ class NodeParameters:
     def size(self) -> int:
         """How many parameters a node has."""
         return 2 + 2 * self.corners + len(self.switches)
+
+    @property
+    def angle(self) -> slice:
+        """Where offset and coefficients of a node's angle stand."""
+        return slice(1, 2 + self.corners)
+
+    @property
+    def width(self) -> slice:
+        """Where the corners' coefficients in its width stand."""
+        return slice(2 + self.corners, 2 + 2 * self.corners)
+
+    @property
+    def places(self) -> slice:
+        """Where its switches stand."""
+        return slice(2 + 2 * self.corners, self.size)
 
     def write(self, cycle: Cycle, piece: int, u: float, weight: float = 0.0) -> list[float]:
         """Return the parameters of a node (piece, u); weight: its share of the piece's width."""
@@ -63,7 +80,7 @@ class Structure:
 
     elastic: instead of the objectives, the least weighted excess of the relaxable limits is sought. slots: nodes of
     each family. hints: names of values that corners without a formula start from. corners: how many the cycle has.
-    points: nodes of each mean over the cycle, by its name.
+    points: nodes of each mean over the cycle, by its name. stations: corners at which families have rows of their own.
     """
 
     program: Program
@@ -72,6 +89,7 @@ class Structure:
     hints: tuple[str, ...]
     corners: int
     points: tuple[tuple[str, int], ...]
+    stations: tuple[Station, ...] = ()
 
     @property
     def key(self) -> Hashable:
@@ -117,6 +135,27 @@ class Structure:
         return NodeParameters(self.corners, (*model.switches, *datum))
 
     @functools.cached_property
+    def recurrent(self) -> tuple[str, ...]:
+        """Derived values that follow one after the other, in order."""
+        return recurrent(self.program.model, self.names)
+
+    @property
+    def names(self) -> list[str]:
+        """The design's variables."""
+        return [variable.name for variable in self.program.variables]
+
+    @functools.cached_property
+    def open_switches(self) -> tuple[str, ...]:
+        """Switches that stations leave open."""
+        known = {name for station in self.stations for name in station.switch}
+        return tuple(name for name in self.node.switches if name not in known)
+
+    @functools.cached_property
+    def held(self) -> list[list[int]]:
+        """Of each family the places of the stations where it has a row."""
+        return [held([station.switch for station in self.stations], family) for family in self.families]
+
+    @functools.cached_property
     def layout(self) -> Layout:
         """Where each parameter stands."""
         program, layout = self.program, Layout()
@@ -129,6 +168,10 @@ class Structure:
         layout.add("objective scale", len(program.objectives))
         for event in program.model.events_read:
             layout.add(f"still {event}", len(program.model.switches))
+        layout.add("station", len(self.stations), len(self.open_switches))
+        for k, places in enumerate(self.held):
+            layout.add(f"sign {k}", len(places))
+        layout.nodes = layout.size
         for name, count in self.points:
             layout.add(f"mean {name}", count, self.node.size)
         for k in range(len(self.families)):
@@ -151,6 +194,10 @@ class Structure:
             write(p, f"still {event}", [switch[name] for name in program.model.switches])
         for mean in means(program, self.elastic):
             write(p, f"mean {mean.name}", self._rule(cycle, mean))
+        stood = Stood(self.stations, cycle)
+        write(p, "station", stood.switches(self.open_switches))
+        for k, family in enumerate(self.families):
+            write(p, f"sign {k}", stood.signs(sampler, family.row)[self.held[k]])
         for k, chosen in enumerate(nodes):
             used = [[1.0, e.sign, *node.write(cycle, e.piece, e.u)] for e in chosen]
             idle = [[0.0, 1.0, *node.write(cycle, 0, 0.5)]] * (self.slots - len(used))
@@ -177,4 +224,5 @@ def structure(program: Program, sampler: Sampler, slots: int, elastic: bool = Fa
     points = tuple(
         (mean.name, len(mean.angles) or len(quadrature(sampler.cycle, mean)[0])) for mean in means(program, elastic)
     )
-    return Structure(program, slots, elastic, tuple(sampler.hints), sampler.corner_count, points)
+    corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
+    return Structure(program, slots, elastic, tuple(sampler.hints), sampler.corner_count, points, corners)

@@ -4,6 +4,7 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from typing import Any
 
+from loomopt.nlp.elimination import Elimination, Solver
 from loomopt.nlp.expressions import expressions
 from loomopt.nlp.options import ipopt_options
 from loomopt.nlp.point import Settings
@@ -16,15 +17,21 @@ CACHE_SIZE = 32
 
 
 class Transcription:
-    """One built NLP, with its solvers and derivatives as they are first asked for."""
+    """One built NLP, with its solvers and derivatives as they are first asked for.
+
+    Where it has lifted variables, `nlp` has them, and all else does as if it had none.
+    """
 
     def __init__(self, made_of: Structure) -> None:
         self.structure, self.slots = made_of, made_of.slots
         written = expressions(made_of)
         self.nlp = {"x": written.x, "p": written.p, "f": written.f, "g": written.g}
         self.rows = int(written.g.numel())
+        self._eliminated = Elimination(written) if written.lifts.defined else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
+        if self._eliminated:
+            self.nlp, self._derivatives = self._eliminated.nlp, self._eliminated.functions
 
     def solver(self, warm: bool, settings: Settings) -> Any:
         """Return IPOPT for this NLP, from scratch or from a solution nearby."""
@@ -38,32 +45,33 @@ class Transcription:
                 "print_time": False,
                 "show_eval_warnings": False,
                 "calc_lam_p": False,
+                "no_nlp_grad": True,
                 "error_on_fail": False,
             }
             if callback is not None:
-                sizes = (self.nlp["x"].numel(), self.rows, self.structure.layout.size)
+                sizes = (self.nlp["x"].numel(), self.nlp["g"].numel(), self.structure.layout.size)
                 options["iteration_callback"] = callback.for_size(*sizes)
             solver = ca.nlpsol("solver", "ipopt", self.nlp, options | self._derivatives)
             if not self._derivatives:
                 functions = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
                 self._derivatives = {option: solver.get_function(made) for option, made in functions.items()}
-            self._solvers[name] = solver
+            self._solvers[name] = Solver(solver, self._eliminated) if self._eliminated else solver
         return self._solvers[name]
 
     @property
     def jacobian(self) -> Any:
         """Rows and their derivatives, as the solver computes them: (x, p) → (g, dg/dx)."""
-        return self._derivatives["jac_g"]
+        return self._eliminated.jacobian if self._eliminated else self._derivatives["jac_g"]
 
     @property
     def gradient(self) -> Any:
         """The objective and its derivatives: (x, p) → (f, df/dx)."""
-        return self._derivatives["grad_f"]
+        return self._eliminated.gradient if self._eliminated else self._derivatives["grad_f"]
 
     @property
     def curvature(self) -> Any:
         """Second derivatives of the Lagrangian: (x, p, weight of f, multipliers) → their upper triangle."""
-        return self._derivatives["hess_lag"]
+        return self._eliminated.curvature if self._eliminated else self._derivatives["hess_lag"]
 
 
 _cache: OrderedDict[Hashable, Transcription] = OrderedDict()

@@ -60,6 +60,21 @@ def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
+class Chain:
+    """Derived values of which each follows from a few before it: an NLP may have them for variables, and sparse rows.
+
+    roots: numbers they follow from in the end; follow(maths, values): each from roots and values before it, by name in
+    order; a kinematics' `derived` that is given them reads them. stations: for each of the arcs' corners in order the
+    switches of the motion's arcs there, where whole-cycle rows are likely to bind. Nothing but loads may jump there.
+    """
+
+    roots: frozenset[str]
+    names: tuple[str, ...]
+    follow: Callable[[Maths, Values], Mapping[str, Number]]
+    stations: tuple[Values, ...]
+
+
+@dataclass(frozen=True)
 class Arcs:
     """Stretches of the cycle that limits speak of; switch: as a load's, of its own corners' angles, rad."""
 
@@ -68,6 +83,8 @@ class Arcs:
     switch: Callable[[float, tuple[float, ...]], float]
     structure: Hashable = None
     """What distinguishes stretches of one name."""
+    chain: Chain | None = None
+    """What their formulas are made of, where that is a chain."""
 
 
 class Kinematics(Protocol):

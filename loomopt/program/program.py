@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from loomopt.cycle import Where
+from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
@@ -158,7 +159,7 @@ class Program:
     follow: Callable[[JobModel, Numbers], Numbers] = field(default=nothing_follows, compare=False)
     """follow(model, values): the variables that follow from the others; raises ValueError where it cannot move."""
 
-    @property
+    @lazy
     def structure(self) -> Hashable:
         """Equal for programs that differ in numbers only."""
         return (
@@ -169,20 +170,20 @@ class Program:
             tuple((objective.rows, objective.form, objective.combine) for objective in self.objectives),
         )
 
-    @property
+    @lazy
     def soft(self) -> dict[int, int]:
         """Relaxable limits by place → their group: the rows of one limit's side give way together."""
         groups: dict[tuple[str, str, int], int] = {}
         keys = {k: (limit.name, limit.family, limit.sign) for k, limit in enumerate(self.limits) if limit.relaxable}
         return {k: groups.setdefault(key, len(groups)) for k, key in keys.items()}
 
-    @property
+    @lazy
     def held(self) -> frozenset[str]:
         """Variables that are held without being limited: their value is today's, not a choice."""
         limited = {limit.row for limit in self.limits if limit.family == "variable"}
         return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)
 
-    @property
+    @lazy
     def fixed(self) -> frozenset[str]:
         """Variables without room."""
         return frozenset(v.name for v in self.variables if v.lower == v.upper)

@@ -1,7 +1,6 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
-import math
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
-from loomopt.tolerances import CLOSER, LEAST_SHARE, SAMPLES
+from loomopt.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -173,8 +172,9 @@ class Sampler:
 
     def _counts(self, samples: int) -> tuple[int, ...]:
         """Return how many nodes each piece has."""
-        widths = np.diff(self.cycle.starts).tolist()
-        return tuple(max(samples // LEAST_SHARE, math.ceil(samples * width / TURN)) + 1 for width in widths)
+        widths = np.diff(self.cycle.starts)
+        least = max(samples // max(LEAST_SHARE, len(widths) // 2), LEAST_NODES)
+        return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
 
     def extremes(self, name: str, where: Where | None = None) -> list[Extreme]:
         """Return the local extremes of |quantity| (of a signed one, its maxima), largest first, right to rounding.

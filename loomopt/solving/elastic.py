@@ -9,6 +9,7 @@ import numpy as np
 from loomopt.nlp import exchange
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Point, Settings
+from loomopt.nlp.stations import owners
 from loomopt.program.program import Limit, Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
@@ -40,9 +41,9 @@ def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     rows = [limit for limit in program.limits if limit.family != "cycle"]
     cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
     prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
-    first, rest = prices[: len(rows)], prices[len(rows) :]
-    worst = rest.reshape(len(cycles), -1).max(axis=1) if rest.size else rest
-    priced = [*zip(rows, first, strict=False), *zip(cycles, worst, strict=False)]
+    rest = len(prices) - len(rows) if cycles else 0
+    of = [*rows, *(cycles[k] for k in owners(program, families(program, elastic=True), rest))] if len(prices) else []
+    priced = zip(of, prices, strict=True)
     return tuple(dict.fromkeys(words.limit(each) for each, price in priced if price > PRICED and not each.hidden))
 
 

@@ -101,9 +101,16 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
 
 def solved(gradients: Floats, system: System) -> Multipliers:
     """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
-    matrix, target, columns = _equations(gradients, system)
+    slopes, target, one_sided = _equations(gradients, system)
+    matrix = np.hstack([slopes, -slopes[:, one_sided:]])
     weights = nnls(matrix, target)
-    return Multipliers(weights @ columns, float(np.abs(matrix @ weights - target).max()))
+    signed = weights[: slopes.shape[1]].copy()
+    signed[one_sided:] -= weights[slopes.shape[1] :]
+    free = one_sided + len(system.equalities)
+    found = signed[free:] @ system.held
+    found[[*system.pieces, *system.inequalities]] += signed[:one_sided]
+    found[list(system.equalities)] += signed[one_sided:free]
+    return Multipliers(found, float(np.abs(matrix @ weights - target).max()))
 
 
 def replaceable(gradients: Floats, system: System, found: Multipliers, most: float) -> list[int]:
@@ -112,25 +119,21 @@ def replaceable(gradients: Floats, system: System, found: Multipliers, most: flo
     Two solutions y, z have ‖A (y − z)‖ ≥ σ ‖y − z‖, σ the least singular value of the slopes A: without a row of
     multiplier y_k what is left is no less than σ y_k less what y leaves.
     """
-    matrix, _, columns = _equations(gradients, system)
-    once = matrix[:, : len(columns) - len(system.equalities) - len(system.held)]
-    sizes = np.linalg.svd(once, compute_uv=False)
-    least = float(sizes[-1]) if len(sizes) == once.shape[1] else 0.0
-    reach = math.sqrt(len(matrix)) * (found.residual + most)
+    slopes, _, _ = _equations(gradients, system)
+    sizes = np.linalg.svd(slopes, compute_uv=False)
+    least = float(sizes[-1]) if len(sizes) == slopes.shape[1] else 0.0
+    reach = math.sqrt(len(slopes)) * (found.residual + most)
     return [k for k in system.inequalities if found.of[k] > POSITIVE and least * found.of[k] <= reach]
 
 
-def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, Floats]:
-    """Return the slopes to be balanced, by column, what they must add up to, and the rows each column is made of.
+def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:
+    """Return the slopes to be balanced, by column, what they must add up to, and how many columns have one sign.
 
-    What has a free sign stands twice, its opposites last.
+    Those of free sign come last: equalities, then what earlier levels hold.
     """
     count, size = gradients.shape
-    unit = np.eye(count)
-    one_sided = [unit[k] for k in (*system.pieces, *system.inequalities)]
-    free = [*(unit[k] for k in system.equalities), *system.held]
-    columns = np.array([*one_sided, *free, *(-each for each in free)]).reshape(-1, count)
     norms = [np.isin(np.arange(count), group).astype(float) for group in system.groups]
-    matrix = np.vstack([gradients.T @ columns.T, np.array(norms) @ columns.T])
-    target = np.concatenate([np.zeros(size), np.ones(len(norms))])
-    return matrix, target, columns
+    slopes = np.vstack([gradients.T, np.array(norms).reshape(-1, count)])
+    one_sided = [*system.pieces, *system.inequalities]
+    columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.held.T])
+    return columns, np.concatenate([np.zeros(size), np.ones(len(norms))]), len(one_sided)

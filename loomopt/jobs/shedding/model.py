@@ -15,12 +15,12 @@ from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.effects.shedding import FramePose as Frame
 from loomopt.lazy import lazy
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths import Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.mechanisms.cam_motion import CamLaw, Spline, mirrored, piece_at, segment_at
+from loomopt.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
 from loomopt.mechanisms.turning_points import followed
-from loomopt.program.kinematics import Arcs, Group
+from loomopt.program.kinematics import Arcs, Chain, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.schema import Table, Values
 
@@ -34,7 +34,6 @@ SEGMENT, LAW = "segment", "law"
 HALF_OPEN = "half_open"
 """The event of a half open shed, which effects may call in: X = h/2 on the rise and on the return."""
 MIDDLE, MIDDLE_PIECE = "half open u", "half open piece"
-BISECTIONS = 60
 
 
 class NoTable(Table):
@@ -145,8 +144,17 @@ class CamFrame:
         """The segments, and the law's pieces."""
         return (
             Arcs(SEGMENT, self._begins, functools.partial(segment_at, self.segments)),
-            Arcs(LAW, lambda maths, given: mirrored(given.values, self.law.breaks), piece_at),
+            Arcs(LAW, lambda maths, given: mirrored(given.values, self.law.breaks), piece_at, chain=self._chain),
         )
+
+    @lazy
+    def _chain(self) -> Chain | None:
+        """The knots of a spline law."""
+        if not isinstance(self.law, Spline):
+            return None
+        inner = range(1, self.law.intervals)
+        stations = tuple({SEGMENT: float(segment), LAW: float(k)} for segment in (RISE, RETURN) for k in inner)
+        return Chain(frozenset(self.law.names), self.law.recurrent, self.law.followed, stations)
 
     def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         begins = (0, *(given.values[f"begin.{name}"] for name in ("far", "return", "near")))
@@ -163,10 +171,11 @@ class CamFrame:
         turning = far + values["far_dwell"]
         near = turning + values["return"]
         found = {"begin.far": far, "begin.return": turning, "begin.near": near, "near_dwell": 2 * maths.pi - near}
-        found |= self.law.prepared(maths, values)
+        knots = self.law.prepared(maths, values)
         if HALF_OPEN in called:
-            found[HALF_OPEN] = mirrored({**values, **found}, [self._middle(maths, {**values, **found})])
-        return found
+            read = {**knots, **values, **found}
+            found[HALF_OPEN] = mirrored(read, [self._middle(maths, read)])
+        return {**found, **knots}
 
     def _middle(self, maths: Maths, values: Values) -> Number:
         """Return the u where s = 1/2; of a law that is not symmetric it moves with the law, from a hint."""
@@ -183,14 +192,7 @@ class CamFrame:
         """Return where a law that is not symmetric passes the middle of the shed, and on which piece."""
         if HALF_OPEN not in called or self.law.symmetric:
             return {}
-        breaks = [0.0, *map(float, self.law.breaks), 1.0]
-        piece = max(k for k, u in enumerate(breaks[:-1]) if self.law.at(FLOAT, given.values, u, k).s < 0.5)
-        low, high = breaks[piece : piece + 2]
-        for _ in range(BISECTIONS):
-            middle = (low + high) / 2
-            below = self.law.at(FLOAT, given.values, middle, piece).s < 0.5
-            low, high = (middle, high) if below else (low, middle)
-        return {MIDDLE: (low + high) / 2, MIDDLE_PIECE: float(piece)}
+        return dict(zip((MIDDLE, MIDDLE_PIECE), middle(self.law, given.values), strict=True))
 
     def pose(self, maths: Maths, given: Given, node: Node) -> FramePose:
         """Return the pose at cam angles θ, rad; switches: segment, the law's piece, worst."""
