@@ -14,6 +14,7 @@ from loomopt.studies.ladders import Ladder, Outcome, Reference, Row, climbed, gr
 from loomopt.studies.subject import Target
 from loomopt.tolerances import NO_ORDER
 
+pytestmark = pytest.mark.xdist_group("accuracy")
 SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))
 LINEAR_PROGRAMMES = {
     8: 75219.70679752559,
