@@ -6,8 +6,7 @@ taken on both sides along (I, Z), with the definitions' own multipliers âˆ’d_zâ
 Numerical Optimization, 2nd ed., section 15.3].
 """
 
-import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.nlp.expressions import Expressions
+from loomopt.nlp.lifted import Lifted
 
 
 class Entries:
@@ -61,6 +61,16 @@ class _Local:
     follow: Floats
 
 
+def _of(picked: Sequence[Lifted], x: Any) -> Any:
+    """Return the slopes of the rows of choices, which read so many that as rows among others they would cost most."""
+    import casadi as ca
+
+    columns = {id(each.options): each.options for each in picked}
+    slopes = {key: ca.jacobian(options, x) for key, options in columns.items()}
+    rows = [ca.mtimes(each.at.T, slopes[id(each.options)]) for each in picked]
+    return ca.jacobian(ca.vertcat(*(each.symbol for each in picked)), x) - ca.vertcat(*rows)
+
+
 class Elimination:
     """An NLP's functions of its own variables and rows, from those with lifted variables, which IPOPT is given."""
 
@@ -68,7 +78,7 @@ class Elimination:
         import casadi as ca
 
         lifted = written.lifts.defined
-        z, worth = (ca.vertcat(*column) for column in zip(*lifted, strict=True))
+        z, worth = ca.vertcat(*(each.symbol for each in lifted)), ca.vertcat(*(each.worth for each in lifted))
         self.own, self.rows, self.count = written.x.numel(), written.g.numel(), len(lifted)
         x, lam_f, lam_g = ca.vertcat(written.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.rows + self.count)
         g = ca.vertcat(written.g, z - worth)
@@ -77,9 +87,9 @@ class Elimination:
             [each.symbol for each in lifted], [each.worth for each in lifted], [], False
         )
         self._start = ca.Function("start", [written.x, written.p], [ca.vertcat(*explicit)])
-        # A choice reads many: apart, they do not spoil the colouring of the others' sparse rows.
-        ends = 0, self.rows, self.rows + len(written.lifts.named), self.rows + self.count
-        slopes = ca.vertcat(*(ca.jacobian(g[i:j], x) for i, j in itertools.pairwise(ends)))
+        first = self.rows + len(written.lifts.named)
+        parts = [ca.jacobian(g[: self.rows], x), ca.jacobian(g[self.rows : first], x), _of(written.lifts.picked, x)]
+        slopes = ca.vertcat(*parts)
         curved = self.rows if not ca.depends_on(slopes[self.rows :, :], x) else self.rows + self.count
         bend: Any = ca.triu(ca.hessian(lam_f * written.f + ca.dot(lam_g[:curved], g[:curved]), x)[0])
         self.functions = {

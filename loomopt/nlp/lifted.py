@@ -15,10 +15,12 @@ from loomopt.tolerances import FEW_CHOICES
 
 
 class Lifted(NamedTuple):
-    """A lifted variable and what it is worth."""
+    """A lifted variable and what it is worth; of a choice, one of the column `options`: that where `at` is 1, not 0."""
 
     symbol: Any
     worth: Any
+    at: Any = None
+    options: Any = None
 
 
 def identity(value: Number) -> object:
@@ -37,8 +39,27 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
     return ca.dot(place == ca.DM(range(len(values))), ca.vertcat(*values))
 
 
+class Options(Sequence[Number]):
+    """What there is to choose from, as one column for all choices."""
+
+    def __init__(self, values: Sequence[Number]) -> None:
+        import casadi as ca
+
+        self.values = list(values)
+        self.column = ca.vertcat(*self.values)
+        self.key = tuple(map(identity, self.values))
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.values)
+
+    def __getitem__(self, place: Number) -> Number:
+        """Return the value at a place."""
+        return self.values[place]
+
+
 class Lifts:
-    """Lifted variables as they are asked for while rows are written down; own: the NLP's other variables.
+    """Lifted variables as they are asked for while rows are written down; own: the NLP's other variables, a column.
 
     named: values that follow one after the other; picked: choices, after all of them.
     """
@@ -49,7 +70,9 @@ class Lifts:
         self.picked: list[Lifted] = []
         self._moving = own
         self._symbols: dict[str, Any] = {}
-        self._choices: dict[tuple[object, ...], tuple[Any, list[Any]]] = {}
+        self._options: dict[object, tuple[Options, bool]] = {}
+        self._places: dict[object, tuple[Any, Any]] = {}
+        self._choices: dict[object, Any] = {}
 
     def symbols(self, names: Sequence[str]) -> dict[str, Any]:
         """Return a symbol for each value that is lifted; `define` says what it is worth."""
@@ -65,19 +88,29 @@ class Lifts:
 
     def choose(self, place: Number, values: Sequence[Number]) -> Number:
         """Return the value at a place as every number system does; a variable for one of many that the design moves."""
-        import casadi as ca
-
         if isinstance(place, float | int) or len(values) <= FEW_CHOICES:
             return chosen(place, values)
-        kept = [place, *values]
-        key = tuple(map(identity, kept))
+        given = values if isinstance(values, Options) else Options(values)
+        key = identity(place), given.key
         if key not in self._choices:
-            found = chosen(place, kept[1:])
-            if ca.depends_on(found, self._moving):
-                self.picked.append(Lifted(ca.SX.sym("chosen"), found))
-                found = self.picked[-1].symbol
-            self._choices[key] = found, kept
-        return self._choices[key][0]
+            self._choices[key] = self._choice(place, given)
+        return self._choices[key]
+
+    def _choice(self, place: Any, given: Options) -> Any:
+        import casadi as ca
+
+        if given.key not in self._options:
+            self._options[given.key] = given, bool(ca.depends_on(given.column, self._moving))
+        options, moves = self._options[given.key]
+        at = identity(place), len(options)
+        if at not in self._places:
+            self._places[at] = place == ca.DM(range(len(options))), place
+        where = self._places[at][0]
+        worth = ca.dot(where, options.column)
+        if not moves:
+            return worth
+        self.picked.append(Lifted(ca.SX.sym("chosen"), worth, where, options.column))
+        return self.picked[-1].symbol
 
     @property
     def defined(self) -> list[Lifted]:

@@ -8,7 +8,7 @@ from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.maths import Number
-from loomopt.nlp.lifted import Lifts, chosen, identity
+from loomopt.nlp.lifted import Lifts, Options, chosen, identity
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
 from loomopt.tolerances import FEW_CHOICES
@@ -19,7 +19,7 @@ class _Choice(NamedTuple):
 
     symbol: Any
     switch: str
-    options: Sequence[Number]
+    options: Options
 
 
 class _Traced(NamedTuple):
@@ -110,8 +110,10 @@ class _Choices:
         if not switch or len(values) <= FEW_CHOICES or not all(map(self._known, values)):
             return chosen(place, values)
         keys = list(map(identity, values))
-        options = [self.worth.get(key, value) for key, value in zip(keys, values, strict=True)]
-        return self._found.setdefault((switch, *keys), _Choice(ca.SX.sym("chosen"), switch, options)).symbol
+        if (switch, *keys) not in self._found:
+            options = Options([self.worth.get(key, value) for key, value in zip(keys, values, strict=True)])
+            self._found[switch, *keys] = _Choice(ca.SX.sym("chosen"), switch, options)
+        return self._found[switch, *keys].symbol
 
     def _known(self, value: Number) -> bool:
         return isinstance(value, float | int) or identity(value) in self.worth or bool(value.is_constant())

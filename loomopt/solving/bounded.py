@@ -12,6 +12,7 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import Where
+from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
@@ -39,6 +40,12 @@ class Boxes(Reading):
         system, model = maths.balls(), sampler.model
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
+
+    @lazy
+    def _switches(self) -> list[dict[str, float]]:
+        """The switches on each piece."""
+        pieces = map(self.cycle.switch, range(self.cycle.pieces))
+        return [{name: float(value) for name, value in switch.items()} for switch in pieces]
 
     def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> Bound:
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
@@ -102,8 +109,7 @@ class Boxes(Reading):
         u = maths.ball_series(centre, half)
         begin, end = self.starts[piece : piece + 2]
         angle = begin + (end - begin) * u
-        switch = {of: float(value) for of, value in self.cycle.switch(piece).items()}
-        value = self.quantity(name, angle, switch)
+        value = self.quantity(name, angle, self._switches[piece])
         return maths.ball_series(0.0, 0.0) * 0 + value
 
 
