@@ -37,10 +37,20 @@ def installed(module: str) -> bool:
 
 
 def show(rows: Sequence[Mapping[str, Any]], as_json: bool, **facts: Any) -> None:
-    """Print rows as a table, then the facts; or both as one JSON object."""
+    """Print rows as a table, then the facts, lists of rows as tables too; or all as one JSON object."""
     if as_json:
         print(json.dumps({"rows": rows, **facts}))
         return
+    _print(rows)
+    for name, value in facts.items():
+        if isinstance(value, list):
+            print(f"\n{name.replace('_', ' ')}:")
+            _print(value)
+        else:
+            print(f"{name.replace('_', ' ')}: {_text(value)}")
+
+
+def _print(rows: Sequence[Mapping[str, Any]]) -> None:
     columns = list(rows[0])
     cells = [columns, *([_text(row[name]) for name in columns] for row in rows)]
     widths = [max(len(line[k]) for line in cells) for k in range(len(columns))]
@@ -50,8 +60,6 @@ def show(rows: Sequence[Mapping[str, Any]], as_json: bool, **facts: Any) -> None
                 cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(line, widths, strict=True))
             )
         )
-    for name, value in facts.items():
-        print(f"{name.replace('_', ' ')}: {_text(value)}")
 
 
 def _text(value: Any) -> str:
