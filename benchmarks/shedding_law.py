@@ -20,6 +20,7 @@ time.
 import argparse
 import time
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import harness
@@ -37,7 +38,7 @@ BOUND = 2 * np.pi
 RAISED = (2, 4, 8)
 BESIDE = (16, 64, 256)
 """Intervals of the laws beside IPOPT alone."""
-IPOPT = {
+IPOPT: dict[str, Any] = {
     "tol": 1e-13,
     "dual_inf_tol": 1e-9,
     "constr_viol_tol": 1e-11,
@@ -137,34 +138,35 @@ def raised(name, n):
 
 
 def by_hand(case, n):
-    """Return the solver of the law's NLP in plain CasADi, with what it is called with; variables s, s', s'', K1, X0."""
-    s, v, a, K1, X0 = (
-        ca.SX.sym(name, size) for name, size in (("s", n + 1), ("v", n + 1), ("a", n + 1), ("K", 1), ("X", 1))
-    )
-    w, first, last = 2 * np.pi * case.rpm / 60, slice(0, n), slice(1, n + 1)
+    """Return the solver of the law's NLP in plain CasADi, what it is called with, and K1 of its unit, N/m.
+
+    Variables: s, s', s'' at the knots, K1, X0.
+    """
+    s, v, a = (ca.SX.sym(name, n + 1) for name in "sva")
+    K1, X0 = ca.SX.sym("K1"), ca.SX.sym("X0")
+    w, first, last, stiffness, force = 2 * np.pi * case.rpm / 60, slice(0, n), slice(1, n + 1), 1e5, 1e4
     rows = [s[last] - s[first] - v[first] / n - (2 * a[first] + a[last]) / (6 * n * n)]
     rows += [v[last] - v[first] - (a[first] + a[last]) / (2 * n)]
-    stiffness, force = 1e5, 1e4
+    spring = stiffness * K1 * (X0 + case.travel * s)
     for angle in (case.angles[0], case.angles[2]):
-        pull = (
-            stiffness * K1 * (X0 + case.travel * s) + case.M * (w / np.radians(angle)) ** 2 * case.travel * a - case.G
-        )
+        steady = spring + case.M * case.travel * (w / np.radians(angle)) ** 2 * a - case.G - case.N_min
         # The warp's linear pull is the lesser of two lines, as T1 >= T2: both are rows.
-        rows += [(pull + T * (2 * s - 1) - case.N_min) / force for T in (case.T1, case.T2)]
+        rows += [(steady + T * (2 * s - 1)) / force for T in (case.T1, case.T2)]
     g, x = ca.vertcat(*rows), ca.vertcat(s, v, a, K1, X0)
     solver = ca.nlpsol("law", "ipopt", {"x": x, "f": K1, "g": g}, {"ipopt": IPOPT, "print_time": False})
     u, one, free = np.arange(n + 1) / n, np.ones(n + 1), np.full(n + 1, np.inf)
     start = u - np.sin(BOUND * u) / BOUND, 1 - np.cos(BOUND * u), BOUND * np.sin(BOUND * u)
     lower, upper = [0 * one, 0 * one, -BOUND * one], [one, free, BOUND * one]
-    for low, high, end in zip(lower, upper, ((0, 1), (0, 0), (0, 0)), strict=True):
-        low[[0, -1]] = high[[0, -1]] = end
-    above = np.concatenate([np.zeros(2 * n), np.full(g.numel() - 2 * n, np.inf)])
-    ends = {"lbx": np.concatenate([*lower, [0, 0]]), "ubx": np.concatenate([*upper, [np.inf, case.X0]])}
-    return (
-        solver,
-        {"x0": np.concatenate([*start, [1, case.X0]]), **ends, "lbg": np.zeros(g.numel()), "ubg": above},
-        stiffness,
-    )
+    for low, high, ends in zip(lower, upper, ((0, 1), (0, 0), (0, 0)), strict=True):
+        low[[0, -1]] = high[[0, -1]] = ends
+    asked = {
+        "x0": np.concatenate([*start, [1, case.X0]]),
+        "lbx": np.concatenate([*lower, [0, 0]]),
+        "ubx": np.concatenate([*upper, [np.inf, case.X0]]),
+        "lbg": np.zeros(g.numel()),
+        "ubg": np.concatenate([np.zeros(2 * n), np.full(g.numel() - 2 * n, np.inf)]),
+    }
+    return solver, asked, stiffness
 
 
 def clocked(call):
@@ -176,10 +178,10 @@ def clocked(call):
 def beside(name, n, repeats):
     """Return the row of one size beside IPOPT alone; the least time of each counts, repeated in turn."""
     scene = lo.load(name).set("targets.law.intervals", n)
-    taken = {"build": [], "solve": [], "loomopt": []}
+    taken: dict[str, list[float]] = {"build": [], "solve": [], "loomopt": []}
     for _ in range(repeats):
-        (solver, called_with, unit), built = clocked(lambda: by_hand(SCENES[name], n))
-        said, solved = clocked(lambda: solver(**called_with))  # noqa: B023
+        (solver, asked, unit), built = clocked(lambda: by_hand(SCENES[name], n))
+        said, solved = clocked(lambda: solver(**asked))  # noqa: B023
         transcribe._cache.clear()
         answer, own = clocked(lambda: lo.solve(scene, "law"))
         for part, seconds in zip(taken.values(), (built, solved, own), strict=True):

@@ -11,18 +11,23 @@ from loomopt.nlp.families import Family, epigraphs, families
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.stations import Stood, held
 from loomopt.nlp.transcribe import Transcription, transcribe
-from loomopt.program.chains import stations
+from loomopt.program.chains import recurrent, stations
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import ELASTIC_SHARE, FIRST_ROOM, FIRST_SHARE, FIRST_SLOTS
+from loomopt.tolerances import BESIDE_STATIONS, ELASTIC_SHARE, FIRST_ROOM, FIRST_SHARE, FIRST_SLOTS, LEADING
 
 
 class Calls:
-    """How one program is put to its NLP; charges what had to be built on the way."""
+    """How one program is put to its NLP; charges what had to be built on the way.
+
+    slots: nodes of each family that a first NLP has room for; leading: those of a start.
+    """
 
     def __init__(self, program: Program, settings: Settings, elastic: bool) -> None:
         self.program, self.settings, self.elastic = program, settings, elastic
         self.families, self.epigraphs = families(program, elastic), epigraphs(program, elastic)
+        names = [variable.name for variable in program.variables]
+        self.slots, self.leading = BESIDE_STATIONS if recurrent(program.model, names) else (FIRST_SLOTS, LEADING)
         count = len(program.objectives)
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
         self.built = 0.0
@@ -45,7 +50,7 @@ class Calls:
 
     def transcribed(self, sampler: Sampler, nodes: Sequence[Sequence[Extreme]], warm: bool) -> Transcription:
         """Return the NLP with room for nodes of each family, its solver made; charges what had to be built."""
-        slots = FIRST_SLOTS
+        slots = self.slots
         while any(len(of) > slots for of in nodes):
             slots *= 2
         began = time.perf_counter()

@@ -20,7 +20,7 @@ from loomopt.nlp.polish import polish
 from loomopt.nlp.transcribe import Transcription
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, LEADING, NEEDED, STANDS
+from loomopt.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, NEEDED, STANDS
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""
@@ -91,7 +91,7 @@ def solve(
 def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:
     """Return where the exchange begins: at the largest extremes of the start, or at a neighbour's nodes."""
     peaks = _frozen(calls.peaks(sampler))
-    nodes = warm.nodes if warm else tuple(tuple(of[:LEADING]) for of in calls.loose(sampler, peaks))
+    nodes = warm.nodes if warm else tuple(tuple(of[: calls.leading]) for of in calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
     raw = warm.raw if warm else {}

@@ -17,7 +17,6 @@ from loomopt.nlp.point import Point
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.tolerances import (
     BINDING,
-    FIRST_SLOTS,
     FOLLOW_FARTHEST,
     FOLLOW_PATIENCE,
     FOLLOW_PROGRESS,
@@ -89,7 +88,7 @@ def _aimed(
 def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:
     """Return the point that pivots lead to from another, with nodes on the extremes; None without one."""
     variables = len(calls.program.variables)
-    nodes = [_chosen(of, old) for of, old in zip(extremes, point.binding, strict=True)]
+    nodes = [_chosen(of, old, calls.slots) for of, old in zip(extremes, point.binding, strict=True)]
     nlp = calls.transcribed(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, point.x, np.asarray(point.raw["extra"]), nodes)
     first = nlp.rows - len(calls.families) * nlp.slots
@@ -108,11 +107,11 @@ def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> P
     return replace(point, x=calls.design(reached.x), nodes=tuple(map(tuple, nodes)), raw=raw, binding=binding)
 
 
-def _chosen(extremes: Sequence[Extreme], binding: Sequence[Extreme]) -> list[Extreme]:
+def _chosen(extremes: Sequence[Extreme], binding: Sequence[Extreme], slots: int) -> list[Extreme]:
     """Return the extremes that the binding ones have become, then others, as many as there is room for."""
     first = [_nearest(extremes, node) for node in binding]
     others = [e for e in extremes if not any(e.piece == f.piece and abs(e.u - f.u) <= SAME_NODE for f in first)]
-    return first + others[: max(0, FIRST_SLOTS - len(first))]
+    return first + others[: max(0, slots - len(first))]
 
 
 def _nearest(extremes: Sequence[Extreme], node: Extreme) -> Extreme:

@@ -127,13 +127,13 @@ def test_the_extreme_a_node_has_become_is_the_nearest_of_its_sign_on_its_piece()
 
 def test_binding_extremes_come_first_and_leave_room_for_the_others():
     extremes = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    chosen = follow._chosen(extremes, [at(0, 0.21), at(0, 0.38)])
+    chosen = follow._chosen(extremes, [at(0, 0.21), at(0, 0.38)], 6)
     assert chosen[:2] == [extremes[4], extremes[8]]
     assert chosen[2:] == [extremes[k] for k in (0, 1, 2, 3)], "six in all, the largest first"
     same = [at(0, 0.5), at(0, 0.5005), at(0, 0.502), at(1, 0.5)]
-    assert follow._chosen(same, [at(0, 0.5)]) == [same[0], same[2], same[3]], "one node stands for close ones"
+    assert follow._chosen(same, [at(0, 0.5)], 6) == [same[0], same[2], same[3]], "one node stands for close ones"
     many = [at(0, k / 20, 9.0 - k) for k in range(9)]
-    assert follow._chosen(many, many[:7]) == many[:7]
+    assert follow._chosen(many, many[:7], 6) == many[:7]
 
 
 def change(u, move):
