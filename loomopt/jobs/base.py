@@ -5,9 +5,7 @@ import importlib
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
 from loomopt.errors import BadInput
@@ -21,6 +19,9 @@ from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.units import SI_UNIT
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 Figures = Mapping[str, float | None]
 
@@ -68,8 +69,10 @@ class Job(abc.ABC):
         return found
 
     @property
-    def resources(self) -> Traversable:
+    def resources(self) -> "Traversable":
         """The folder with the job's template.toml, and problems/ and results/ where it brings any."""
+        from importlib.resources import files
+
         return files(self.package)
 
     def demand(self, scene: Scene, target: str) -> None:

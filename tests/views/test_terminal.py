@@ -67,6 +67,28 @@ def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
     assert sorted(shown.split()[4:]) == sorted(word for line in lines for cell in line for word in cell.split())
 
 
+BLANKS = st.lists(st.sampled_from(["a", "bcd", "ef-gh", "1.5", f"l1{layout.JOINED}mm", " ", "  ", "x" * 30]), max_size=14)
+ANY_CELLS = BLANKS.map("".join)
+PARAGRAPHS = st.lists(ANY_CELLS, min_size=1, max_size=3).map("\n".join)
+HEADS = st.tuples(st.sampled_from(["", "name", "phi\n[deg]"]), st.just("x"), st.sampled_from(["", "what it is"]))
+GRIDS = st.builds(
+    Grid,
+    st.sampled_from(["", "T", "A title of some length"]),
+    HEADS,
+    st.lists(st.tuples(ANY_CELLS, ANY_CELLS, ANY_CELLS), min_size=1, max_size=3).map(tuple),
+    right=st.sampled_from([(), (0,), (1, 2)]),
+)
+
+
+@given(st.lists(PARAGRAPHS | GRIDS, min_size=1, max_size=3), st.sampled_from([40, 60, 100, layout.UNWRAPPED]))
+@settings(deadline=None, derandomize=True, max_examples=400)
+def test_what_is_laid_out_without_rich_is_to_the_letter_what_rich_lays_out(parts, columns):
+    found = text(*parts, columns=columns)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(layout, "_laid_out", layout.by_rich)
+        assert found == text(*parts, columns=columns)
+
+
 @given(CELLS, st.integers(20, 90))
 @settings(deadline=None, derandomize=True)
 def test_a_paragraph_fits_the_width_and_keeps_every_word(sentence, columns):
