@@ -4,7 +4,6 @@ import abc
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
@@ -104,7 +103,7 @@ class Job(abc.ABC):
         sampler = self.sampler(scene, design)
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
-        return curves(sampler, replace(self.columns(scene, sampler), checks=checks), steps, also)
+        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, also)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""

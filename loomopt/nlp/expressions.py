@@ -1,8 +1,7 @@
 """An NLP's objective and rows as CasADi expressions, read through the same rows as in every other number system."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt import maths
 from loomopt.balance import Given, total
@@ -14,8 +13,7 @@ from loomopt.program.reading import Rows
 from loomopt.schema import Values
 
 
-@dataclass(frozen=True)
-class Expressions:
+class Expressions(NamedTuple):
     """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0."""
 
     x: Any

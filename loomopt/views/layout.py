@@ -9,9 +9,8 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import StringIO
-from typing import Any
+from typing import Any, NamedTuple
 
 GAP = "  "
 JOINED = "\ue000"
@@ -22,8 +21,7 @@ UNWRAPPED = 10_000
 """Columns of a pipe or a file."""
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(NamedTuple):
     """A table; right: places of right-aligned columns, the others may be wrapped; a heading may have lines."""
 
     title: str

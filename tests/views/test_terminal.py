@@ -67,7 +67,9 @@ def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
     assert sorted(shown.split()[4:]) == sorted(word for line in lines for cell in line for word in cell.split())
 
 
-BLANKS = st.lists(st.sampled_from(["a", "bcd", "ef-gh", "1.5", f"l1{layout.JOINED}mm", " ", "  ", "x" * 30]), max_size=14)
+BLANKS = st.lists(
+    st.sampled_from(["a", "bcd", "ef-gh", "1.5", f"l1{layout.JOINED}mm", " ", "  ", "x" * 30]), max_size=14
+)
 ANY_CELLS = BLANKS.map("".join)
 PARAGRAPHS = st.lists(ANY_CELLS, min_size=1, max_size=3).map("\n".join)
 HEADS = st.tuples(st.sampled_from(["", "name", "phi\n[deg]"]), st.just("x"), st.sampled_from(["", "what it is"]))
