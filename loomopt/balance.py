@@ -8,7 +8,7 @@ Only loads that stand in the scene are in the sums. Each term is written in its 
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.effects.kinds import Load, Motion, State
 from loomopt.maths import Maths, Number
@@ -34,8 +34,7 @@ class Pose(Motion):
     omega_dot: Number = None
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(NamedTuple):
     """All numbers of a scene in one number system: `values` by name, `own` values of each effect.
 
     cases: the same of every further set of scene numbers (several fabrics on one machine).

@@ -8,9 +8,8 @@ import json
 import math
 import re
 import typing
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
@@ -155,8 +154,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
     return _refusal(kind, problem or "it is not one number with one unit", remedy)
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """What a scene's number may be: its kind, and its range in SI units."""
 
     kind: str
@@ -192,8 +190,7 @@ class Quantity:
         return core_schema.no_info_plain_validator_function(self.validate)
 
 
-@dataclass(frozen=True)
-class NumberList:
+class NumberList(NamedTuple):
     """A list of pure numbers, as in TOML or as JSON text; at most `longest` of them."""
 
     longest: int = 1000

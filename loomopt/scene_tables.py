@@ -1,7 +1,6 @@
 """The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
@@ -29,8 +28,7 @@ class Problem(Table):
     source: str = ""
 
 
-@dataclass(frozen=True)
-class Bound:
+class Bound(NamedTuple):
     """Range of a number that may vary, SI; equal ends fix it; not free: held at today's; unit: as written."""
 
     min: float
@@ -39,8 +37,7 @@ class Bound:
     unit: str
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """Range in which a figure is kept, SI; None: that side is open; unit: as written."""
 
     min: float | None

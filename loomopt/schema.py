@@ -1,7 +1,7 @@
 """What tables of a scene are made of, and what a designer reads and asks: figures and targets."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
@@ -18,8 +18,7 @@ Values = Mapping[str, Number]
 """Scene numbers by name, in one number system: `l1`, `M0`, `today.l1`, …"""
 
 
-@dataclass(frozen=True)
-class Figure:
+class Figure(NamedTuple):
     """One number a designer reads: its kind of quantity, and the sides on which a scene may limit it."""
 
     name: str
@@ -28,8 +27,7 @@ class Figure:
     sides: tuple[str, ...] = ("min", "max")
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """What a job can be asked for; `own` models the values of its `[targets.NAME]` table.
 
     needs: numbers of [operation] it keeps; needs_effects: effects without which it says nothing.

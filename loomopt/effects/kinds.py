@@ -6,7 +6,7 @@ An effect that is absent from a scene is absent from its equations.
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Literal, Protocol, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from loomopt.maths import Maths, Number
 from loomopt.schema import Figure, Table, Values
@@ -65,8 +65,7 @@ def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
     return ()
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """What an effect's row must keep: a value, SI, or that of a key of its table; sign +1 at most, −1 at least, 0 ="""
 
     row: str
@@ -130,8 +129,7 @@ class Load(Effect, Generic[Pose]):
     told: Mapping[float, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Axis:
+class Axis(NamedTuple):
     """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
 
     name: str

@@ -4,10 +4,7 @@ import abc
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from importlib.resources import files
-from importlib.resources.abc import Traversable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
 from loomopt.errors import BadInput
@@ -21,6 +18,9 @@ from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.units import SI_UNIT
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 Figures = Mapping[str, float | None]
 
@@ -68,8 +68,10 @@ class Job(abc.ABC):
         return found
 
     @property
-    def resources(self) -> Traversable:
+    def resources(self) -> "Traversable":
         """The folder with the job's template.toml, and problems/ and results/ where it brings any."""
+        from importlib.resources import files
+
         return files(self.package)
 
     def demand(self, scene: Scene, target: str) -> None:
@@ -101,7 +103,7 @@ class Job(abc.ABC):
         sampler = self.sampler(scene, design)
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
-        return curves(sampler, replace(self.columns(scene, sampler), checks=checks), steps, also)
+        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, also)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""

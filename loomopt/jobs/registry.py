@@ -9,9 +9,8 @@ import importlib
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt import packaged
 from loomopt.effects.kinds import Effect, ranked
@@ -21,6 +20,9 @@ from loomopt.scene_document import read_document
 from loomopt.scene_errors import unknown
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene, build
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
 """Groups of entry points."""
@@ -34,18 +36,18 @@ def own_names() -> tuple[str, ...]:
 
 
 @functools.cache
-def _points(group: str) -> tuple[EntryPoint, ...]:
+def _points(group: str) -> "tuple[EntryPoint, ...]":
     """Return the entry points of a group, by name; the same one found twice on the path counts once."""
     from importlib.metadata import entry_points
 
     return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
 
 
-def _distribution(point: EntryPoint) -> str:
+def _distribution(point: "EntryPoint") -> str:
     return point.dist.name if point.dist else point.value
 
 
-def _single(group: str, name: str, what: str) -> EntryPoint | None:
+def _single(group: str, name: str, what: str) -> "EntryPoint | None":
     """Return the one entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
     points = [point for point in _points(group) if point.name == name]
     if len(points) > 1:
@@ -54,7 +56,7 @@ def _single(group: str, name: str, what: str) -> EntryPoint | None:
     return points[0] if points else None
 
 
-def _loaded(point: EntryPoint, what: str, kind: type, name: str) -> Any:
+def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
     """Return what an entry point names. Raises BadInput, naming its distribution, where that fails or is another."""
     try:
         found = point.load()
@@ -68,7 +70,7 @@ def _loaded(point: EntryPoint, what: str, kind: type, name: str) -> Any:
     return found
 
 
-def _useless(point: EntryPoint, what: str, why: str) -> BadInput:
+def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
     problem = f"{what} {point.name} of {_distribution(point)} {why}"
     return BadInput(problem, key=point.name, value=point.value, remedy="Mend or uninstall it")
 

@@ -5,7 +5,7 @@ the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cr
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number, numpy
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Lengths:
+class Lengths(NamedTuple):
     """Link lengths of one number system; side: +1 or −1."""
 
     l1: Number

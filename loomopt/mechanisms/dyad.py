@@ -4,21 +4,19 @@ All lengths in one unit, angles in rad, derivatives with respect to the crank an
 of P1→P2, −1 to the right; it never flips while the dyad's triangle keeps its area.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from loomopt.maths import Maths, Number
 
 
-@dataclass(frozen=True)
-class Vector:
+class Vector(NamedTuple):
     """A plane vector; x and y of any number system and shape."""
 
     x: Number
     y: Number
 
 
-@dataclass(frozen=True)
-class Dyad:
+class Dyad(NamedTuple):
     """A closed dyad.
 
     link1, link2: vectors P1→C and P2→C; area4: side × four times the triangle's area (= 2 link1 × link2).

@@ -6,7 +6,8 @@ the design just reached, in plain NumPy, and between any two nodes.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,7 @@ Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """Where a round begins: variables, SI, with the extremes there; nodes to solve at.
 
     raw: multipliers to start warm from, if any; extra: the epigraph or elastic variables, None where nothing is known.
@@ -41,8 +41,7 @@ class _Place:
     extra: Floats | None
 
 
-@dataclass(frozen=True)
-class _Round:
+class _Round(NamedTuple):
     """What a round gave: IPOPT's answer, and where the next one begins.
 
     reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; iterations: of all

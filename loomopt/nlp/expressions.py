@@ -2,8 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.balance import total
 from loomopt.maths import Number
@@ -17,8 +16,7 @@ from loomopt.program.reading import Rows
 from loomopt.schema import Values
 
 
-@dataclass(frozen=True)
-class Expressions:
+class Expressions(NamedTuple):
     """x: the design's variables and the extra ones, scaled; p: parameters; f: objective; g: rows, each ≤ 0 or = 0.
 
     lifts: variables beside x that rows read.

@@ -5,22 +5,20 @@ whose worst counts, and one family of rows for each whole-cycle quantity [Boyd a
 section 4.1.3; Hettich and Kortanek, Semi-infinite programming, SIAM Review 35 (1993)].
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from loomopt.cycle import Where
 from loomopt.program.program import Program
 
 
-@dataclass(frozen=True)
-class Epigraph:
+class Epigraph(NamedTuple):
     """A variable above all rows of one group of an objective; objective: its place in the program."""
 
     objective: int
     rows: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place."""
 
     row: str

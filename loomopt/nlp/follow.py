@@ -6,7 +6,8 @@ method for semi-infinite programs with a fixed number of nodes [Hettich and Kort
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,7 @@ Nodes = Sequence[Sequence[Extreme]]
 """Nodes of each family."""
 
 
-@dataclass(frozen=True)
-class _Change:
+class _Change(NamedTuple):
     """What binding nodes did in a round: where each stood on its piece, and how far the extreme has moved from it."""
 
     u: Floats
@@ -82,7 +82,7 @@ def _aimed(
         share = float(turned @ change.move / (turned @ turned))
         goals = change.u + change.move - share * (change.u - last.u + turned)
         aims = {id(now): min(max(float(to), 0.0), 1.0) for now, to in zip(binding, goals, strict=True)}
-    return tuple(tuple(replace(e, u=aims.get(id(e), e.u)) for e in of) for of in extremes)
+    return tuple(tuple(e._replace(u=aims.get(id(e), e.u)) for e in of) for of in extremes)
 
 
 def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:

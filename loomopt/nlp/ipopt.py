@@ -1,7 +1,7 @@
 """How IPOPT is asked to work, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 """What IPOPT says when its callback raised, or asked it to stop."""
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What IPOPT said.
 
     extra: the epigraph or elastic variables; raw: its multipliers and `extra` again, nothing where it did not run.

@@ -8,7 +8,6 @@ put: steps are the least that do.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -46,8 +45,7 @@ class Derivatives(Protocol):
         """(x, p, weight of the objective, multipliers of rows) → the Lagrangian's second derivatives, upper half."""
 
 
-@dataclass(frozen=True)
-class Reached:
+class Reached(NamedTuple):
     """A KKT point: x scaled; which limits are active, and the multipliers of all, 0 for those that are not."""
 
     x: Floats
@@ -55,8 +53,7 @@ class Reached:
     multipliers: Floats
 
 
-@dataclass(frozen=True)
-class _Problem:
+class _Problem(NamedTuple):
     """An NLP with its numbers; firm: limits that are active whatever their multiplier: equalities, held variables."""
 
     nlp: Derivatives
@@ -64,8 +61,7 @@ class _Problem:
     firm: Flags
 
 
-@dataclass(frozen=True)
-class _Meeting:
+class _Meeting(NamedTuple):
     """Where the active limits meet: all limits' excess and slopes there."""
 
     x: Floats
@@ -79,8 +75,7 @@ class _Meeting:
         return np.flatnonzero(self.active)
 
 
-@dataclass(frozen=True)
-class _Priced:
+class _Priced(NamedTuple):
     """A meeting with the multipliers of its active limits, and what slope of the objective they leave."""
 
     at: _Meeting

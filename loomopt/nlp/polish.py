@@ -5,8 +5,7 @@ IPOPT stops a hair inside its bounds. Where rows and bounds carry multipliers, N
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +29,7 @@ Nodes = Sequence[Sequence[Extreme]]
 Flags = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Binding:
+class Binding(NamedTuple):
     """Which rows and bounds bind, from multipliers: positive at an upper bound, negative at a lower one."""
 
     rows: Flags

@@ -48,7 +48,7 @@ class Quantities:
         found = model.given(replace(maths.casadi(), choose=chosen), symbols)
         pairs = zip((found, *found.cases), (given, *given.cases), strict=True)
         first, *others = [Given(self._shared(one.values, worth.values), one.own) for one, worth in pairs]
-        self.given, self._traces_of = given, replace(first, cases=tuple(others))
+        self.given, self._traces_of = given, first._replace(cases=tuple(others))
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 

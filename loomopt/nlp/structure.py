@@ -7,6 +7,7 @@ through a few slots, each a node that the exchange fills; an unused slot weighs 
 import functools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +23,7 @@ from loomopt.program.reading import DATUM, quadrature
 from loomopt.program.sampling import Extreme, Sampler
 
 
-@dataclass(frozen=True)
-class NodeParameters:
+class NodeParameters(NamedTuple):
     """A node as parameters: offsets of width and angle, a coefficient of each corner in either, then the switches."""
 
     corners: int

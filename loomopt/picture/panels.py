@@ -2,15 +2,16 @@
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from loomopt.frozen import Frozen
 
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
 ANGLE = "phi [rad]"
 """The column all others are drawn over."""
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """A point of a curve that is named: crank angle, rad, and value, SI."""
 
     phi: float
@@ -18,8 +19,7 @@ class Mark:
     text: str
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """One panel: columns of one unit, such as "N [N]", in order; a single one gives the panel its name.
 
     levels: what a horizontal line says → where, SI; points: named points of the curves.
@@ -28,7 +28,7 @@ class Panel:
 
     columns: tuple[str, ...]
     name: str = ""
-    levels: Mapping[str, float] = field(default_factory=dict)
+    levels: Mapping[str, float] = Frozen()
     points: tuple[Mark, ...] = ()
     wide: bool = False
     today: bool = False

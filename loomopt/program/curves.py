@@ -1,12 +1,13 @@
 """Curves over the cycle, written once: the motion as a job names it, each effect's term, force, torque, checks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from loomopt import maths
 from loomopt.cycle import TURN, Floats, Pieces
+from loomopt.frozen import Frozen
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
 from loomopt.tolerances import SAME_ROW
@@ -16,8 +17,7 @@ STEPS = 720
 ANGLE = "phi [rad]"
 
 
-@dataclass(frozen=True)
-class Columns:
+class Columns(NamedTuple):
     """What curves show.
 
     motion: column name with unit → formula. force: column of the output force, and the quantity (of which sign) that
@@ -30,8 +30,8 @@ class Columns:
     unit: str
     force: tuple[str, Formula] | None = None
     torque: tuple[str, Formula] | None = None
-    after: Mapping[str, Formula] = field(default_factory=dict)
-    checks: Mapping[str, str] = field(default_factory=dict)
+    after: Mapping[str, Formula] = Frozen()
+    checks: Mapping[str, str] = Frozen()
     also: tuple[float, ...] = ()
     closed: bool = False
 

@@ -1,8 +1,7 @@
 """The mechanism with its effects at one instant, and the formulas that are read there: quantities, rows, integrals."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt import balance
 from loomopt.balance import Given
@@ -65,8 +64,7 @@ class Instant:
 Formula = Callable[[Instant], Number]
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """A whole-cycle quantity; figure: whether its largest |value| is one.
 
     signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
@@ -79,8 +77,7 @@ class Quantity:
     bounded: bool = False
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
 
     formula: Formula
@@ -88,8 +85,7 @@ class Row:
     event: str = ""
 
 
-@dataclass(frozen=True)
-class Integral:
+class Integral(NamedTuple):
     """A mean of `quantity` over the crank angle; root: its square root.
 
     Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Motion
+from loomopt.frozen import Frozen
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import spikes
@@ -21,8 +21,7 @@ OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """Links that close a triangle at every crank angle, and what follows from that.
 
     quantities: over the cycle: the squares of the base over what the links span (1 where they are stretched or folded:
@@ -33,7 +32,7 @@ class Group:
 
     quantities: Mapping[str, OfPhi]
     closes: Mapping[str, str]
-    rows: Mapping[str, Callable[[Maths, Values], Number]] = field(default_factory=dict)
+    rows: Mapping[str, Callable[[Maths, Values], Number]] = Frozen()
     margins: tuple[str, ...] = ()
     closest: tuple[float, ...] = ()
 
@@ -59,8 +58,7 @@ def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
     return (spikes.sectioned(height, top - step, top + step),)
 
 
-@dataclass(frozen=True)
-class Chain:
+class Chain(NamedTuple):
     """Derived values of which each follows from a few before it: an NLP may have them for variables, and sparse rows.
 
     roots: numbers they follow from in the end; follow(maths, values): each from roots and values before it, by name in
@@ -74,8 +72,7 @@ class Chain:
     stations: tuple[Values, ...]
 
 
-@dataclass(frozen=True)
-class Arcs:
+class Arcs(NamedTuple):
     """Stretches of the cycle that limits speak of; switch: as a load's, of its own corners' angles, rad."""
 
     name: str

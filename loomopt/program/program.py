@@ -6,7 +6,7 @@ serves every scene of the same structure.
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from loomopt.cycle import Where
 from loomopt.lazy import lazy
@@ -106,8 +106,7 @@ class Objective:
         return self.form == "value" and len(self.groups) == len(self.rows)
 
 
-@dataclass(frozen=True)
-class Wish:
+class Wish(NamedTuple):
     """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
 
     when, above: it holds where that variable exceeds that value, SI; "" for always.
@@ -119,8 +118,7 @@ class Wish:
     above: float = 0.0
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """A direction that may leave everything unchanged, along straight lines in the NLP's variables.
 
     kind "scale": all of `along` grow in proportion; "axis": each of `along` changes by itself.

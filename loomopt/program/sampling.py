@@ -3,7 +3,7 @@
 import functools
 from array import array
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
 
 
-@dataclass(frozen=True)
-class Extreme:
+class Extreme(NamedTuple):
     """A local extreme of |quantity|: where, and the value with its sign, SI; signed: of the quantity as it is."""
 
     piece: int

@@ -1,17 +1,16 @@
 """What studies read of a job: its targets, peaks and closed forms, said by the job itself."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from loomopt.frozen import Frozen
 from loomopt.maths import Number
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
 
 
-@dataclass(frozen=True)
-class Crossing:
+class Crossing(NamedTuple):
     """The first crank angle at which |quantity| passes a level: the figure that tells it, and the level's full name."""
 
     figure: str
@@ -19,8 +18,7 @@ class Crossing:
     level: str
 
 
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """Ever finer sets of designs that a target chooses from, such as laws of more and more intervals.
 
     method: what its ladder is called; target, key: whose scene key says how fine; limit(scene, x): the figure that
@@ -33,8 +31,7 @@ class Family:
     limit: "Callable[[Scene, Mapping[str, Number]], Number | None]"
 
 
-@dataclass(frozen=True)
-class Studied:
+class Studied(NamedTuple):
     """What a designer reads of a job.
 
     targets: the optima; peaks: figure → (quantity, whether its sign counts); static: figures of one position;
@@ -42,7 +39,7 @@ class Studied:
     """
 
     targets: tuple[str, ...]
-    peaks: Mapping[str, tuple[str, bool]] = field(default_factory=dict)
+    peaks: Mapping[str, tuple[str, bool]] = Frozen()
     static: tuple[str, ...] = ()
     motion: str = "q_2"
     crossing: Crossing | None = None

@@ -4,7 +4,6 @@
 that reads float64 can promise less than n ≈ 1.
 """
 
-import dataclasses
 import math
 
 import casadi as ca
@@ -165,7 +164,7 @@ SCANNED = [PAPER, Lengths(0.3, 0.95, 0.6, 1.0), Lengths(0.1, 0.3, 0.85, 1.0), Le
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("lengths", SCANNED)
 def test_dead_centres_are_the_extremes_of_a_dense_scan(lengths, side):
-    lengths = dataclasses.replace(lengths, side=side)
+    lengths = lengths._replace(side=side)
     phi, step = np.linspace(0, 2 * math.pi, 200_000, endpoint=False, retstep=True)
     psi = side * Pose(maths.numpy(), lengths, phi).psi
     centres = dead_centres(maths.FLOAT, lengths)
@@ -273,17 +272,20 @@ def test_synthesis_refuses_angles_of_no_crank_rocker(theta, beta, swing):
 @given(linkages(), angles, st.integers(-20, 20))
 @REPEATABLE
 def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
+    """But for one rounding: libm's atan2 of two doubled numbers may end beside that of the numbers themselves."""
     scaled = Lengths(*[*(length * 2.0**power for length in numbers(lengths)), lengths.side])
     first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, scaled, phi)
-    assert (first.psi, first.psi_1, first.psi_2) == (second.psi, second.psi_1, second.psi_2)
+    assert (first.psi_1, first.psi_2) == (second.psi_1, second.psi_2)
+    assert first.psi == pytest.approx(second.psi, rel=EPS, abs=0)
     one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, scaled)
-    assert [getattr(one, name) for name in CENTRES] == [getattr(two, name) for name in CENTRES]
+    for name in CENTRES:
+        assert getattr(one, name) == pytest.approx(getattr(two, name), rel=EPS, abs=0)
 
 
 @given(linkages(), angles)
 @REPEATABLE
 def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
-    mirrored = dataclasses.replace(lengths, side=-lengths.side)
+    mirrored = lengths._replace(side=-lengths.side)
     first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, mirrored, -phi)
     assert (second.psi, second.psi_1, second.psi_2) == (-first.psi, first.psi_1, -first.psi_2)
     one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, mirrored)

@@ -174,7 +174,7 @@ def gives_up(monkeypatch, moved=0.0):
     def given_up(*arguments):
         answer = ipopt.run(*arguments)
         x = {name: value + moved for name, value in answer.x.items()}
-        return replace(answer, status="Search_Direction_Becomes_Too_Small", x=x)
+        return answer._replace(status="Search_Direction_Becomes_Too_Small", x=x)
 
     monkeypatch.setattr(exchange, "run", given_up)
 

@@ -1,6 +1,5 @@
 """The rapier model: derivatives of the travel, turns that move with the drive, margins, dwells and events."""
 
-import dataclasses
 import functools
 import itertools
 import math
@@ -111,7 +110,7 @@ def test_a_span_is_one_where_the_five_bar_closes_with_the_margin_only():
         at = pose(maths.FLOAT, sampled.given, 1.0)
         base = math.hypot(at.joints.base.x, at.joints.base.y)
         l5 = base * ASSEMBLY_MARGIN - 0.185 if sign > 0 else base / ASSEMBLY_MARGIN + 0.185
-        given = dataclasses.replace(sampled.given, values={**sampled.given.values, "l5": l5})
+        given = sampled.given._replace(values={**sampled.given.values, "l5": l5})
         stands = functools.partial(pose, maths.FLOAT, sampled.given, 1.0)
         assert group.quantities[name](maths.FLOAT, given, 1.0, stands) == pytest.approx(1, rel=1e-13)
 
@@ -150,7 +149,7 @@ def test_forces_are_quantities_only_with_loads():
 
 def test_the_hand_over_is_read_only_where_a_target_speaks_of_it():
     sampled, model = JOB.sampler(SCENE, {}), JOB.program(SCENE, "stroke-dwell").model
-    given = dataclasses.replace(sampled.given, values={**sampled.given.values, "phi_stroke": 3.0})
+    given = sampled.given._replace(values={**sampled.given.values, "phi_stroke": 3.0})
     rows, at = model.static(maths.FLOAT, given, {}), pose(maths.FLOAT, sampled.given, 3.0)
     assert (rows["phi_stroke"], rows["rest"], rows["stroke_short"]) == (3.0, at.q1, at.q - 0.85)
     assert not {"phi_stroke", "rest", "stroke_short"} & set(sampled.static)
