@@ -12,6 +12,9 @@ from typing import Annotated, Any
 _COLLECTING = gc.isenabled()
 gc.disable()
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+# Threads of the linear algebra would wait for each other longer than matrices as small as these take.
+for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
 
 import typer  # noqa: E402
 

@@ -1,6 +1,7 @@
 """From the shell to the answer: nothing is imported that the command does not use, counted in modules."""
 
 import functools
+import os
 import subprocess
 import sys
 
@@ -84,3 +85,12 @@ def test_solving_the_beatup_imports_no_module_of_another_job_no_study_and_no_pic
     own = {module for module in modules if module.startswith("loomopt")}
     assert not {module for module in own if any(word in module for word in foreign)}
     assert len(own) <= OF_ONE_JOB
+
+
+@pytest.mark.parametrize(("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_otherwise(given, expected):
+    """Before NumPy is imported: afterwards it would not listen."""
+    script = "import sys, os, loomopt.cli; print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['MKL_NUM_THREADS'])"
+    own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**own, **given})
+    assert done.stdout.split() == [expected, "1"]

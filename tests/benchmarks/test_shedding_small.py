@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
-from test_benchmarks_small import FOLDER, least, rows, said
+from test_benchmarks_small import ATTEMPTS, FOLDER, least, rows, run, said
 
 import loomopt as lo
 
@@ -265,6 +265,19 @@ def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
         assert abs(row["off"]) < 1e-10, row
         assert max(row["contact lost"], row["law's faults"]) < 1e-10, row
         assert row["peak s''"] < BOUND * (1 + 1e-10), row
+
+
+def test_a_certified_law_takes_at_most_ten_times_ipopt_alone_on_an_nlp_written_for_it():
+    """And is the same optimum, from 16 to 256 intervals."""
+    ratios = [1e9] * 3
+    for attempt in range(ATTEMPTS):
+        found = (said(LAW) if attempt == 0 else run(LAW))["beside_ipopt_alone"]
+        assert [row["intervals"] for row in found] == [16, 64, 256]
+        assert max(abs(row["off IPOPT's"]) for row in found) < 1e-9
+        ratios = list(map(min, ratios, (row["ratio"] for row in found)))
+        if max(ratios) <= 10.0:
+            break
+    assert max(ratios) <= 10.0
 
 
 def test_a_free_law_of_16_intervals_needs_a_quarter_less_spring_than_the_softest_fixed_one():

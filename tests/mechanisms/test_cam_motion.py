@@ -8,7 +8,18 @@ import pytest
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_motion import Named, Spline, Tabulated, knots, mirrored, named_knots, piece_at, segment_at
+from loomopt.mechanisms.cam_motion import (
+    Column,
+    Named,
+    Spline,
+    Tabulated,
+    knots,
+    middle,
+    mirrored,
+    named_knots,
+    piece_at,
+    segment_at,
+)
 from loomopt.mechanisms.cam_spline import FALLS, FEWEST, MOST, cycloid_like
 
 POINTS = ([0, 0.2, 0.5, 0.8, 1], [0, 0.1, 0.5, 0.9, 1])
@@ -119,3 +130,61 @@ def test_the_least_slope_inside_an_interval_counts():
     dip = cam_spline._least_slope(made, 2)
     assert dip == pytest.approx(made.at(FLOAT, 0.5 + 1 / 32, 2).s1, rel=1e-14)
     assert dip < min(made.v[2:4])
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_each_knot_follows_from_the_one_before_it(mirror):
+    """With s and s' of all knots given, each is what one interval makes of the knot before."""
+    law, values = Spline(8, mirror), named_knots(cycloid_like(8))
+    own = law.prepared(FLOAT, values)
+    assert law.recurrent == tuple(name for k in range(1, 9) for name in (f"law_s_{k}", f"law_v_{k}"))
+    again = law.followed(FLOAT, {**values, **{name: own[name] for name in law.recurrent}})
+    assert tuple(again) == law.recurrent
+    assert again == pytest.approx({name: own[name] for name in law.recurrent}, abs=1e-15)
+    given = {name: 0.1 * k for k, name in enumerate(law.recurrent)}
+    read = law.prepared(FLOAT, {**values, **given})
+    assert {name: read[name] for name in law.recurrent} == given, "as they are"
+    assert (read["law_s_0"], read["law_v_0"]) == (0.0, 0.0)
+    for k in range(8):
+        made = [read[law.knot(of, place)] for of, place in (("s", k), ("v", k), ("a", k), ("a", k + 1))]
+        ends = cam_spline.cubic(1.0, 8, *made)
+        followed = law.followed(FLOAT, {**values, **given})
+        assert (followed[law.knot("s", k + 1)], followed[law.knot("v", k + 1)]) == pytest.approx(ends[:2], abs=1e-14)
+
+
+def test_a_choice_among_knots_reads_one():
+    class Counted(dict[str, float]):
+        reads = 0
+
+        def __getitem__(self, name):
+            self.reads += 1
+            return super().__getitem__(name)
+
+    law = Spline(256)
+    counted = Counted(law.prepared(FLOAT, named_knots(cycloid_like(256))))
+    law.at(FLOAT, counted, 0.3, 76)
+    assert counted.reads == 4
+    column = Column(counted, law.knots["s"])
+    assert (len(column), list(column)) == (257, [counted[name] for name in law.knots["s"]])
+
+
+@pytest.mark.parametrize(
+    "law", [Spline(5), Spline(16), Spline(256), Tabulated(cam_spline.tabulated(*POINTS)), Named("modified_trapezoid")]
+)
+def test_the_middle_is_where_the_law_passes_a_half_on_its_piece(law):
+    n = getattr(law, "intervals", 0)
+    bends = [value * (1.4 if k < n / 2 else 0.7) for k, value in enumerate(cycloid_like(n))] if n else []
+    height = cam_spline.spline(FLOAT, bends).end[0] if n else 1.0
+    values = law.prepared(FLOAT, named_knots([bend / height for bend in bends]))
+    u, piece = middle(law, values)
+    ends = [0.0, *map(float, law.breaks), 1.0]
+    assert ends[int(piece)] <= u <= ends[int(piece) + 1]
+    assert law.at(FLOAT, values, u, piece).s == pytest.approx(0.5, abs=1e-15)
+
+
+def test_pieces_of_many_knots_are_counted_on_either_side():
+    values = {"rise": 2.0, "return": 1.5, "begin.near": 6.0}
+    breaks = mirrored(values, [Fraction(k, 64) for k in range(1, 64)])
+    for angle in [k / 50 for k in range(314)]:
+        rise, back = (angle >= place for place in breaks[:63]), (angle >= place for place in breaks[63:])
+        assert piece_at(angle, breaks) == sum(rise) - sum(back)

@@ -7,7 +7,7 @@ import pytest
 
 from loomopt.cycle import TURN
 from loomopt.jobs import registry
-from loomopt.program.sampling import CHUNK
+from loomopt.program.sampling import CHUNK, Sampler
 
 POINTS = 1_000_000
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
@@ -136,6 +136,21 @@ def test_the_grid_holds_both_ends_of_every_piece_and_enough_points_of_the_narrow
         assert (own[0], own[-1]) == (0.0, 1.0)
         assert len(own) >= 91
         assert np.max(np.diff(own)) * np.diff(sampled.cycle.starts)[piece] <= TURN / 720 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(("intervals", "least"), [(4, 91), (16, 41), (64, 11), (256, 9)])
+def test_many_pieces_share_their_samples(intervals, least):
+    """A free law of 256 intervals has 516 pieces: no more than eight nodes of one of them beside its ends."""
+    freed = registry.load("shedding").set("targets.law.intervals", intervals)
+    task = registry.of(freed).program(freed, "law")
+    sampled = Sampler(task.model, {**task.parameters, **task.starts[0]})
+    pieces, u = sampled.grid(720)
+    counts = np.bincount(pieces)
+    assert len(counts) == sampled.cycle.pieces == 2 * intervals + 2 + 2
+    assert counts.min() == least
+    assert np.all(counts >= np.ceil(720 * np.diff(sampled.cycle.starts) / TURN) + 1)
+    assert set(u[np.cumsum(counts) - 1]) == {1.0}
+    assert len(u) <= 2 * 720 + 720 + 9 * len(counts)
 
 
 def test_a_quantity_that_is_zero_everywhere_has_a_peak_of_zero():

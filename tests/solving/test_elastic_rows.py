@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Point, Settings
@@ -42,6 +43,20 @@ def test_single_values_come_first_and_each_whole_cycle_limit_has_a_row_per_slot(
     assert priced(made, first) == ("w <= 0.25",)
     assert PRICED == 1e-6
     assert priced(made, [PRICED, PRICED * 1.001, *none[2:]]) == ("y <= 1",)
+
+
+def test_rows_at_corners_are_priced_with_their_limit():
+    """A free law with a demand: rows of it and, hidden, of contact at 22 knots each, then slots."""
+    scene = registry.load("shedding").update({"targets.law.intervals": 12, "operation.N_min": "100 N"})
+    made = registry.of(scene).program(scene, "law")
+    single = [limit for limit in made.limits if limit.family != "cycle"]
+    demand, contact = (made.limits[family.limit] for family in families(made, elastic=True))
+    assert (demand.hidden, contact.hidden) == (False, True)
+    for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
+        prices = np.zeros(len(single) + 2 * 22 + 2 * 2)
+        prices[len(single) + place] = 1.0
+        point = Point({}, "", True, raw={"lam_g": prices})
+        assert elastic._priced(made, point, Words(scene)) == (("N_min >= 100 N",) if named else ()), place
 
 
 def test_without_multipliers_nothing_has_a_price():

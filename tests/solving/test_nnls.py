@@ -64,3 +64,32 @@ def test_free_signs_are_pairs_of_columns():
     plus, second, minus = nnls(np.column_stack([matrix, -matrix[:, 0]]), matrix @ np.array([-5.0, 2.0]))
     assert plus - minus == pytest.approx(-5.0, abs=1e-10)
     assert second == pytest.approx(2.0, abs=1e-10)
+
+
+def test_many_multipliers_are_found_to_their_last_digits():
+    """A free cam law of 256 intervals has as many in use as it has variables, but a few."""
+    generator = np.random.default_rng(7)
+    matrix, wanted = generator.normal(size=(130, 125)), np.zeros(125)
+    used = generator.permutation(125)[:120]
+    wanted[used] = generator.uniform(0.01, 2.0, size=120)
+    found = nnls(matrix, matrix @ wanted)
+    assert set(np.flatnonzero(found)) == set(used)
+    assert found == pytest.approx(wanted, rel=1e-12)
+
+
+def test_columns_that_nearly_depend_on_each_other_are_solved_to_the_residual_scipy_finds():
+    generator = np.random.default_rng(3)
+    matrix = generator.normal(size=(30, 60))
+    matrix[:, 30:] = matrix[:, :30] + 1e-9 * generator.normal(size=(30, 30))
+    target = generator.normal(size=30)
+    ours = np.linalg.norm(matrix @ nnls(matrix, target) - target)
+    assert ours == pytest.approx(scipy.optimize.nnls(matrix, target)[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("what", ["matrix", "target"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_no_number_is_refused(what, value):
+    matrix, target = problem(0, 4, 6)
+    (matrix if what == "matrix" else target)[..., 1] = value
+    with pytest.raises(ArithmeticError, match="no number"):
+        nnls(matrix, target)

@@ -88,6 +88,30 @@ def test_it_is_so_with_16_intervals(travel, name):
     assert answer.figures["K1"] == pytest.approx(OTHER_DIGITS[travel, name], rel=1e-9)
 
 
+LARGE = {
+    ("65.6 mm", 64, True): 67768.4923010013,
+    ("65.6 mm", 256, False): 50164.62007398059,
+    ("14.5 mm", 256, True): 24477.086000420317,
+}
+
+
+@pytest.mark.parametrize(("travel", "n", "symmetric"), LARGE)
+def test_laws_of_many_intervals_are_those_of_the_linear_programmes_too(travel, n, symmetric):
+    answer = freed(TRAVELS[travel], n, symmetric)
+    assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
+    assert answer.figures["K1"] == pytest.approx(LARGE[travel, n, symmetric], rel=1e-12)
+    assert len(answer.design["law"]) == n + 1
+    assert answer.solver["iterations"] < 60
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_they_are_with_every_effect(name):
+    case = replace(PRINTED, **OTHERS[name])
+    answer = freed(case, 64)
+    assert answer.status == "optimal"
+    assert answer.figures["K1"] == pytest.approx(programmed(case, 64), rel=1e-12)
+
+
 def test_the_law_converges_with_the_intervals_at_first_order():
     """The limit law jumps between the bounds of s'': the fall shrinks by 2 with each doubling, from above."""
     K1 = [freed(PRINTED, n, True).figures["K1"] for n in (8, 16, 32)]

@@ -1,0 +1,112 @@
+"""A program of steps that follow one after the other: as a chain that an NLP may lift, and without one."""
+
+import bisect
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from loomopt.balance import Given
+from loomopt.cycle import TURN, Node
+from loomopt.effects.kinds import Motion
+from loomopt.maths import Maths, Number
+from loomopt.program.kinematics import Arcs, Chain, Group
+from loomopt.program.model import JobModel, Quantity, Row
+from loomopt.program.program import Limit, Objective, Program, Variable
+from loomopt.schema import Values
+
+COUNT = 12
+NAMES = tuple(f"x{k}" for k in range(COUNT))
+HEIGHTS = tuple(f"h{k}" for k in range(COUNT))
+STEP, RAISED = "step", "raised"
+HALF = 0.1, 3.3
+"""Crank angles, rad, between which waves are raised: from step 1 to step 6 where steps begin."""
+
+
+def heights(maths: Maths, values: Values, bend: float) -> dict[str, Number]:
+    """Return h of every step, which follows from the one before: h' = h/2 + bend h² + x."""
+    found: dict[str, Number] = {}
+    before = maths.number(0.0)
+    for name, own in zip(HEIGHTS, NAMES, strict=True):
+        found[name] = before / 2 + bend * before**2 + values[own]
+        before = values.get(name, found[name])
+    return found
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Twelve steps of one turn; bend: of what each follows from; lifted: whether they are told as a chain."""
+
+    bend: float
+    lifted: bool
+    structure: tuple[object, ...] = ()
+    groups: Mapping[str, Group] = field(default_factory=dict)
+    breaks: frozenset[str] = frozenset()
+
+    @property
+    def arcs(self) -> tuple[Arcs, ...]:
+        """One stretch for each step, after those of the half of the turn that is raised."""
+        stations = tuple({STEP: float(k)} for k in range(COUNT))
+        follow = Chain(frozenset(NAMES), HEIGHTS, lambda m, v: heights(m, v, self.bend), stations)
+        raised = Arcs(RAISED, lambda maths, given: tuple(map(maths.number, HALF)), raised_at)
+        return raised, Arcs(STEP, corners, step_at, chain=follow if self.lifted else None)
+
+    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Values:
+        return {**heights(maths, values, self.bend), **{name: values[name] for name in HEIGHTS if name in values}}
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        return {}
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> Motion:
+        raise NotImplementedError
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Motion:
+        raise NotImplementedError
+
+    def events(self, maths: Maths, given: Given) -> Values:
+        return {}
+
+
+def corners(maths: Maths, given: Given) -> tuple[Number, ...]:
+    return tuple(maths.number(k * TURN / COUNT) for k in range(COUNT))
+
+
+def raised_at(angle: float, angles: tuple[float, ...]) -> float:
+    return float(angles[0] <= angle % TURN < angles[1])
+
+
+def step_at(angle: float, angles: tuple[float, ...]) -> float:
+    return float(bisect.bisect_right(angles, angle % TURN) - 1)
+
+
+def wave(at):
+    """Return the height, from step to step without a jump, times a wave that is 1 where they begin, raised or not."""
+    step, raised = (at.node.switch[name] for name in (STEP, RAISED))
+    columns = HEIGHTS, (*HEIGHTS[1:], HEIGHTS[0])
+    begin, end = (at.maths.choose(step, [at.values[name] for name in names]) for names in columns)
+    share = COUNT * at.node.phi / TURN - step
+    factor = at.maths.choose(raised, (1, at.values["raise"])) * (1 + (at.maths.cos(COUNT * at.node.phi) - 1) / 10)
+    return (begin + share * (end - begin)) * factor
+
+
+def swing(at):
+    return wave(at) + at.values["x0"] ** 2 / 4
+
+
+def model(bend=0.0, lifted=True):
+    """Return the model: whole-cycle quantities wave (signed) and swing, rows of every step's height and a bowl."""
+    rows = {name: Row(lambda at, name=name: at.values[name]) for name in HEIGHTS}
+    rows["bowl"] = Row(lambda at: sum((at.values[name] - 2) ** 2 for name in NAMES) + at.values[HEIGHTS[-1]])
+    quantities = {"wave": Quantity(wave, signed=True), "swing": Quantity(swing)}
+    return JobModel(Steps(bend, lifted, ("steps", bend, lifted)), own_quantities=quantities, own_rows=rows)
+
+
+def program(bend=0.0, lifted=True, limits=(("wave", 1, 1.5), ("h3", 1, 1.2)), where=None):
+    """Return the least bowl below limits (row, sign, value)."""
+    variables = tuple(Variable(name, -10.0, 10.0, 2.0, (-1.0, 1.0)) for name in NAMES)
+    rows = tuple(
+        Limit(row, sign, row, value, 1.0, "cycle" if row in ("wave", "swing") else "static", where=where)
+        for row, sign, value in limits
+    )
+    start = {name: 0.1 * k for k, name in enumerate(NAMES)}
+    return Program(
+        model(bend, lifted), variables, {"raise": 1.25}, rows, (Objective("bowl", "bowl", "value", 1.0),), (start,)
+    )
