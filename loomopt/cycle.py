@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.schema import Values
 from loomopt.tolerances import SAME_ANGLE
@@ -51,7 +52,12 @@ class Cycle:
 
     def switch(self, pieces: Pieces | int) -> dict[str, Number]:
         """Return the switches on a piece, or on each of several, by name."""
-        return dict(zip(self.names, self.switches[pieces].T, strict=True))
+        return {name: column[pieces] for name, column in zip(self.names, self._columns, strict=True)}
+
+    @lazy
+    def _columns(self) -> Floats:
+        """The switches by name: what is taken from a column stands together in memory."""
+        return np.ascontiguousarray(self.switches.T)
 
     def on(self, where: Where | None) -> NDArray[np.bool_]:
         """Say of each piece whether it is meant; all are without `where`."""

@@ -1,4 +1,4 @@
-"""The number systems one formula runs in: float, NumPy arrays, jets, CasADi symbols, mpmath, SymPy, balls.
+"""The number systems one formula runs in: float, NumPy arrays, jets, CasADi symbols, mpmath, SymPy, balls, recordings.
 
 A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
 integers, so it is written once. Each system is imported only when it is asked for.
@@ -9,19 +9,27 @@ import importlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from loomopt.tracing import Tape
 
 Number = Any
 """A value of any number system: the one type formulas are written over."""
 
 
-@dataclass(frozen=True)
+def _as_it_is(x: Number) -> Number:
+    return x
+
+
+@dataclass(frozen=True, eq=False)
 class Maths:
     """One number system.
 
     sin, cos, sqrt: functions of one number; atan2(y, x): angle in (−π, π]; pi: the system's own π.
     number(x): the system's own copy of a float64, exact in every system.
     choose(place, values): the value at a place that is data of a node (0, 1, 2 ... as numbers), never of the design.
+    constant(x): a scalar in the form in which arithmetic with what varies is quickest; the results are the same bits.
     """
 
     name: str
@@ -32,6 +40,7 @@ class Maths:
     pi: Number
     number: Callable[[float], Number]
     choose: Callable[[Number, Sequence[Number]], Number]
+    constant: Callable[[Number], Number] = _as_it_is
 
 
 def _chosen(place: Number, values: Sequence[Number]) -> Number:
@@ -42,19 +51,32 @@ FLOAT = Maths("float", math.sin, math.cos, math.sqrt, math.atan2, math.pi, float
 """Plain float64 scalars: several times faster than NumPy on one angle."""
 
 
+FEW, CHOICES = 1024, 16
+"""Places up to which NumPy's own choice is quicker than one mask for each value, and values that it takes in every
+version (31)."""
+
+
 @functools.cache
 def numpy() -> Maths:
     """Arrays of float64, any shape."""
     import numpy as np
 
     def choose(place: Number, values: Sequence[Number]) -> Number:
-        stacked = np.array(np.broadcast_arrays(*values))
+        if not any(isinstance(value, np.ndarray) and value.ndim for value in values):
+            return np.array(values, dtype=np.float64)[np.asarray(place, dtype=np.intp)]
         places = np.asarray(place, dtype=np.intp)
-        if stacked.ndim == 1:
-            return stacked[places]
-        return np.take_along_axis(stacked, np.broadcast_to(places, stacked.shape[1:])[None], axis=0)[0]
+        if places.size <= FEW and len(values) <= CHOICES:
+            return np.choose(places, values)
+        found: Number = math.nan
+        for k, value in enumerate(values):
+            found = np.where(places == k, value, found)
+        return found
 
-    return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64, choose)
+    def constant(x: Number) -> Number:
+        # An array without axes saves NumPy the conversion of a scalar in every operation: half the time of a short one.
+        return np.asarray(x, dtype=np.float64) if isinstance(x, int | float) else x
+
+    return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64, choose, constant)
 
 
 @functools.cache
@@ -63,6 +85,17 @@ def jets() -> Maths:
     from loomopt import jets
 
     return Maths("jets", jets.sin, jets.cos, jets.sqrt, jets.atan2, math.pi, float, jets.chosen)
+
+
+def recorded(tape: "Tape", system: int = 0) -> Maths:
+    """Numbers that record on a tape what is done with them; system: what they stand for, by its place in `Program`."""
+
+    def function(name: str) -> Callable[..., Number]:
+        return functools.partial(tape.call, system, name)
+
+    sin, cos, sqrt, atan2, number = map(function, ("sin", "cos", "sqrt", "atan2", "number"))
+    pi = tape.record(f"pi_{system}")
+    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, functools.partial(tape.choose, system))
 
 
 @functools.cache
@@ -112,6 +145,10 @@ def balls() -> Maths:
         slope = (x * y.derivative() - y * x.derivative()) / (x * x + y * y)
         return arb.atan2(y[0], x[0]) + slope.integral()
 
+    def constant(x: Number) -> Number:
+        # Between two series nothing is converted: a third of the time.
+        return series([x], ORDER) if isinstance(x, int | float | arb) else x
+
     return Maths(
         "balls",
         lambda x: x.sin(),
@@ -121,6 +158,7 @@ def balls() -> Maths:
         arb.pi(),
         arb,
         lambda place, values: values[int(float(place))],
+        constant,
     )
 
 

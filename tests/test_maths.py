@@ -140,6 +140,31 @@ def test_numpy_chooses_one_of_whole_columns():
     assert np.array_equal(found, [0.0, 5.0, 2 / 3, 5.0])
 
 
+@pytest.mark.parametrize("count", [3, 40])
+@pytest.mark.parametrize("nodes", [1, 30, 5000])
+def test_numpy_chooses_among_few_and_many_at_few_nodes_and_many(nodes, count):
+    """Value by value as lists do; numbers that are no arrays become floats, and what is not chosen may be no number."""
+    drawn = np.random.default_rng(nodes)
+    places = drawn.integers(1, count, nodes).astype(float)
+    columns = [np.full(nodes, np.nan), *drawn.random((count - 2, nodes)), 7]
+    found = maths.numpy().choose(places, columns)
+    assert found.tolist() == [float(np.broadcast_to(columns[int(k)], nodes)[n]) for n, k in enumerate(places)]
+    assert found.dtype == np.float64
+    assert maths.numpy().choose(places, range(count)).tolist() == places.tolist()
+
+
+def test_a_constant_is_the_same_number():
+    """In the form that arithmetic is quickest with; what is no scalar stays what it is."""
+    for system in SCALAR:
+        own = system.number(0.1)
+        assert float(system.constant(own) - own if system.name != "balls" else (system.constant(own) - own)[0]) == 0.0
+    column = np.array([[1.0], [2.0]])
+    assert maths.numpy().constant(column) is column
+    assert maths.numpy().constant(3).shape == ()
+    series = maths.ball_series(0.5, 0.1)
+    assert maths.balls().constant(series) is series
+
+
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX])
 def test_casadi_chooses_by_a_symbol_and_only_the_chosen_moves(kind):
     """The slope is that of the chosen value; the place itself has none."""

@@ -1,12 +1,12 @@
 """What a mechanism offers a job: poses, events by name, and groups of links that must close."""
 
+import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Motion
@@ -19,6 +19,8 @@ from loomopt.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR, SINGULAR_SAMPLE
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""
+Squares = Callable[[tuple[str, ...], Floats], Sequence[Floats]]
+"""squares(names, phi): whole-cycle quantities at crank angles, rad."""
 
 
 class Group(NamedTuple):
@@ -36,26 +38,29 @@ class Group(NamedTuple):
     margins: tuple[str, ...] = ()
     closest: tuple[float, ...] = ()
 
-    def singular(self, given: Given, pose: Callable[[Floats], Any]) -> tuple[float, ...]:
-        """Return the crank angles, rad, where the links nearly fold or stretch; pose(phi): the mechanism's."""
-        found: list[float] = []
-        for name in self.closes.values():
-
-            def height(at: Floats, name: str = name) -> Floats:
-                return np.asarray(self.quantities[name](maths.numpy(), given, at, lambda: pose(at)))
-
-            tops = self.closest or _tops(height)
-            found += [top for top in tops if height(np.array([top]))[0] > (1 - NEARLY_SINGULAR) ** 2]
-        return tuple(dict.fromkeys(found))
+    def singular(self, prefix: str, squares: Squares) -> tuple[float, ...]:
+        """Return the crank angles, rad, where the links nearly fold or stretch; prefix: what their quantities have."""
+        own = functools.partial(squares, tuple(prefix + name for name in self.closes.values()))
+        if self.closest:
+            tops = [pair for values in own(np.array(self.closest)) for pair in zip(self.closest, values, strict=True)]
+        else:
+            tops = list(_tops(own))
+        return tuple(dict.fromkeys(top for top, square in tops if square > (1 - NEARLY_SINGULAR) ** 2))
 
 
-def _tops(height: Callable[[Floats], Floats]) -> tuple[float, ...]:
-    """Return the crank angle, rad, of the highest value where it is worth a closer look."""
+def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float, float]]:
+    """Yield the crank angle, rad, of each quantity's highest value where that is worth a closer look, and the value."""
     angles = np.linspace(0.0, 2 * math.pi, SINGULAR_SAMPLES)
-    top, step = float(angles[int(np.argmax(height(angles)))]), 2 * math.pi / (SINGULAR_SAMPLES - 1)
-    if height(np.array([top]))[0] <= 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
-        return ()
-    return (spikes.sectioned(height, top - step, top + step),)
+    step = 2 * math.pi / (SINGULAR_SAMPLES - 1)
+    for k, sampled in enumerate(squares(angles)):
+
+        def height(at: Floats, k: int = k) -> Floats:
+            return squares(at)[k]
+
+        top = int(np.argmax(sampled))
+        if sampled[top] > 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
+            found = spikes.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
+            yield found, float(height(np.array([found]))[0])
 
 
 class Chain(NamedTuple):

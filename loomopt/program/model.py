@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 from loomopt import balance, cycle
 from loomopt.balance import Acting, Given
-from loomopt.cycle import Cycle, Floats, Node, Where
-from loomopt.effects.kinds import Check, Demand, Effect, Load, Motion, State
+from loomopt.cycle import Cycle, Node, Where
+from loomopt.effects.kinds import Check, Demand, Effect, Load, State
 from loomopt.lazy import lazy
-from loomopt.maths import Maths, Number, numpy
+from loomopt.maths import Maths, Number
 from loomopt.owned import label, owned
 from loomopt.program import formulas
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
-from loomopt.program.kinematics import Arcs, Kinematics
+from loomopt.program.kinematics import Arcs, Kinematics, Squares
 from loomopt.schema import Values
 
 __all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
@@ -75,6 +75,11 @@ class JobModel:
     def labels(self) -> dict[str, str]:
         """Full name of every number of the effects' tables → what a designer calls it."""
         return {owned(effect, key): label(effect, key) for effect in self.effects for key in effect.own.model_fields}
+
+    @lazy
+    def _full(self) -> dict[str, dict[str, str]]:
+        """Keys of each effect's table with the full names of their numbers."""
+        return {each.name: {key: owned(each, key) for key in each.own.model_fields} for each in self.effects}
 
     def words_of(self, effect: str) -> dict[str, str]:
         """Return the words of an effect's table by key."""
@@ -183,14 +188,13 @@ class JobModel:
             self._given(maths, {**values, **{name: values[cased(name, k + 1)] for name in names}})
             for k, names in enumerate(self.cases)
         )
-        return Given(first.values, first.own, others)
+        return Given(first.values, first.own, others, frozenset(values))
 
     def _given(self, maths: Maths, values: Values) -> Given:
         own: dict[str, dict[str, Any]] = {}
-        for effect in self.effects:
-            full = {key: owned(effect, key) for key in effect.own.model_fields}
-            own[effect.name] = {key: values[name] for key, name in full.items() if name in values}
-            own[effect.name] |= self.words_of(effect.name)
+        for effect, full in self._full.items():
+            own[effect] = {key: values[name] for key, name in full.items() if name in values}
+            own[effect] |= self.words_of(effect)
         found = Given({**values, **self.kinematics.derived(maths, values, self.called)}, own)
         for state in (load for load in self.loads if isinstance(load, State)):
             derived = state.derived(
@@ -257,13 +261,10 @@ class JobModel:
             found |= {cased(n, k + 1): v for n, v in self.kinematics.hints(case, self.called).items()}
         return found
 
-    def singular(self, given: Given) -> tuple[float, ...]:
+    def singular(self, squares: Squares) -> tuple[float, ...]:
         """Return the crank angles, rad, where the mechanism nearly reaches a singular position."""
-
-        def pose(phi: Floats) -> Motion:
-            return self.kinematics.pose(numpy(), given, Node(phi, {}))
-
-        return tuple(angle for group in self.kinematics.groups.values() for angle in group.singular(given, pose))
+        groups = self.kinematics.groups.items()
+        return tuple(angle for prefix, group in groups for angle in group.singular(prefix, squares))
 
     # Values.
 

@@ -11,6 +11,7 @@ from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit
+from loomopt.program.traced import Quantities
 from loomopt.schema import Values
 from loomopt.tolerances import GAUSS_NODES
 
@@ -41,6 +42,7 @@ class Rows(abc.ABC):
     def __init__(self, model: JobModel, maths: Maths, given: Given, stills: Stills) -> None:
         self.model, self.maths, self.given, self.stills = model, maths, given, stills
         self._single: dict[str, Number] = {}
+        self._quantities = Quantities(model, (maths, maths), given)
 
     @abc.abstractmethod
     def mean(self, integral: Integral) -> Number:
@@ -48,7 +50,7 @@ class Rows(abc.ABC):
 
     def quantity(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a whole-cycle quantity at a crank angle, rad, SI."""
-        return self.model.quantity(self.maths, self.given, name, Node(phi, switch))
+        return self._quantities((name,), Node(phi, switch))[0]
 
     def single(self, name: str) -> Number:
         """Return a figure or row of the design, a mean over the cycle or its root, or a number of the scene, SI."""

@@ -16,6 +16,7 @@ from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
+from loomopt.program.traced import Quantities
 from loomopt.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
 
 CHUNK = 8192
@@ -57,13 +58,14 @@ def _vertex(values: Floats) -> Floats:
     """Return where a polynomial through three or five equidistant values is highest, in steps from the middle one."""
     middle = len(values) // 2
     low, mid, high = values[middle - 1 : middle + 2]
-    slope, bend, third = (high - low) / 2, low - 2 * mid + high, np.zeros_like(mid)
+    slope, bend = (high - low) / 2, low - 2 * mid + high
     if middle == 2:
         outer = values[4] - values[0]
         third = outer / 2 - 2 * slope
         slope, bend = (16 * slope - outer) / 12, bend - (values[4] - 4 * high + 6 * mid - 4 * low + values[0]) / 12
-    first = slope / np.where(bend < 0, -bend, np.inf)
-    shift = first + third * first**2 / np.where(bend < 0, -2 * bend, np.inf)
+    down = np.where(bend < 0, -bend, np.inf)
+    first = slope / down
+    shift = first + third * first**2 / (2 * down) if middle == 2 else first
     return np.asarray(np.minimum(np.maximum(shift, -middle), middle), dtype=np.float64)
 
 
@@ -138,16 +140,14 @@ class Sampler:
         value = self.single(row)
         return abs(value) if objective.form == "magnitude" else value
 
+    @lazy
+    def quantities(self) -> Quantities:
+        """The design's whole-cycle quantities in NumPy."""
+        return Quantities(self.model, (maths.FLOAT, maths.numpy()), self.given)
+
     def at(self, name: str, pieces: Pieces, u: Floats) -> Floats:
         """Return a quantity at nodes (pieces, u), SI."""
-        result = np.empty(u.shape)
-        Tally.positions += len(u)
-        for begin in range(0, len(u), CHUNK):
-            part = slice(begin, begin + CHUNK)
-            node = self.node(pieces[part], u[part])
-            with np.errstate(invalid="ignore", divide="ignore"):
-                result[part] = self.model.quantity(maths.numpy(), self.given, name, node)
-        return result
+        return self.together((name,), pieces, u)[name]
 
     def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
         """Return several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
@@ -156,10 +156,19 @@ class Sampler:
         for begin in range(0, len(u), CHUNK):
             part = slice(begin, begin + CHUNK)
             with np.errstate(invalid="ignore", divide="ignore"):
-                read = self.model.together(maths.numpy(), self.given, self.node(pieces[part], u[part]))
-                for name, values in found.items():
-                    values[part] = read(name)
+                read = self.quantities(tuple(found), self.node(pieces[part], u[part]))
+                for values, own in zip(found.values(), read, strict=True):
+                    values[part] = own
         return found
+
+    def at_angle(self, names: tuple[str, ...], phi: float) -> tuple[float, ...]:
+        """Return quantities that no switch changes at one crank angle, rad, SI; raises where there is no real value."""
+        Tally.positions += 1
+        return self._floats(names, Node(phi, {}))
+
+    @lazy
+    def _floats(self) -> Quantities:
+        return Quantities(self.model, (maths.FLOAT, maths.FLOAT), self.given)
 
     def node(self, pieces: Pieces, u: Floats) -> Node:
         """Return nodes (pieces, u) with their crank angles, rad, and switches."""
@@ -167,7 +176,11 @@ class Sampler:
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
-        return _grid(self._counts(samples or self.samples))
+        return _grid(self._counts(samples)) if samples else self._own_grid
+
+    @lazy
+    def _own_grid(self) -> tuple[Pieces, Floats]:
+        return _grid(self._counts(self.samples))
 
     def _counts(self, samples: int) -> tuple[int, ...]:
         """Return how many nodes each piece has."""
@@ -218,7 +231,11 @@ class Sampler:
     @lazy
     def singular(self) -> tuple[float, ...]:
         """Crank angles, rad, where the mechanism comes very near to a singular position."""
-        return self.model.singular(self.given)
+
+        def squares(names: tuple[str, ...], phi: Floats) -> Sequence[Floats]:
+            return [np.zeros(phi.shape) + values for values in self.quantities(names, Node(phi, {}))]
+
+        return self.model.singular(squares)
 
     def _spikes(self, name: str) -> list[Extreme]:
         """Return the extremes beside singular positions that even samples may miss."""
@@ -237,7 +254,7 @@ class Sampler:
         Tally.positions += len(angles)
         node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
         with np.errstate(invalid="ignore", divide="ignore"):
-            values = self.model.quantity(maths.numpy(), self.given, name, node)
+            (values,) = self.quantities((name,), node)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
     @lazy
@@ -284,7 +301,7 @@ class Sampler:
         """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
             node = Node(np.asarray(integral.angles), {DATUM: np.asarray(integral.data)})
-            return float(np.mean(self.model.quantity(maths.numpy(), self.given, integral.quantity, node)))
+            return float(np.mean(self.quantities((integral.quantity,), node)[0]))
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
         return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))

@@ -9,6 +9,7 @@ from loomopt.cycle import Floats, Node
 from loomopt.maths import numpy
 from loomopt.program.model import JobModel
 from loomopt.program.sampling import Sampler, Tally, sampled
+from loomopt.program.traced import Quantities
 from loomopt.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
 
 
@@ -35,7 +36,8 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
 def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]) -> Floats:
     """Return (speeds, nodes): a quantity at each of several speeds, rad/s."""
     values = {**at_rest.values, **at_rest.hints, "speed": np.array(speeds)[:, None]}
-    found = at_rest.model.quantity(numpy(), at_rest.model.given(numpy(), values), name, nodes)
+    given = at_rest.model.given(numpy(), values)
+    (found,) = Quantities(at_rest.model, (numpy(), numpy()), given)((name,), nodes)
     Tally.positions += found.size
     return np.broadcast_to(found, (len(speeds), len(nodes.phi)))
 

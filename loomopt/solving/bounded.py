@@ -5,8 +5,11 @@ bound is too coarse the box is halved. The formulas are the model's own, run in 
 inside the balls.
 """
 
-from collections.abc import Sequence
+import functools
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +21,7 @@ from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler, Tally
-from loomopt.tolerances import MEAN_BOXES, MOST_BOXES
+from loomopt.tolerances import MEAN_BOXES, MOST_BOXES, NEAR_TOP
 
 CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""
@@ -33,6 +36,25 @@ class Bound:
     angle: float | None = None
 
 
+class Box(NamedTuple):
+    """Shares of a piece from low to high; bend: what holds f''/2 all over it, where a box around it has shown that."""
+
+    low: float
+    high: float
+    bend: Number = None
+
+    def nearest(self, tops: Sequence[float]) -> float:
+        """Return where to expand: at the top that lies in the box, or so near that its end is; else in its middle."""
+        middle, width = (self.low + self.high) / 2, self.high - self.low
+        top = min(tops, key=lambda u: abs(u - middle), default=math.inf)
+        return min(max(top, self.low), self.high) if abs(top - middle) <= NEAR_TOP * width else middle
+
+    def halves(self, bend: Number) -> "list[Box]":
+        """Return both halves, the left one last; bend: theirs."""
+        middle = (self.low + self.high) / 2
+        return [Box(middle, self.high, bend), Box(self.low, middle, bend)]
+
+
 class Boxes(Reading):
     """One design read in balls, ready to be bounded."""
 
@@ -40,6 +62,9 @@ class Boxes(Reading):
         system, model = maths.balls(), sampler.model
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
+        self.sampler = sampler
+        self._read: dict[tuple[int, float, float], Number] = {}
+        self._read_of = ""
 
     @lazy
     def _switches(self) -> list[dict[str, float]]:
@@ -51,21 +76,35 @@ class Boxes(Reading):
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
         cycle, used = self.cycle, 0
         for piece in map(int, np.flatnonzero(cycle.on(where))):
-            boxes = [(0.0, 1.0)]
+            tops = self._tops(name, sign, piece)
+            boxes = [Box(0.0, 1.0)]
             while boxes:
-                low, high = boxes.pop()
+                box = boxes.pop()
                 used += 1
-                Tally.positions += 2
-                holds = self._judge(name, sign, limit, piece, (low + high) / 2, (high - low) / 2)
+                at = box.nearest(tops)
+                holds, bend = judged_box(functools.partial(self._signed, name, sign, piece), limit, box, at)
                 if holds is False:
-                    middle = (low + high) / 2
-                    angle = cycle.starts[piece] * (1 - middle) + cycle.starts[piece + 1] * middle
-                    return Bound("violated", used, float(angle))
+                    return Bound("violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at))
                 if holds is None:
                     if used >= MOST_BOXES:
                         return Bound("undecided", used)
-                    boxes += [((low + high) / 2, high), (low, (low + high) / 2)]
+                    boxes += box.halves(bend)
         return Bound("proven" if used else "undecided", used)
+
+    def _tops(self, name: str, sign: float, piece: int) -> list[float]:
+        """Return where sign · quantity is highest on a piece, as refined in floats: no more than a hint."""
+        found = [extreme for extreme in self.sampler.extremes(name) if extreme.piece == piece]
+        return [extreme.u for extreme in found if sign * extreme.sign > 0]
+
+    def _signed(self, name: str, sign: float, piece: int, centre: float, half: float) -> Number:
+        """Return sign · quantity's series around a ball; the last quantity's are kept, for its other sign."""
+        if name != self._read_of:
+            self._read, self._read_of = {}, name
+        ball = piece, centre, half
+        if ball not in self._read:
+            Tally.positions += 1
+            self._read[ball] = self._series(name, *ball)
+        return sign * self._read[ball]
 
     def mean(self, integral: Integral) -> Number:
         """Return a ball around an integral's mean over its pieces.
@@ -86,24 +125,6 @@ class Boxes(Reading):
                 total = total + length * 2 * half * (value + bend * half**2 / 3)
         return total / width
 
-    def _judge(self, name: str, sign: float, limit: float, piece: int, centre: float, half: float) -> bool | None:
-        """Return True where the box keeps the limit, False where its centre breaks it, None where that is open."""
-        try:
-            here, around = (self._series(name, piece, centre, radius) for radius in (0.0, half))
-        except (ValueError, ZeroDivisionError):
-            return None
-        if sign * here[0] > limit:
-            return False
-        slope, bend = sign * here[1], sign * around[2]
-        rise = abs(slope).upper() * half
-        if bend < 0:
-            # The parabola's own top, wherever it lies: what touches its bound from below is proven in a wide box.
-            rise = min(rise, (slope**2 / (4 * abs(bend))).upper(), key=float)
-            within = sign * here[0] + rise <= limit
-        else:
-            within = sign * here[0] + rise + bend.upper() * half**2 <= limit
-        return True if within else None
-
     def _series(self, name: str, piece: int, centre: float, half: float) -> Number:
         """Return a quantity's Taylor series in u, to second order, around a ball of u on a piece."""
         u = maths.ball_series(centre, half)
@@ -111,6 +132,45 @@ class Boxes(Reading):
         angle = begin + (end - begin) * u
         value = self.quantity(name, angle, self._switches[piece])
         return maths.ball_series(0.0, 0.0) * 0 + value
+
+
+def judged_box(
+    series: Callable[[float, float], Number], limit: float, box: Box, at: float
+) -> tuple[bool | None, Number]:
+    """Return True where f ≤ limit on a box, False where f(at) breaks it, None where that is open; then its bend.
+
+    series(centre, half): f's Taylor series in u, to second order, around a ball.
+    """
+    try:
+        if box.bend is not None:
+            here = series(at, 0.0)
+            if here[0] > limit:
+                return False, None
+            if _keeps(here, box.bend, box, at, limit):
+                return True, None
+        around = series((box.low + box.high) / 2, (box.high - box.low) / 2)
+        if around[0] <= limit:
+            return True, None
+        here = series(at, 0.0)
+        if here[0] > limit:
+            return False, None
+        return _keeps(here, around[2], box, at, limit) or None, around[2]
+    except (ValueError, ZeroDivisionError):
+        return None, box.bend
+
+
+def _keeps(here: Number, bend: Number, box: Box, at: float, limit: float) -> bool:
+    """Say whether f(at) + f'(at) h + k h² ≤ limit all over a box; k ≤ bend, h from low − at to high − at.
+
+    What is no number keeps nothing.
+    """
+    ball = maths.balls().number
+    value, slope, bend = here[0], here[1], bend.upper()
+    low, high = (ball(end) - ball(at) for end in (box.low, box.high))
+    if bend < 0 and not (slope + 2 * bend * low < 0 or slope + 2 * bend * high > 0):
+        # The parabola's own top: what touches its bound from below is proven in a wide box.
+        return bool(value - slope * slope / (4 * bend) <= limit)
+    return all(value + h * (slope + bend * h) <= limit for h in (low, ball(0.0), high))
 
 
 def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:

@@ -3,18 +3,15 @@ grid: stroke, dwells, turning points.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import maths
-from loomopt.cycle import TURN, Floats, Node
-from loomopt.effects.kinds import Motion
+from loomopt.cycle import TURN, Node
 from loomopt.jobs.base import Figures
 from loomopt.jobs.rapier.model import jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import STROKE, VARIABLES, MatchTarget, match_table
-from loomopt.maths import Maths, Number
 from loomopt.mechanisms.turning_points import crossing
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
@@ -45,8 +42,8 @@ def read(sampler: Sampler) -> Reading:
     outward = max(found, key=lambda extreme: extreme.value)
     stroke, phi = 0.0, 0.0
     if outward.value > 0.0:
-        phi = _settled(lambda angle: _pose(sampler, maths.FLOAT, angle), sampler.angle(outward))
-        stroke = float(_pose(sampler, maths.FLOAT, phi).q)
+        phi = _settled(sampler, sampler.angle(outward))
+        stroke = sampler.at_angle(("S",), phi)[0]
     room = sampler.given.values.get("s_dwell")
     if room is None:
         return Reading(stroke, phi % TURN, math.nan, math.nan)
@@ -55,17 +52,17 @@ def read(sampler: Sampler) -> Reading:
     return Reading(stroke, phi % TURN, after, before)
 
 
-def _settled(pose_at: Callable[[float], Motion], angle: float) -> float:
-    """Return the crank angle, rad, of a turning point after Newton's method from nearby."""
+def _settled(sampler: Sampler, angle: float) -> float:
+    """Return the crank angle, rad, of a turning point of the head after Newton's method from nearby."""
     for _ in range(NEWTON):
-        pose = pose_at(angle)
-        step = pose.q1 / pose.q2 if pose.q2 else 0.0
+        slope, bend = sampler.at_angle(("S_1", "peak_acceleration"), angle)
+        step = slope / bend if bend else 0.0
         if abs(step) > 1e-3:
             return angle
         angle -= step
         if abs(step) < 1e-15:
             break
-    return float(angle)
+    return angle
 
 
 def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:
@@ -73,21 +70,14 @@ def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> f
     even = np.linspace(0.0, TURN, SAMPLES + 1)
     angles = np.unique(np.concatenate([even, np.mod(side * np.array(extremes), TURN)]))
 
-    def travel(turned: Floats) -> Floats:
-        return np.asarray(np.abs(_pose(sampler, maths.numpy(), side * turned).q), dtype=np.float64)
-
-    sizes = travel(angles)
+    (travels,) = sampler.quantities(("S",), Node(side * angles, {}))
+    sizes = np.abs(travels)
     out = np.flatnonzero(sizes > room * (1 + TOUCHES))
     if not out.size:
         return TURN
     inside = np.flatnonzero(sizes[: out[0]] <= room)
     low, high = float(angles[inside[-1]]) if inside.size else 0.0, float(angles[out[0]])
-    return crossing(lambda turned: float(travel(np.array([turned]))[0]) - room, low, high)
-
-
-def _pose(sampler: Sampler, system: Maths, phi: Number) -> Motion:
-    """Return the head's pose at crank angles φ1, rad."""
-    return sampler.model.kinematics.pose(system, sampler.given, Node(phi, {}))
+    return crossing(lambda turned: abs(sampler.at_angle(("S",), side * turned)[0]) - room, low, high)
 
 
 def follow(model: JobModel, values: Numbers) -> Mapping[str, float]:

@@ -1,0 +1,291 @@
+"""Formulas written down once: numbers that record what is done with them, and the plain function that does it again.
+
+Equal expressions are computed once; what does not depend on the function's arguments, once for all its calls; what does
+not even depend on a design, once for a number system. The operations are the formula's own, in that system: the same to
+the last bit [Griewank and Walther, Evaluating Derivatives, 2nd ed., chapter 2: the evaluation trace].
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+
+if TYPE_CHECKING:
+    from loomopt.maths import Maths
+
+Number = Any
+"""A recorded number, or one of any number system that stands in a formula as it is."""
+Function = Callable[..., tuple[Number, ...]]
+Bind = Callable[[Sequence[Number]], Function]
+"""bind(known): the function, with these values of what is known before it is called."""
+Program = Callable[[Sequence["Maths"]], Bind]
+"""program(systems): how the function is bound in these number systems; the last is that of its arguments."""
+DEEPEST = 16
+"""Operations nested in one expression: far below the 200 brackets at which CPython's parser gives up."""
+INPUT, LITERAL = "input", "literal"
+ARITHMETIC = frozenset({"{0} + {1}", "{0} - {1}", "{0} * {1}", "{0} / {1}"})
+HARMLESS = re.compile(r"input|literal|pi_\d+|\(.*\)|[-+]\{0\}|\{0\} [-+*] \{1\}")
+"""What raises in no number system. All else is done even where nothing needs its result, for it might fail there."""
+
+
+class Operation(NamedTuple):
+    """What is done: Python with its operands as {0}, {1} ..., the places of these, and the value of a literal."""
+
+    form: str
+    of: tuple[int, ...] = ()
+    value: Number = None
+
+
+class Recorded:
+    """A number of which only is known how it came about: its place on a tape."""
+
+    __slots__ = ("place", "tape")
+    __array_ufunc__ = None
+    """So that NumPy leaves scalar * recorded to the recorded number."""
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, tape: "Tape", place: int) -> None:
+        self.tape, self.place = tape, place
+
+    def __add__(self, other: Number) -> "Recorded":
+        """Return the sum."""
+        return self.tape.record("{0} + {1}", self, other)
+
+    def __radd__(self, other: Number) -> "Recorded":
+        """Return the sum, the other number first."""
+        return self.tape.record("{0} + {1}", other, self)
+
+    def __sub__(self, other: Number) -> "Recorded":
+        """Return the difference."""
+        return self.tape.record("{0} - {1}", self, other)
+
+    def __rsub__(self, other: Number) -> "Recorded":
+        """Return the difference, the other number first."""
+        return self.tape.record("{0} - {1}", other, self)
+
+    def __mul__(self, other: Number) -> "Recorded":
+        """Return the product."""
+        return self.tape.record("{0} * {1}", self, other)
+
+    def __rmul__(self, other: Number) -> "Recorded":
+        """Return the product, the other number first."""
+        return self.tape.record("{0} * {1}", other, self)
+
+    def __truediv__(self, other: Number) -> "Recorded":
+        """Return the quotient."""
+        return self.tape.record("{0} / {1}", self, other)
+
+    def __rtruediv__(self, other: Number) -> "Recorded":
+        """Return the quotient, the other number on top."""
+        return self.tape.record("{0} / {1}", other, self)
+
+    def __pow__(self, power: Number) -> "Recorded":
+        """Return a power."""
+        return self.tape.record("{0} ** {1}", self, power)
+
+    def __rpow__(self, base: Number) -> "Recorded":
+        """Return a power of another number."""
+        return self.tape.record("{0} ** {1}", base, self)
+
+    def __neg__(self) -> "Recorded":
+        """Return the opposite."""
+        return self.tape.record("-{0}", self)
+
+    def __pos__(self) -> "Recorded":
+        """Return the number itself."""
+        return self.tape.record("+{0}", self)
+
+    def __bool__(self) -> bool:
+        """Raise TypeError: what is not known yet decides nothing."""
+        raise TypeError("a recorded number has no value yet")
+
+    def _undecided(self, other: object) -> NoReturn:
+        raise TypeError("a recorded number has no value yet")
+
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _undecided
+
+
+class Tape:
+    """Operations in the order in which they were recorded, equal ones once."""
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+        self._places: dict[object, int] = {}
+
+    def input(self) -> Recorded:
+        """Return a number that is given when the function is bound, or called."""
+        return self._at(len(self.operations), Operation(INPUT))
+
+    def known(self, number: Recorded) -> Recorded:
+        """Return an input that stands for a number known when the function is bound; an input stands for itself."""
+        return number if self.operations[number.place].form == INPUT else self.input()
+
+    def call(self, system: int, function: str, *operands: Number) -> Recorded:
+        """Return what a function of a number system gives; system: its place among those of `Program`."""
+        listed = ", ".join(f"{{{k}}}" for k in range(len(operands)))
+        return self.record(f"{function}_{system}({listed})", *operands)
+
+    def choose(self, system: int, place: Number, values: Sequence[Number]) -> Recorded:
+        """Return the value at a place, by a number system's `choose`."""
+        listed = "".join(f"{{{k}}}, " for k in range(len(values)))
+        return self.call(system, "choose", place, self.record(f"({listed})", *values))
+
+    def record(self, form: str, *operands: Number) -> Recorded:
+        """Return the result of an operation on recorded numbers and literals."""
+        operation = Operation(form, tuple(map(self.place, operands)))
+        return self._at(operation, operation)
+
+    def place(self, number: Number) -> int:
+        """Return the place of a number. Raises ValueError for one of another tape."""
+        if isinstance(number, Recorded):
+            if number.tape is not self:
+                raise ValueError("a number of another tape")
+            return number.place
+        # 1, 1.0 and True are equal but not the same, and so are 0.0 and -0.0.
+        text = repr(number) if isinstance(number, int | float) else id(number)
+        return self._at((type(number), text), Operation(LITERAL, (), number)).place
+
+    def _at(self, key: object, operation: Operation) -> Recorded:
+        place = self._places.setdefault(key, len(self.operations))
+        if place == len(self.operations):
+            self.operations.append(operation)
+        return Recorded(self, place)
+
+    def needed(self, outputs: Iterable[Number], since: int = 0) -> set[int]:
+        """Return the places that outputs need, and what may fail from the place `since` on."""
+        found = {self.place(output) for output in outputs}
+        found |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].form)}
+        for place in range(len(self.operations) - 1, -1, -1):
+            if place in found:
+                found.update(self.operations[place].of)
+        return found
+
+    def program(
+        self, outputs: tuple[Number, ...], called: Sequence[Recorded], known: Sequence[Recorded], since: int = 0
+    ) -> Program:
+        """Return program(systems) → bind(known) → function(*called) → outputs.
+
+        called, known: inputs, of each call and of all calls; since: place from which on what may fail is always done.
+        """
+        levels = {each.place: CALLED for each in called} | {each.place: KNOWN for each in known}
+        names = {each.place: f"x{k}" for k, each in enumerate(called)}
+        names |= {each.place: f"a{k}" for k, each in enumerate(known)}
+        needed = sorted(self.needed(outputs, since))
+        written = _Written(self.operations, needed, list(map(self.place, outputs)), levels)
+        code = compile(written.text(names), "<recorded formula>", "exec")
+        space: dict[str, Number] = {"__name__": __name__, **written.literals}
+        exec(code, space)
+        found: Program = space["program"]
+        return found
+
+
+ALWAYS, KNOWN, CALLED = range(3)
+"""Since when a result is known: in a number system, of a design, in a call."""
+
+
+class _Written:
+    """Outputs of a tape as Python.
+
+    What is read once is written where it is read. What is read several times, or later than it is known, has a name:
+    in a call a local variable, taken again as soon as it is free.
+    """
+
+    def __init__(
+        self, operations: Sequence[Operation], needed: Sequence[int], outputs: Sequence[int], inputs: Mapping[int, int]
+    ) -> None:
+        self.operations, self.needed, self.outputs = operations, needed, outputs
+        self.literals: dict[str, Number] = {}
+        self.end = len(operations)
+        self.level = {**inputs, self.end: CALLED}
+        self.readers: dict[int, list[int]] = {place: [] for place in needed}
+        for place in needed:
+            operands = operations[place].of
+            self.level.setdefault(place, max((self.level[operand] for operand in operands), default=ALWAYS))
+            for operand in operands:
+                self.readers[operand].append(place)
+        for place in outputs:
+            self.readers[place].append(self.end)
+        self.named = self._named()
+        self.last = self._last_read()
+
+    def _named(self) -> set[int]:
+        """Return what has a name: read several times, never or later than it is known, or else nested too deeply."""
+        found, depth = set(), dict.fromkeys(self.needed, 0)
+        for place in self.needed:
+            form, operands, _ = self.operations[place]
+            if form in (INPUT, LITERAL):
+                continue
+            depth[place] = 1 + max((depth[operand] for operand in operands if operand not in found), default=0)
+            readers = self.readers[place]
+            later = any(self.level[reader] > self.level[place] for reader in readers)
+            if len(readers) != 1 or later or depth[place] == DEEPEST:
+                found.add(place)
+        return found
+
+    def _last_read(self) -> dict[int, int]:
+        """Return of each result what named one reads it last."""
+        last: dict[int, int] = {}
+        for place in reversed(self.needed):
+            reached = [reader if reader in self.named else last.get(reader, self.end) for reader in self.readers[place]]
+            last[place] = max(reached, default=place)
+        return last
+
+    def text(self, inputs: Mapping[int, str]) -> str:
+        """Return the source of `program`; inputs: their names."""
+        names, wide = dict(inputs), dict[int, str]()
+        lines: tuple[list[str], ...] = ([], [], [])
+        free, freed = list[str](), dict[int, list[str]]()
+        for place in self.needed:
+            form, operands, value = self.operations[place]
+            level = self.level[place]
+            if form == INPUT:
+                continue
+            if form == LITERAL:
+                names[place] = self._literal(place, value)
+                continue
+            if level == CALLED and form in ARITHMETIC:
+                for operand in (each for each in operands if self.level[each] < CALLED and each not in wide):
+                    wide[operand] = f"w{operand}"
+                    lines[self.level[operand]].append(f"w{operand} = constant({names[operand]})")
+                written = form.format(*(wide.get(operand, names[operand]) for operand in operands))
+            else:
+                written = form.format(*(names[operand] for operand in operands))
+            if place not in self.named:
+                names[place] = f"({written})"
+                continue
+            names[place] = f"r{place}"
+            if level == CALLED:
+                free += freed.pop(place, [])
+                names[place] = free.pop() if free else names[place]
+                freed.setdefault(self.last[place], []).append(names[place])
+            lines[level].append(f"{names[place]} = {written}")
+        return self._nested(lines, inputs, "".join(f"{names[place]}, " for place in self.outputs))
+
+    def _nested(self, lines: Sequence[Sequence[str]], inputs: Mapping[int, str], result: str) -> str:
+        """Return the source of `program` from the lines of each level."""
+        forms = {self.operations[place].form for place in self.needed}
+        used = sorted({found[0] for form in forms if (found := re.match(r"[a-z0-9]+_\d+", form))})
+        taken = [f"{name} = systems[{name.split('_')[1]}].{name.split('_')[0]}" for name in used]
+        known, called = (
+            [name for place, name in inputs.items() if self.level[place] == level] for level in (KNOWN, CALLED)
+        )
+        return "\n".join(
+            [
+                "def program(systems):",
+                *(f" {line}" for line in (*taken, "constant = systems[-1].constant", *lines[ALWAYS])),
+                " def bind(known):",
+                *(f"  {line}" for line in ([f"{', '.join(known)}, = known"] if known else []) + [*lines[KNOWN]]),
+                f"  def function({', '.join(called)}):",
+                *(f"   {line}" for line in lines[CALLED]),
+                f"   return ({result})",
+                "  return function",
+                " return bind",
+            ]
+        )
+
+    def _literal(self, place: int, value: Number) -> str:
+        """Return how a literal is written: by a name where it has no exact text."""
+        if type(value) in (int, float) and math.isfinite(value):
+            return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"
+        self.literals[f"k{place}"] = value
+        return f"k{place}"
