@@ -1,4 +1,4 @@
-"""Every number that decides a verdict, a stop or a step, but for a job's own: where it comes from, what depends on it."""
+"""Every number that decides a verdict, a stop or a step, but a job's own: where it comes from, what depends on it."""
 
 ASSEMBLY_MARGIN = 1.001
 """Factor to spare by which every dyad's triangle must close at both ends (assembly margins of all jobs)."""
