@@ -1,6 +1,7 @@
 """A program of steps that follow one after the other: as a chain that an NLP may lift, and without one."""
 
 import bisect
+import functools
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
@@ -91,13 +92,13 @@ def swing(at):
     return wave(at) + at.values["x0"] ** 2 / 4
 
 
-def height(name):
-    return Row(lambda at: at.values[name])
+def at_design(name, at):
+    return at.values[name]
 
 
 def model(bend=0.0, lifted=True):
     """Return the model: whole-cycle quantities wave (signed) and swing, rows of every step's height and a bowl."""
-    rows = {name: height(name) for name in HEIGHTS}
+    rows = {name: Row(functools.partial(at_design, name)) for name in HEIGHTS}
     rows["bowl"] = Row(lambda at: sum((at.values[name] - 2) ** 2 for name in NAMES) + at.values[HEIGHTS[-1]])
     quantities = {"wave": Quantity(wave, signed=True), "swing": Quantity(swing)}
     return JobModel(Steps(bend, lifted, ("steps", bend, lifted)), own_quantities=quantities, own_rows=rows)
