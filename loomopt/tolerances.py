@@ -293,14 +293,9 @@ excess that is none."""
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
 
-MOST_BOXES, MEAN_BOXES = 20_000, 2048
-"""Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and over which a mean is
-enclosed: the cube of a width of 1/2048 is 1e-10."""
-
-NEAR_TOP = 1.5
-"""Widths between a box's middle and a refined top within which the box is expanded at the top, or at its end toward it.
-Proofs of all packaged scenes take a tenth more readings with 0.5, tops inside a box alone; from 1 to 6 they take the
-same."""
+MOST_BOXES, MEAN_BOXES, NEAR_TOP = 20_000, 2048, 1.5
+"""Boxes after which a bound is undecided (packaged rows take under 200); those of a mean (1/2048 cubed: 1e-10); widths
+to a top toward which a box is expanded: 0.5, tops inside alone, takes a tenth more readings, 1 to 6 as many."""
 
 SLACK, LEAST_SLACK, MOST_SLACK = 1e-8, 1e-13, 0.1
 """What a proof leaves open, relative to a quantity's largest magnitude: usual, what balls resolve, most allowed."""
