@@ -23,6 +23,7 @@ benchmark: .venv/installed-test
 	$(BIN)/python benchmarks/balance_peers.py
 	$(BIN)/python benchmarks/rapier_peers.py
 	$(BIN)/python benchmarks/shedding_peers.py
+	$(BIN)/python benchmarks/startup.py
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv

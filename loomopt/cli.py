@@ -4,6 +4,7 @@ import atexit
 import gc
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,26 +19,18 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import typer  # noqa: E402
 
-from loomopt import __version__, api, commands  # noqa: E402
+from loomopt import __version__, commands  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark  # noqa: E402
 
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
 BAD_INPUT, INTERRUPTED = 2, 130
+SUMMARY = "Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs."
 CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 """Click's base exception, which Typer carries inside itself or imports, by version."""
 
-app = typer.Typer(
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    help="Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs.",
-)
 
-
-@app.callback(invoke_without_command=True)
 def start(
     context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Show the version.")] = False
 ) -> None:
@@ -49,11 +42,6 @@ def start(
         print(context.get_help())
 
 
-for _name, _command in commands.FIRST.items():
-    app.command(_name)(_command)
-
-
-@app.command()
 def solve(
     problem: Problem,
     target: Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")] = None,
@@ -68,13 +56,15 @@ def solve(
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
     """Solve a problem and certify the answer."""
-    from loomopt.views import layout, outputs, terminal
+    from loomopt import api
 
     scene = read_scene(problem, sets, on, off)
     if free:
         scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
     settings = {"accuracy": read_number("--accuracy", accuracy, float), "starts": read_number("--starts", starts, int)}
     if out:
+        from loomopt.views import outputs
+
         outputs.check_folder(out)
     with Progress() as progress:
         answer = api.solve(
@@ -86,15 +76,12 @@ def solve(
     if as_json:
         printed(answer)
     else:
+        from loomopt.views import layout, terminal
+
         layout.show(*terminal.solution(answer, scene))
     raise typer.Exit(EXIT[answer.status])
 
 
-for _name, _command in commands.OF_A_DESIGN.items():
-    app.command(_name)(_command)
-
-
-@app.command()
 def accuracy(
     problem: Problem,
     sets: Set = None,
@@ -129,7 +116,6 @@ def accuracy(
         remark(f"Wrote {path}")
 
 
-@app.command()
 def check(
     problems: Annotated[list[str] | None, typer.Argument(help="Packaged scenes; all of them without a name.")] = None,
     write: Annotated[Path | None, typer.Option(metavar="DIR", help="Write new reference tables there instead.")] = None,
@@ -157,10 +143,36 @@ def check(
         raise typer.Exit(DIFFERS)
 
 
+COMMANDS: dict[str, Callable[..., None]] = {
+    **commands.FIRST,
+    "solve": solve,
+    **commands.OF_A_DESIGN,
+    "accuracy": accuracy,
+    "check": check,
+}
+"""Name → command, in the order that help lists them in."""
+
+
+def application(words: list[str]) -> typer.Typer:
+    """Return the command line that reads words: with the one command they begin with, else with all of them."""
+    app = typer.Typer(
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        help=SUMMARY,
+    )
+    app.callback(invoke_without_command=True)(start)
+    for name in set(words[:1]) & COMMANDS.keys() or COMMANDS:
+        app.command(name)(COMMANDS[name])
+    return app
+
+
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
+    words = sys.argv[1:] if arguments is None else arguments
     try:
-        status = int(app(arguments, standalone_mode=False, prog_name="loomopt") or 0)
+        status = int(application(words)(words, standalone_mode=False, prog_name="loomopt") or 0)
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:

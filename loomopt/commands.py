@@ -2,18 +2,17 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt import api, designs
 from loomopt.errors import BadInput
-from loomopt.jobs import registry
-from loomopt.scene_errors import refusal
-from loomopt.scenes import Scene
 from loomopt.shell import DIFFERS, read_design, read_number, read_scene, remark
-from loomopt.solving.asked import check_numbers
-from loomopt.solving.solution import Evaluation
+
+if TYPE_CHECKING:
+    from loomopt.designs import Design as DesignGiven
+    from loomopt.scenes import Scene
+    from loomopt.solving.solution import Evaluation
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
 Set = Annotated[
@@ -26,13 +25,16 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
 
-def remarked(scene: Scene, design: designs.Design) -> None:
+def remarked(scene: "Scene", design: "DesignGiven") -> None:
     """Say on stderr what a reader of a design's figures should know."""
+    from loomopt import designs
+    from loomopt.jobs import registry
+
     for text in registry.of(scene).views.remarks(scene, designs.flat(design)):
         remark(f"Remark: {text}.")
 
 
-def printed(found: Evaluation) -> None:
+def printed(found: "Evaluation") -> None:
     """Print one JSON object."""
     from loomopt.views import outputs
 
@@ -41,6 +43,7 @@ def printed(found: Evaluation) -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
+    from loomopt.jobs import registry
     from loomopt.views import layout, scene_view
 
     scenes, faults = [], list(registry.brought()[1])
@@ -60,6 +63,8 @@ def new(
 ) -> None:
     """Write a commented scene to start from."""
     from loomopt.files import atomically
+    from loomopt.jobs import registry
+    from loomopt.scene_errors import refusal
 
     template = registry.template(job)
     if file.exists():
@@ -102,6 +107,8 @@ def evaluate(
     as_json: Json = False,
 ) -> None:
     """Show the figures of a design (today's without one)."""
+    from loomopt import api
+
     scene = read_scene(problem, sets, on, off)
     given = read_design(design, scene)
     found = api.evaluate(scene, given)
@@ -125,6 +132,7 @@ def prove(
     as_json: Json = False,
 ) -> None:
     """Prove limits and peaks at every crank angle, or show where not."""
+    from loomopt import api
     from loomopt.views import layout, outputs, terminal
 
     scene = read_scene(problem, sets, on, off)
@@ -151,6 +159,7 @@ def simulate(
     off: Without = None,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
+    from loomopt.solving.asked import check_numbers
     from loomopt.views import layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)

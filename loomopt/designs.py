@@ -1,6 +1,5 @@
 """Designs from files: the JSON of a `design` object, or of a whole answer."""
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,8 @@ _GIVE = "Give the JSON that `loomopt solve --json` prints, or its design object"
 
 def read(path: Path, scene: Scene) -> dict[str, float]:
     """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
+    import json
+
     origin = str(path)
     try:
         if not path.is_file():

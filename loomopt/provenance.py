@@ -1,6 +1,5 @@
 """Where a table comes from, and tables as CSV text that says so."""
 
-import datetime
 from typing import TYPE_CHECKING
 
 from loomopt.scenes import Scene
@@ -13,6 +12,7 @@ VERSIONED = ("loomopt", "casadi", "numpy")
 
 def provenance(scene: Scene, **more: object) -> dict[str, str]:
     """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
+    import datetime
     import importlib.metadata
 
     versions = {name: importlib.metadata.version(name) for name in VERSIONED}

@@ -4,7 +4,6 @@ Numbers and unit factors are exact fractions until the last step, so "155 mm", "
 give the same float64. Angle is a dimension of its own: an angle and an angular speed must name their unit.
 """
 
-import json
 import math
 import re
 import typing
@@ -210,6 +209,8 @@ class NumberList(NamedTuple):
 
 
 def _parsed(text: str) -> object:
+    import json
+
     try:
         return json.loads(text[: 100 * _LONGEST_TEXT])
     except (ValueError, RecursionError):

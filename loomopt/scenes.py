@@ -1,6 +1,5 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
-import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
@@ -169,6 +168,7 @@ class Scene:
     def hash(self) -> str:
         """Twelve hex digits of all that decides an answer: the checked numbers, SI, no name or title."""
         import hashlib
+        import json
 
         content = {
             "job": self.job,

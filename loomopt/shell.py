@@ -4,12 +4,10 @@ import sys
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from loomopt import designs
-from loomopt.jobs.registry import load
-from loomopt.scene_errors import refusal
-from loomopt.scenes import Scene
+if TYPE_CHECKING:
+    from loomopt.scenes import Scene
 
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
@@ -35,8 +33,11 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> Scene:
+def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
     """Return a scene with what the command line changes in it: effects on, then any number, then effects off."""
+    from loomopt.jobs.registry import load
+    from loomopt.scene_errors import refusal
+
     scene = load(problem)
     own: dict[str, object] = {}
     rest: dict[str, object] = {}
@@ -58,13 +59,17 @@ def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: 
     return scene
 
 
-def read_design(path: Path | None, scene: Scene) -> dict[str, float]:
+def read_design(path: Path | None, scene: "Scene") -> dict[str, float]:
     """Return the design of a file, or none for today's."""
+    from loomopt import designs
+
     return designs.read(path, scene) if path else {}
 
 
 def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
     """Return an option's number. Raises BadInput."""
+    from loomopt.scene_errors import refusal
+
     try:
         return kind(text)
     except ValueError:

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
 from loomopt.jobs import registry
-from loomopt.program import sparse_curves
 from loomopt.provenance import csv as csv
 from loomopt.provenance import provenance as provenance
 from loomopt.scenes import Scene
@@ -61,6 +60,8 @@ def curves(scene: Scene, design: designs.Design, accuracy: float | None = None) 
     if accuracy is None:
         columns = rows()
     else:
+        from loomopt.program import sparse_curves
+
         columns, error = sparse_curves.curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)

@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from loomopt.picture.panels import Panel, each
-
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Panel
     from loomopt.picture.shapes import Drawing
     from loomopt.scenes import Scene
 
@@ -38,8 +37,10 @@ class JobViews:
         """Return the crank angles a reader looks for, rad; a stretch "begins" and "ends"."""
         raise NotImplementedError
 
-    def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> tuple[Panel, ...]:
+    def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: a panel for every column, unless a job knows better."""
+        from loomopt.picture.panels import each
+
         return each(columns)
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
