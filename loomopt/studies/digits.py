@@ -14,6 +14,8 @@ from loomopt.cycle import Floats
 from loomopt.maths import Maths, Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.point import Point
+from loomopt.nlp.stations import Stood, held
+from loomopt.program.chains import stations
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
@@ -111,7 +113,23 @@ class _Rows:
         self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].form == "peak"]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
+        before = len(static) + sum(2 * len(o.rows) for o in magnitudes)
+        self.binding = self._binding(rows[before:])
         self.start += [self._top(above[k]) for k in self.tops]
+
+    def _binding(self, prices: Floats) -> list[list[Extreme]]:
+        """Return the nodes that bind of each family, those of rows at corners too; prices: of whole-cycle rows."""
+        program, sampler = self.program, self.sampler
+        found = [list(of) for of in self.point.binding]
+        corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
+        stood, place = Stood(corners, sampler.cycle), 0
+        for family, of in zip(self.families, found, strict=True):
+            signs = stood.signs(sampler, family.row)
+            for k in held([corner.switch for corner in corners], family):
+                if prices[place] > BINDING:
+                    of.append(Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k])))
+                place += 1
+        return found
 
     def _top(self, epigraph: Epigraph) -> Number:
         """Return where the peak that an epigraph stands for is in float64, in its natural size."""
@@ -142,7 +160,7 @@ class _Rows:
         exact, number = self.design(unknown), self.number
         found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
         found += [exact.single(o.row) / number(o.scale) for o in self.zero]
-        for family, binding in zip(self.families, self.point.binding, strict=True):
+        for family, binding in zip(self.families, self.binding, strict=True):
             bound, scale = self._bound(family, unknown[len(self.free) :])
             for node in binding:
                 found.append(number(node.sign) * extreme(exact, family.row, node) / number(scale) - bound)

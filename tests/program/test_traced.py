@@ -11,7 +11,7 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from test_cases import ALL, FABRICS
 from test_states import ELASTIC, WITH_ARM
-from test_tracing import bits
+from test_tracing_tape import bits
 
 import loomopt as lo
 from loomopt import maths

@@ -33,7 +33,8 @@ def read(thing, names):
 
 
 def resized(thing, names, factor):
-    return dataclasses.replace(thing, **{name: factor * getattr(thing, name) for name in names})
+    changes = {name: factor * getattr(thing, name) for name in names}
+    return thing._replace(**changes) if isinstance(thing, tuple) else dataclasses.replace(thing, **changes)
 
 
 # Kernels ---------------------------------------------------------------------------------------------------------
@@ -57,7 +58,7 @@ def test_a_crank_rocker_of_another_size_has_the_same_angles(lengths, phi, factor
 def test_a_crank_rocker_in_a_mirror_that_turns_backward_has_the_same_angles_to_the_last_digit(lengths, phi):
     """y → −y: ψ(−φ) of the other side is −ψ(φ); odd derivatives stay, even ones change their sign."""
     here = read(Pose(maths.FLOAT, lengths, phi), CURVES)
-    there = Pose(maths.FLOAT, dataclasses.replace(lengths, side=-lengths.side), -phi)
+    there = Pose(maths.FLOAT, lengths._replace(side=-lengths.side), -phi)
     signs = {"psi": -1, "psi_2": -1, "rod_2": -1, "sin_crank_rod": -1}
     assert read(there, CURVES) == [signs.get(name, 1) * value for name, value in zip(CURVES, here, strict=True)]
 

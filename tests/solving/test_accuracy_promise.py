@@ -13,6 +13,7 @@ import loomopt as lo
 from loomopt import tables
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.tolerances import GAUSS_NODES
 
 ACCURACIES = [10.0**-power for power in range(2, 12)]
 BEST = ACCURACIES[-1]
@@ -203,8 +204,12 @@ def test_no_more_is_computed_than_it_takes(name):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_machines_cost_more_where_more_is_asked(name):
     counts = [solved(name, accuracy).solver["evaluations"] for accuracy in (*ASKED, BEST)]
-    assert counts == sorted(counts)
-    assert counts[-1] > counts[0] or name in ("pulse", "retrofit"), "they have nothing that holds all round"
+    if name in ("pulse", "retrofit"):
+        # They have nothing that holds all round; samples of their own for a coarse answer read one mean more.
+        assert max(counts) - min(counts) <= GAUSS_NODES
+    else:
+        assert counts == sorted(counts)
+        assert counts[-1] > counts[0]
 
 
 # Curves -------------------------------------------------------------------------------------------------------------
