@@ -3,7 +3,6 @@
 A mirror changes no digit: what it shows is compared bit by bit.
 """
 
-import dataclasses
 import functools
 import math
 
@@ -33,8 +32,7 @@ def read(thing, names):
 
 
 def resized(thing, names, factor):
-    changes = {name: factor * getattr(thing, name) for name in names}
-    return thing._replace(**changes) if isinstance(thing, tuple) else dataclasses.replace(thing, **changes)
+    return type(thing)(**{n: getattr(thing, n) * (factor if n in names else 1) for n in type(thing).__annotations__})
 
 
 # Kernels ---------------------------------------------------------------------------------------------------------
