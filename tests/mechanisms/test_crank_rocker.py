@@ -10,7 +10,7 @@ import casadi as ca
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from loomopt import maths
@@ -269,17 +269,21 @@ def test_synthesis_refuses_angles_of_no_crank_rocker(theta, beta, swing):
         crank_rocker_synthesis.synthesise(theta, beta, swing, 1.0)
 
 
+@example(Lengths(0.01, 0.6646950218385032, 0.6646950218385032, 1.0), 0.0, -2)
 @given(linkages(), angles, st.integers(-20, 20))
 @REPEATABLE
 def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
-    """But for one rounding: libm's atan2 of two doubled numbers may end beside that of the numbers themselves."""
+    """But for one rounding of each angle: libm's atan2 of two doubled numbers may end beside that of the numbers.
+
+    Those of the dead centres are made of two.
+    """
     scaled = Lengths(*[*(length * 2.0**power for length in numbers(lengths)), lengths.side])
     first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, scaled, phi)
     assert (first.psi_1, first.psi_2) == (second.psi_1, second.psi_2)
     assert first.psi == pytest.approx(second.psi, rel=EPS, abs=0)
     one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, scaled)
     for name in CENTRES:
-        assert getattr(one, name) == pytest.approx(getattr(two, name), rel=EPS, abs=0)
+        assert getattr(one, name) == pytest.approx(getattr(two, name), rel=2 * EPS, abs=0)
 
 
 @given(linkages(), angles)

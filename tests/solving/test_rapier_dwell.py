@@ -83,6 +83,5 @@ def test_table_of_dwells_is_what_cold_solves_give(scene, table):
 
 
 def test_table_of_dwells_needs_one_built_nlp(table):
-    """What is left of building is the task's own numbers, a hundredth of writing down an NLP."""
-    built = [answer.time["build_s"] for answer in table]
-    assert max(built[1:]) <= 0.2 * built[0]
+    """What is left of building is the task's own numbers; writing down an NLP takes most of a call."""
+    assert max(answer.time["build_s"] / answer.time["total_s"] for answer in table[1:]) <= 0.3
