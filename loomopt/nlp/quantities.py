@@ -48,7 +48,7 @@ class Quantities:
         found = model.given(replace(maths.casadi(), choose=chosen), symbols)
         pairs = zip((found, *found.cases), (given, *given.cases), strict=True)
         first, *others = [Given(self._shared(one.values, worth.values), one.own) for one, worth in pairs]
-        self.given, self._traces_of = given, first._replace(cases=tuple(others))
+        self.given, self._in_symbols = given, first._replace(cases=tuple(others))
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 
@@ -66,7 +66,6 @@ class Quantities:
 
     def at(self, name: str, phi: Number, switch: Values) -> Number:
         """Return a quantity at a crank angle, rad."""
-
         if name not in self._traced:
             self._traced[name] = self._trace(name)
         traced = self._traced[name]
@@ -78,7 +77,7 @@ class Quantities:
 
         choices = _Choices(self.switches, self._worth)
         system = replace(maths.casadi(), choose=choices.choose)
-        value = self.model.quantity(system, self._traces_of, name, Node(self.phi, self.switches))
+        value = self.model.quantity(system, self._in_symbols, name, Node(self.phi, self.switches))
         read = [each for each in ca.symvar(ca.SX(value)) if identity(each) in self._worth]
         inputs = ca.vertcat(*read), self.phi, *self.switches.values(), *choices.symbols
         worth = ca.vertcat(*(self._worth[identity(each)] for each in read))

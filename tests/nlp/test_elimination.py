@@ -8,6 +8,7 @@ import pytest
 from steps import COUNT, program
 
 from loomopt.nlp import exchange
+from loomopt.nlp.callback import IterationCallback
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.elimination import Elimination, Entries
 from loomopt.nlp.point import Settings
@@ -119,6 +120,13 @@ def test_a_warm_start_has_the_multipliers_of_what_is_lifted():
     left = slope + prices @ slopes
     left[: len(said["x"])] += said["lam_x"]
     assert np.abs(left).max() < 1e-8
+
+
+def test_iterations_are_reported():
+    seen: list[int] = []
+    task = program(0.05)
+    point = exchange.solve(task, task.starts[0], Settings(callback=IterationCallback(seen.append)))
+    assert (seen[0], max(seen)) == (0, point.iterations)
 
 
 def test_the_least_relaxation_is_that_without_lifted_variables():
