@@ -3,6 +3,12 @@
 What the scene's numbers give at once is taken from `Given`; what else does not depend on the node is computed when a
 formula is bound to a design. A formula is recorded once it was evaluated often enough to be worth it: before, after,
 and where it cannot be recorded, the numbers are the same to the last bit.
+
+Time of the recorded formula over that of the formula itself, one run, the mean of all quantities (beat-up, rapier,
+shedding): floats 0.24, 0.14, 0.25; balls 0.43, 0.37, 0.34; 20 nodes of NumPy 0.48, 0.32, 0.41, 720 of them 0.77, 0.68,
+0.56, 8192 0.71, 0.52, 0.36; jets 0.67, 0.78, 0.68; 40 digits 0.72, 0.70, 0.60. So all of these run recordings. Formulas
+themselves are run on a sampler's own grid, where the quantities that are asked for share one pose; for rows of the
+design alone, which share their dead centres (in jets a recording takes nine times as long); and by the NLPs.
 """
 
 import weakref
