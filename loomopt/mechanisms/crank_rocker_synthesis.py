@@ -27,7 +27,10 @@ def synthesise(theta: float, beta: float, swing: float, l4: float) -> Lengths:
     """
     if not (0 < beta < math.pi and 0 < beta - theta < math.pi and 0 < theta + swing < 2 * math.pi):
         raise ValueError("no crank-rocker has these angles: beta and beta - theta must lie between 0 and 180 degrees")
-    ratios = synthesis(FLOAT, theta, beta, swing)
+    try:
+        ratios = synthesis(FLOAT, theta, beta, swing)
+    except ZeroDivisionError:
+        raise ValueError("no crank-rocker has these angles: theta + swing cannot be told from 0") from None
     lengths = Lengths(ratios[0] * l4, ratios[1] * l4, ratios[2] * l4, l4)
     problem = "a length is not positive" if min(ratios) <= 0 else fault(lengths.l1, lengths.l2, lengths.l3, l4)
     if problem:

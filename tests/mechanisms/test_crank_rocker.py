@@ -228,6 +228,7 @@ def test_synthesis_gives_the_angles_it_was_asked_for(theta, beta, swing, l4):
     assert (centres.theta, centres.beta, centres.swing) == pytest.approx((theta, beta, swing), rel=0, abs=1e-12)
 
 
+@example(0.0, 1.0, 5e-324)
 @given(st.floats(-1.5, 1.5), st.floats(-1, 4), st.floats(-0.2, 3))
 @settings(REPEATABLE, max_examples=1000)
 def test_synthesis_gives_what_was_asked_for_or_refuses(theta, beta, swing):
