@@ -80,9 +80,6 @@ def solve(
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or not result.reached:
             break
-        if calls.is_beaten(result.answer.value, result.answer.extra):
-            value = result.answer.value
-            return Point(result.after.x, "Beaten", False, result.iterations, built=calls.built, value=value)
         if result.violation <= settings.excess:
             break
         followed = _followed(calls, result)
@@ -109,7 +106,8 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
 def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     """Return what one round gives: solve at the nodes, add the extremes that exceed their bounds.
 
-    A point of failure where what the solver reached has no real cycle; iterations: of the rounds before.
+    A point of failure where what the solver reached has no real cycle, or is no better than what is known; iterations:
+    of the rounds before.
     """
     nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
     extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
@@ -119,6 +117,8 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         extra = calls.first_extra(nlp, here.sampler, here.peaks)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, {})
         iterations += answer.iterations
+    if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):
+        return Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
     sampler = calls.sampler(answer.x)
     if sampler is None:
         return Point(answer.x, "Invalid_Number_Detected", False, iterations)

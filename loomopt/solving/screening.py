@@ -100,15 +100,19 @@ class Screening:
 
     def diverse(self, designs: Floats, merits: Floats) -> Floats:
         """Return the best design, then always the next best that is far from all those: nearer ones until enough."""
-        shares = (designs[:, self.free] - self.low[self.free]) / (self.high - self.low)[self.free]
-        order, chosen, apart = np.argsort(merits, kind="stable").tolist(), list[int](), APART
+        order = np.argsort(merits, kind="stable")
+        shares = ((designs[:, self.free] - self.low[self.free]) / (self.high - self.low)[self.free])[order]
+        chosen, apart = list[int](), APART
+        nearest = np.full(len(designs), np.inf)
         while len(chosen) < min(SCREENED_STARTS, len(designs)):
-            for k in order:
-                distances = [np.sqrt(np.mean((shares[k] - shares[other]) ** 2)) for other in chosen]
-                if k not in chosen and len(chosen) < SCREENED_STARTS and all(d > apart for d in distances):
-                    chosen.append(k)
-            apart = apart * CLOSER_TOGETHER if apart > APART / 1000 else -1.0
-        return designs[chosen]
+            far = np.flatnonzero(nearest > apart)
+            if not far.size:
+                apart = apart * CLOSER_TOGETHER if apart > APART / 1000 else -1.0
+                continue
+            chosen.append(int(far[0]))
+            nearest = np.minimum(nearest, np.sqrt(np.mean((shares - shares[far[0]]) ** 2, axis=1)))
+            nearest[far[0]] = -2.0
+        return designs[order[chosen]]
 
 
 def _least_change(judged: Judged, count: int) -> Floats:

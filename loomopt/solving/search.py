@@ -57,8 +57,9 @@ class Search:
 
     settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
     best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
-    no design; designs: how many were looked at; stayed: whether it kept to a neighbour's basin; built, solved, settled,
-    certified: seconds of making NLPs, of solves with that, of silent levels, of certificates.
+    no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
+    basin; built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of
+    certificates.
     """
 
     job: Job
@@ -68,6 +69,7 @@ class Search:
     candidates: tuple[Candidate, ...] = ()
     best: Judged | None = None
     nearest: Point | None = None
+    sought: int = 0
     designs: int = 0
     stayed: bool = False
     built: float = 0.0

@@ -115,6 +115,7 @@ def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[di
 def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
     """Return the search with where its limits' excesses are least; solved from there where there are none."""
     began = time.perf_counter()
-    nearest = least(search.program, [*starts, *([search.today] if search.today else [])], search.settings)
-    search = replace(search, nearest=nearest, solved=search.solved + time.perf_counter() - began)
+    places = [*starts, *([search.today] if search.today else [])]
+    nearest = least(search.program, places, search.settings)
+    search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
     return search if nearest is None or nearest.relaxed else tried(search, nearest.x)

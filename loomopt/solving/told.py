@@ -14,7 +14,11 @@ def counts(search: Search) -> dict[str, Any]:
     best = search.best
     same = [c for c in search.candidates if _is_there(c, best.candidate)] if best else []
     accuracy = search.settings.accuracy
-    counts = {"starts": len(search.candidates), "starts_at_best": len(same), "basins": len(optima(search))}
+    counts = {
+        "starts": len(search.candidates) + search.sought,
+        "starts_at_best": len(same),
+        "basins": len(optima(search)),
+    }
     return {**counts, "designs": search.designs, "accuracy": accuracy}
 
 
