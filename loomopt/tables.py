@@ -47,23 +47,26 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
     return found
 
 
-def curves(scene: Scene, design: designs.Design, accuracy: float | None = None) -> "pd.DataFrame":
+def curves(
+    scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
+) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
+    target: what the design was found for, where that is known.
     """
     import pandas as pd
 
     job = registry.of(scene)
     rows = functools.partial(job.curves, scene, {**job.today(scene), **designs.flat(design)})
-    more: dict[str, object] = {}
+    more: dict[str, object] = {"target": target} if target else {}
     if accuracy is None:
         columns = rows()
     else:
         from loomopt.program import sparse_curves
 
         columns, error = sparse_curves.curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
-        more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
+        more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame

@@ -22,15 +22,17 @@ def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Set
     First the least sum over all limits, in natural sizes; then each other limit by itself, where that suffices. Empty
     when a design needs none (the limits do not clash after all) or when no relaxation was found.
     """
-    together = _least(program, starts, settings)
+    groups = dict.fromkeys((limit.name, limit.sign) for limit in program.limits if limit.relaxable)
+    of = 1 + len(groups)
+    together = _least(program, starts, settings.at(f"looking for the least relaxation 1 of {of}"))
     if together is None:
         return Clash()
     point, needs = together
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
-    groups = dict.fromkeys((limit.name, limit.sign) for limit in program.limits if limit.relaxable)
     known = {(program.limits[k].name, program.limits[k].sign) for k in needs} if len(needs) == 1 else set()
-    for group in (group for group in groups if needs and group not in known):
-        single = _least(_only(program, *group), starts[:2], settings)
+    for place, group in ((k, group) for k, group in enumerate(groups, 2) if needs and group not in known):
+        step = settings.at(f"looking for the least relaxation {place} of {of}")
+        single = _least(_only(program, *group), starts[:2], step)
         if single and len(single[1]) == 1:
             found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single[1].items()]
     return Clash(_priced(program, point, words) if found else (), tuple(found), point.x)

@@ -29,9 +29,12 @@ NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI; today's without one), nothing optimised.
 
-    Raises BadInput for a design that does not assemble.
+    target: whose limits, the job's default without one. Raises BadInput for a design that does not assemble.
     """
-    return _evaluated(scene, registry.of(scene), target or scene.schema.default_target, design or {})
+    job, name = registry.of(scene), target_name(scene, target)
+    if target:
+        job.demand(scene, name)
+    return _evaluated(scene, job, name, design or {})
 
 
 def _evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:
@@ -50,6 +53,7 @@ def solve(
     prove: bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
+    on_step: Callable[[str], None] | None = None,
 ) -> Solution:
     """Return the certified optimum of a scene's target, or what stands in its way.
 
@@ -57,7 +61,8 @@ def solve(
     near: an answer to start warm from (one of another structure is no help and is left alone);
     prove: whether to prove every limit of the answer at every crank angle;
     on_iteration: called with each iteration's number;
-    on_start: called with each start's number and how many there are.
+    on_start: called with each start's number and how many there are;
+    on_step: called with what is being done, before each step that may take long.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     forget()
@@ -65,17 +70,20 @@ def solve(
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
     check_numbers(accuracy, starts)
+    settings = Settings(accuracy, callback=_callback(on_iteration), on_step=on_step).at(f"building the {target}")
     imported = _import_solver()
     begun = time.perf_counter()
     program = job.program(scene, target)
     made = time.perf_counter() - begun
-    settings = Settings(accuracy, callback=_callback(on_iteration))
     search = solve_program(program, job, settings, starts, seed, near.point if near else None, on_start)
     search, answer, reported = _answer(scene, target, search, seed)
     for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
+        options["on_step"] = replace(settings, step=f"trying sizes of {name}").say
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
-    answer = _proven(scene, target, answer) if prove and answer.certificate else answer
+    if prove and answer.certificate:
+        settings.at("proving")
+        answer = _proven(scene, target, answer)
     solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error

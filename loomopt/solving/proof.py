@@ -71,8 +71,8 @@ def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, 
     """
     if not LEAST_SLACK <= slack <= MOST_SLACK:
         allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
-        remedy = "Write --slack 1e-8, or leave it out."
-        raise BadInput("the slack is out of range", key="--slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
+        remedy = "Give 1e-8, or leave it out."
+        raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
     job, name = registry.of(scene), target_name(scene, target)
     job.demand(scene, name)
     full = {**job.today(scene), **design}

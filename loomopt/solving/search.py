@@ -84,7 +84,7 @@ class Search:
 def searched(search: Search, count: int, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
     """Return the search after `count` starts; after more where none is certified; after none where `near` leads on."""
     if near is not None:
-        search = tried(search, near.x, near)
+        search = tried(_at(search, "start nearby"), near.x, near)
         search = judged(search) if search.candidates[-1].point.reached else search
         if search.passed:
             return search
@@ -94,12 +94,17 @@ def searched(search: Search, count: int, seed: int, near: Point | None, on_start
         for place, start in enumerate(chosen[done:], done + 1):
             if on_start:
                 on_start(place, len(chosen))
-            search = tried(search, start)
+            search = tried(_at(search, f"start {place} of {len(chosen)}"), start)
         done = max(done, len(chosen))
         search = judged(search)
         if search.passed:
             break
     return search
+
+
+def _at(search: Search, step: str) -> Search:
+    """Return the search at another step, which is told."""
+    return replace(search, settings=search.settings.at(step))
 
 
 def tried(search: Search, start: Mapping[str, float], warm: Point | None = None) -> Search:
@@ -192,6 +197,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
 def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, float], Certificate]:
     """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate."""
     job, program, began = search.job, search.program, time.perf_counter()
+    search.settings.at("certifying")
     settled, said = settle(program, job.tidy(program, x))
     at = time.perf_counter()
     exact = job.values(program, job.design(program, settled))

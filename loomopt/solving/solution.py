@@ -3,19 +3,23 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
+from loomopt.scene_document import copied
 from loomopt.solving.verdict import Certificate
+
+if TYPE_CHECKING:
+    from loomopt.scenes import Scene
 
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",
-    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts (--starts 20).",
+    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts, such as 20.",
     "Infeasible_Problem_Detected": "IPOPT found no point that keeps all limits; loosen one of them.",
-    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts (--starts 20).",
-    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts (--starts 20).",
-    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts (--starts 20).",
+    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts, such as 20.",
+    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts, such as 20.",
+    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts, such as 20.",
     "Diverging_Iterates": "The objective falls without end; bound every variable.",
     "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of the lengths.",
     "Not_Enough_Degrees_Of_Freedom": "More is fixed than the design can follow; free a dimension.",
@@ -80,6 +84,8 @@ class Evaluation:
     figures: Mapping[str, float | None]
     units: Mapping[str, str]
     limits: tuple[Finding, ...]
+    scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
+    """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -95,6 +101,7 @@ class Evaluation:
         return {
             "problem": self.problem,
             "effects": list(self.effects),
+            **({"scene": _scene_dict(self.scene)} if self.scene else {}),
             "design": dict(self.design),
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
@@ -182,6 +189,11 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
         "unique": certificate.unique,
         "settled": list(certificate.settled),
     }
+
+
+def _scene_dict(scene: "Scene") -> dict[str, Any]:
+    """Return a scene as JSON data from which it can be made again."""
+    return {"hash": scene.hash, "document": copied(scene.document, scene.origin)}
 
 
 def _finite(value: float | None) -> float | None:

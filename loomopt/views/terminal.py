@@ -79,7 +79,7 @@ def lists(found: Evaluation, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
     told = registry.of(scene).views.lists
     return [
-        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; see --json"
+        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; all in design"
         for name, values in found.design.items()
         if name in told and values
     ]
