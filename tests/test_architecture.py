@@ -33,7 +33,7 @@ ROOMS = (
     "jobs",
     "nlp",
     "solving",
-    "tables",
+    "tables table_frame",
     "studies",
     "views",
     "api shell commands cli",

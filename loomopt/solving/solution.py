@@ -12,6 +12,7 @@ from loomopt.solving.verdict import Certificate
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
+    from loomopt.solving.proof import Proofs
 
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",
@@ -101,7 +102,6 @@ class Evaluation:
         return {
             "problem": self.problem,
             "effects": list(self.effects),
-            **({"scene": _scene_dict(self.scene)} if self.scene else {}),
             "design": dict(self.design),
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
@@ -127,6 +127,8 @@ class Solution(Evaluation):
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    proofs: "Proofs | None" = None
+    """What was proven at every crank angle, where that was asked for."""
     today: Callable[[], Evaluation] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -144,12 +146,15 @@ class Solution(Evaluation):
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""
         base = super().as_dict()
-        head = {
+        head: dict[str, Any] = {
             "problem": self.problem,
             "target": self.target,
             "status": self.status,
             "message": self.message,
+            "effects": base["effects"],
         }
+        if self.scene:
+            head["scene"] = _scene_dict(self.scene)
         tail: dict[str, Any] = {
             "binding": [
                 {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}
@@ -159,6 +164,8 @@ class Solution(Evaluation):
             "solver": dict(self.solver),
             "time": dict(self.time),
         }
+        if self.proofs:
+            tail["proofs"] = self.proofs.as_dict()["proofs"]
         if self.relaxation:
             tail["clash"] = list(self.clash)
             tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]
