@@ -17,6 +17,7 @@ from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.prices import figure_of
+from loomopt.solving.rounding import told_apart
 from loomopt.solving.search import Candidate, Judged, Search, compared, judged, searched, tried
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.words import Words
@@ -29,12 +30,15 @@ NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI; today's without one), nothing optimised.
 
-    target: whose limits, the job's default without one. Raises BadInput for a design that does not assemble.
+    target: whose limits, the job's default without one. A limit that is exceeded by less than the rounding of the
+    digits given says so. Raises BadInput for a design that does not assemble.
     """
     job, name = registry.of(scene), target_name(scene, target)
     if target:
         job.demand(scene, name)
-    return _evaluated(scene, job, name, design or {})
+    full = {**job.today(scene), **{scene.full(of): value for of, value in (design or {}).items()}}
+    evaluate = functools.partial(_evaluated, scene, job, name)
+    return told_apart(evaluate(full), scene, full, evaluate)
 
 
 def _evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:

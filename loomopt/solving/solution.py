@@ -31,13 +31,21 @@ ADVICE = {
 
 @dataclass(frozen=True)
 class Finding:
-    """One limit beside its figure, SI; min or max is None where the limit has no such side."""
+    """One limit beside its figure, SI; min or max is None where the limit has no such side.
+
+    rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
+    """
 
     name: str
     value: float
     min: float | None
     max: float | None
     ok: bool
+    rounding: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data; what is not exceeded says nothing of rounding."""
+        return {name: value for name, value in vars(self).items() if value or name != "rounding"}
 
 
 @dataclass(frozen=True)
@@ -105,7 +113,7 @@ class Evaluation:
             "design": dict(self.design),
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
-            "limits": [vars(limit) for limit in self.limits],
+            "limits": [limit.as_dict() for limit in self.limits],
         }
 
 

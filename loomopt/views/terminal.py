@@ -47,8 +47,11 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
 
 def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> list[str | Grid]:
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
-    broken = ", ".join(limit.name for limit in found.limits if not limit.ok)
+    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
+    rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
     held = f"NOT admissible: {broken}" if broken else "all limits held"
+    if rounded:
+        held += f"{';' if broken else ','} but for the rounding of the digits given: {rounded}"
     table = comparison(found, scene, before, "design" if before else "today")
     return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
@@ -56,15 +59,16 @@ def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> li
 def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits."""
     table = rows(found, scene, before)
+    missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in found.limits}
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
-        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else "  <- not held"))
+        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
         unit = "" if row["unit"] == "1" else row["unit"]
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit))
     shown = {row["name"] for row in table}
     lines += [
-        (limit.name, *([""] if before else []), "", "", joined("<- not held"))
+        (limit.name, *([""] if before else []), "", "", joined(f"<- {missed[limit.name]}"))
         for limit in found.limits
         if limit.name not in shown and not limit.ok
     ]
