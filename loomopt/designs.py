@@ -19,7 +19,8 @@ LARGEST = 1e60
 Design = Mapping[str, float | Sequence[float]]
 """A design by label, SI and rad; parts of it may be lists of numbers."""
 _ALLOWED = "a finite number in SI units, not negative"
-_GIVE = "Give an answer as JSON, or its design object"
+_GIVE = "Give an answer's design, or a part of it"
+_GIVE_FILE = "Give the JSON that `loomopt solve --json` prints, or its design object"
 
 
 def read(path: Path, scene: Scene) -> dict[str, float]:
@@ -38,7 +39,7 @@ def loaded(path: Path) -> object:
             what = "it is no ordinary file" if path.exists() else "there is no such file"
             raise refusal(f"the design cannot be read: {what}", origin, remedy="Correct the path")
         if path.stat().st_size > LARGEST_FILE:
-            raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE)
+            raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
         found: object = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         reason = error.strerror or str(error)
@@ -46,7 +47,7 @@ def loaded(path: Path) -> object:
     except BadInput:
         raise
     except (ValueError, RecursionError):
-        raise refusal("the file is not JSON", origin, remedy=_GIVE) from None
+        raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
     return found
 
 
