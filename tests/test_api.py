@@ -6,6 +6,7 @@ import pickle
 import pydoc
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -219,6 +220,7 @@ def test_an_answer_is_evaluated_simulated_and_proven_in_its_own_scene_for_its_ow
 
 
 def test_no_message_speaks_of_the_command_line_to_python():
+    no_design: Any = [0.03]
     calls = [
         lambda: lo.solve(SCENE, "ballance"),
         lambda: lo.solve(SCENE, accuracy=1.0),
@@ -228,7 +230,7 @@ def test_no_message_speaks_of_the_command_line_to_python():
         lambda: lo.evaluate(SCENE, None, "ballance"),
         lambda: lo.simulate(SCENE, None, "ballance"),
         lambda: lo.simulate(SCENE, accuracy=2.0),
-        lambda: lo.evaluate(SCENE, [0.03]),
+        lambda: lo.evaluate(SCENE, no_design),
         lambda: lo.evaluate(SCENE, {"l9": 1.0}),
         lambda: SCENE.set("limits.bearing_force.max", "1 N"),
         lambda: SCENE.set("operation.M0", 3),

@@ -26,6 +26,7 @@ EXPONENT = re.compile(r"\d[eE][-+]\d")
 def test_an_answers_table_shows_rounding_as_zero_and_no_exponents(problem, target, zero):
     answer = lo.solve(problem, target)
     table = answer.table()
+    assert isinstance(table, TableFrame)
     for shown in (repr(table), table._repr_html_(), str(table[["design", "max"]])):
         assert EXPONENT.findall(shown.replace("1e+06", "")) == []
     assert table.loc[zero, "design"] == 0.0
