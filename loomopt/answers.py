@@ -10,8 +10,8 @@ from loomopt.scene_document import looked_up
 from loomopt.scene_errors import clean, refusal, shown
 from loomopt.scenes import Scene, build
 
-MOST_TOLD = 12
-"""Changes that are told one by one: more are another scene altogether, and their number says so."""
+MOST_TOLD, LONGEST_TOLD = 8, 200
+"""Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""
 
 
 class Handed(NamedTuple):
@@ -67,7 +67,8 @@ def changes(scene: Scene, own: Scene) -> list[str]:
             continue
         was = f" ({clean(scene.origin, 80)}: {_text(before[key])})" if key in before else ""
         told.append(f"{key} = {_text(after[key])}{was}" if key in after else f"{key} left out{was}")
-    return told if len(told) <= MOST_TOLD else [*told[:MOST_TOLD], f"and {len(told) - MOST_TOLD} more"]
+    short = [clean(each, LONGEST_TOLD) for each in told[:MOST_TOLD]]
+    return short if len(told) <= MOST_TOLD else [*short, f"and {len(told) - MOST_TOLD} more"]
 
 
 def _text(value: object) -> str:

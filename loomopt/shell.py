@@ -121,6 +121,7 @@ def read_asked(
         scene, given, name = changed(scene, sets, on, off), dict[str, float](), target
     else:
         from loomopt import answers, designs
+        from loomopt.scene_errors import clean
 
         handed = answers.read(design, scene)
         own = answers.changes(scene, handed.scene)
@@ -128,8 +129,8 @@ def read_asked(
         given, name = designs.checked(handed.design, scene, str(design)), target or handed.target
         if own:
             here = [*(sets or ()), *(f"{each} on" for each in on or ()), *(f"{each} off" for each in off or ())]
-            then = f"; then, of this call: {', '.join(here)}" if here else ""
-            remark(f"Remark: the scene is that of {design}: {', '.join(own)}{then}.")
+            then = f"; then, of this call: {', '.join(clean(each, 80) for each in here)}" if here else ""
+            remark(f"Remark: the scene is that of {clean(str(design))}: {', '.join(own)}{then}.")
     return Asked(scene, given, target_name(scene, name) if name else None)
 
 

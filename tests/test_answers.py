@@ -91,7 +91,16 @@ def test_another_scene_of_the_job_is_told_by_its_name_and_not_without_end():
     many |= {f"mechanism.l{k}": f"{100 * SCENE.mechanism[f'l{k}']} cm" for k in range(1, 5)}
     told = answers.changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
     assert len(told) == answers.MOST_TOLD + 1
-    assert told[-1] == "and 2 more"
+    assert told[-1] == "and 6 more"
+    assert len(", ".join(told)) < 2000
+
+
+def test_what_is_told_of_a_file_obeys_no_terminal_and_has_an_end():
+    rapier = lo.load("rapier")
+    (told,) = answers.changes(rapier, rapier.set("targets.match.table", "a\x1b[31m" + "b" * 500 + ".csv"))
+    assert told.startswith("targets.match.table = a")
+    assert told.isprintable()
+    assert len(told) < 250
 
 
 def test_what_is_expected_is_no_part_of_the_machine():
