@@ -24,7 +24,9 @@ Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help=
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
 
-Target = Annotated[str | None, typer.Option(help="Whose limits; the answer's own, or the job's default, without it.")]
+Target = Annotated[
+    str | None, typer.Option(help="Whose limits count; the answer's own, or the job's default, without it.")
+]
 
 
 def remarked(scene: "Scene", design: "DesignGiven") -> None:

@@ -59,7 +59,7 @@ def evaluated(cli, *arguments):
         ),
         ("shedding", ("--target", "speed", "--with", "dry_friction")),
     ],
-    ids=" ".join,
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
 def test_an_answer_is_read_as_it_was_solved(cli, solved, problem, changes):
     answer = solved(problem, *changes)
