@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import pickle
 import pydoc
+import re
 import subprocess
 import sys
 from typing import Any
@@ -263,7 +264,7 @@ def test_each_step_is_told_before_it():
 def test_what_is_looked_for_where_nothing_is_admissible_is_told_one_by_one():
     steps: list[str] = []
     assert lo.solve(SCENE, "retrofit", on_step=steps.append).status == "infeasible"
-    looked = [step for step in steps if step.startswith("looking for the least relaxation ")]
+    looked = [step for step in steps if re.match(r"looking for the least relaxation \d", step)]
     places = [tuple(map(int, step.split(":")[0].split()[-3::2])) for step in looked]
     assert places == sorted(places)
     assert places[0][0] == 1
