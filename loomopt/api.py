@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from loomopt import answers, designs
+from loomopt import designs
 from loomopt.designs import Design
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
@@ -153,6 +153,8 @@ def _design(given: Design | Evaluation | None, scene: Scene) -> dict[str, float]
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
     if isinstance(given, Evaluation):
         if given.scene:
+            from loomopt import answers
+
             answers.check_job(given.scene.job, scene, "<answer>")
         given = given.design
     return designs.checked(given, scene) if given else {}

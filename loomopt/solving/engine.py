@@ -15,7 +15,6 @@ from loomopt.scenes import Scene
 from loomopt.solving import elastic, report, told
 from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
-from loomopt.solving.rounding import told_apart
 from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.strategy import searched
@@ -36,7 +35,12 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
         job.demand(scene, name)
     full = {**job.today(scene), **{scene.full(of): value for of, value in (design or {}).items()}}
     evaluate = functools.partial(_evaluated, scene, job, name)
-    return told_apart(evaluate(full), scene, full, evaluate)
+    found = evaluate(full)
+    if found.admissible:
+        return found
+    from loomopt.solving.rounding import told_apart
+
+    return told_apart(found, scene, full, evaluate)
 
 
 def _evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:

@@ -23,13 +23,13 @@ Evaluate = Callable[[Mapping[str, float]], Evaluation]
 
 
 def told_apart(found: Evaluation, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluation:
-    """Return an evaluation in which limits say whether rounding alone exceeds them.
+    """Return an evaluation that is not admissible with limits that say whether rounding alone exceeds them.
 
     design: all of it by full names, SI; evaluate(design): the same evaluation of another design.
     The reach of rounding is the sum of what half a unit of each number's last digit moves, the worst case.
     """
     reach = [0.0] * len(found.limits)
-    for name, step in roundings(scene, design).items() if not found.admissible else ():
+    for name, step in roundings(scene, design).items():
         moved = [_values(evaluate, {**design, name: design[name] + side * step}) for side in (1.0, -1.0)]
         for k, limit in enumerate(found.limits):
             changes = [abs(values[k] - limit.value) for values in moved if values]
