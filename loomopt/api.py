@@ -1,6 +1,7 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
 import dataclasses
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -10,13 +11,17 @@ from loomopt.designs import Design
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, check_numbers
+from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.solution import Evaluation, Solution
+from loomopt.tolerances import SLACK
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.solving.proof import Proofs
+
+Given = Scene | str | os.PathLike[str]
+"""A scene, or what `load` takes: a packaged name or a path."""
 
 __all__ = ["Answer", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
 
@@ -35,7 +40,19 @@ class Answer(Solution):
 
     def curves(self) -> "pd.DataFrame":
         """Return the curves of the design over the cycle, SI, units in the column names."""
-        return simulate(self.scene, self.design)
+        return self.simulate()
+
+    def evaluate(self) -> Evaluation:
+        """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
+        return evaluate(self.scene, self.design, self.target)
+
+    def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
+        """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`."""
+        return simulate(self.scene, self.design, self.target, accuracy=accuracy)
+
+    def prove(self, *, slack: float = SLACK) -> "Proofs":
+        """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`."""
+        return prove(self.scene, self.design, self.target, slack=slack)
 
     def _repr_html_(self) -> str:
         from loomopt.views import notebook
@@ -44,7 +61,7 @@ class Answer(Solution):
 
 
 def solve(
-    scene: Scene,
+    scene: Given,
     target: str | None = None,
     *,
     accuracy: float = ACCURACY,
@@ -54,16 +71,18 @@ def solve(
     prove: bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
+    on_step: Callable[[str], None] | None = None,
 ) -> Answer:
     """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
 
-    accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts: the job's own first, then random ones drawn
-    with `seed`. near: an answer to the same structure, from which the solve starts warm. prove: whether every
-    limit is proven at every crank angle too. on_iteration(number), on_start(number, of): progress. Raises BadInput,
-    and KeyboardInterrupt on Ctrl-C.
+    scene: itself, or its packaged name or path. accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts:
+    the job's own first, then random ones drawn with `seed`. near: an answer to the same structure, from which the
+    solve starts warm. prove: whether every limit is proven at every crank angle too. on_iteration(number),
+    on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
+    own = _scene(scene)
     found = engine.solve(
-        scene,
+        own,
         target,
         accuracy=accuracy,
         starts=starts,
@@ -72,34 +91,70 @@ def solve(
         prove=prove,
         on_iteration=on_iteration,
         on_start=on_start,
+        on_step=on_step,
     )
     fields = {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(Solution)}
-    return Answer(**fields, scene=scene)
+    return Answer(**fields | {"scene": own})
 
 
-def evaluate(scene: Scene, design: Design | None = None) -> Evaluation:
-    """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput."""
-    return engine.evaluate(scene, designs.checked(design, scene) if design else None)
+def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
+    """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
+
+    design: a mapping, or an answer, of which the design alone is taken: `answer.evaluate()` takes its scene and target
+    too. target: whose limits, the job's default without one.
+    """
+    own = _scene(scene)
+    return engine.evaluate(own, _design(design, own), target)
 
 
-def prove(scene: Scene, design: Design | None = None, target: str | None = None, *, slack: float = 1e-8) -> "Proofs":
+def prove(
+    scene: Given, design: Design | Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
+) -> "Proofs":
     """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
-    target: whose limits, the job's default without one. slack: what binding limits leave open, relative to each
-    quantity's largest magnitude over the cycle. Raises BadInput.
+    design: a mapping, or an answer, of which the design alone is taken. target: whose limits,
+    the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
+    over the cycle. Raises BadInput.
     """
     from loomopt.solving import proof
 
-    return proof.prove(scene, designs.checked(design, scene) if design else {}, target, slack)
+    own = _scene(scene)
+    return proof.prove(own, _design(design, own), target, slack)
 
 
-def simulate(scene: Scene, design: Design | None = None, *, accuracy: float | None = None) -> "pd.DataFrame":
+def simulate(
+    scene: Given,
+    design: Design | Evaluation | None = None,
+    target: str | None = None,
+    *,
+    accuracy: float | None = None,
+) -> "pd.DataFrame":
     """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
 
-    accuracy: as few rows as show each column's largest magnitude to it; every half degree without. Raises BadInput.
+    design: a mapping, or an answer, of which the design alone is taken. target: what it was found for, to be named in
+    the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
+    without. Raises BadInput.
     """
     from loomopt import tables
 
     if accuracy is not None:
         check_numbers(accuracy, 1)
-    return tables.curves(scene, designs.checked(design, scene) if design else {}, accuracy)
+    own = _scene(scene)
+    name = target_name(own, target) if target else None
+    return tables.curves(own, _design(design, own), accuracy, name)
+
+
+def _scene(given: Given) -> Scene:
+    """Return a scene that is given as itself, by its name or by its path. Raises BadInput."""
+    return given if isinstance(given, Scene) else load(given)
+
+
+def _design(given: Design | Evaluation | None, scene: Scene) -> dict[str, float]:
+    """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
+    if isinstance(given, Evaluation):
+        if given.scene:
+            from loomopt import answers
+
+            answers.check_job(given.scene.job, scene, "<answer>")
+        given = given.design
+    return designs.checked(given, scene) if given else {}

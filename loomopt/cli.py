@@ -22,7 +22,7 @@ import typer  # noqa: E402
 from loomopt import __version__, commands  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
-from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark  # noqa: E402
+from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark, worded  # noqa: E402
 
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -68,9 +68,7 @@ def solve(
 
         outputs.check_folder(out)
     with Progress() as progress:
-        answer = api.solve(
-            scene, target, **settings, prove=proven, on_start=lambda number, of: progress.say(f"start {number} of {of}")
-        )
+        answer = api.solve(scene, target, **settings, prove=proven, on_step=progress.say)
     if out:
         remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
     remarked(scene, answer.design)
@@ -126,14 +124,14 @@ def check(
     from loomopt.views import layout
 
     if write:
-        remark(f"Wrote {len(study.write(write, problems or ()))} reference tables to {write}")
+        with Progress() as progress:
+            written = study.write(write, problems or (), progress.say)
+        remark(f"Wrote {len(written)} reference tables to {write}")
         return
     outcomes: list[study.Outcome] = []
     try:
         with Progress() as progress:
-            for outcome in study.check(problems or ()):
-                outcomes.append(outcome)
-                progress.say(f"checked {outcome.problem}, {outcome.target}")
+            outcomes.extend(study.check(problems or (), on_step=progress.say))
     finally:
         if outcomes:
             lines = tuple((o.problem, o.target, o.status, "; ".join(o.differences) or "reproduces") for o in outcomes)
@@ -177,7 +175,7 @@ def run(arguments: list[str] | None = None) -> int:
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:
-        remark(f"loomopt: {error}")
+        remark(f"loomopt: {worded(error)}")
         return BAD_INPUT
     except CommandLineError as error:
         remark(f"loomopt: {mistake(error)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from loomopt.errors import BadInput
-from loomopt.shell import DIFFERS, read_design, read_number, read_scene, remark
+from loomopt.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
 
 if TYPE_CHECKING:
     from loomopt.designs import Design as DesignGiven
@@ -23,6 +23,10 @@ Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT"
 Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free bounds that are held.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
+
+Target = Annotated[
+    str | None, typer.Option(help="Whose limits count; the answer's own, or the job's default, without it.")
+]
 
 
 def remarked(scene: "Scene", design: "DesignGiven") -> None:
@@ -101,6 +105,7 @@ def show(
 def evaluate(
     problem: Problem,
     design: Design = None,
+    target: Target = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -109,22 +114,21 @@ def evaluate(
     """Show the figures of a design (today's without one)."""
     from loomopt import api
 
-    scene = read_scene(problem, sets, on, off)
-    given = read_design(design, scene)
-    found = api.evaluate(scene, given)
+    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    found = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
         printed(found)
         return
     from loomopt.views import layout, terminal
 
-    layout.show(*terminal.evaluation(found, scene, api.evaluate(scene) if given else None))
+    layout.show(*terminal.evaluation(found, scene, api.evaluate(scene, None, name) if given else None))
 
 
 def prove(
     problem: Problem,
     design: Design = None,
-    target: Annotated[str | None, typer.Option(help="Whose limits; the job's default without it.")] = None,
+    target: Target = None,
     slack: Annotated[str, typer.Option(metavar="R", help="What binding limits leave open, relative.")] = "1e-8",
     sets: Set = None,
     on: With = None,
@@ -135,8 +139,10 @@ def prove(
     from loomopt import api
     from loomopt.views import layout, outputs, terminal
 
-    scene = read_scene(problem, sets, on, off)
-    found = api.prove(scene, read_design(design, scene), target, slack=read_number("--slack", slack, float))
+    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    with Progress() as progress:
+        progress.say("proving")
+        found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
     if as_json:
         print(outputs.json_text(found.as_dict()))
     else:
@@ -147,6 +153,7 @@ def prove(
 def simulate(
     problem: Problem,
     design: Design = None,
+    target: Target = None,
     out: Annotated[
         list[Path] | None,
         typer.Option(metavar="F", help="Write curves (.csv, .parquet) or a figure (.png, .svg, .pdf)."),
@@ -162,13 +169,12 @@ def simulate(
     from loomopt.solving.asked import check_numbers
     from loomopt.views import layout, outputs, scene_view
 
-    scene = read_scene(problem, sets, on, off)
-    given = read_design(design, scene)
+    scene, given, name = read_asked(problem, design, target, sets, on, off)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
     for path in out or ():
-        outputs.curves(path, scene, given, asked)
+        outputs.curves(path, scene, given, asked, name)
         remark(f"Wrote {path}")
     if not out:
         layout.show(*scene_view.curves(scene, given, layout.width()))
@@ -178,6 +184,7 @@ def export(
     problem: Problem,
     out: Annotated[Path, typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for joints or profile.")],
     design: Design = None,
+    target: Target = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -185,8 +192,7 @@ def export(
     """Export linkage or cam at true scale, for the workshop."""
     from loomopt.views import outputs
 
-    scene = read_scene(problem, sets, on, off)
-    given = read_design(design, scene)
+    scene, given, _ = read_asked(problem, design, target, sets, on, off)
     outputs.linkage(out, scene, given)
     remark(f"Wrote {out}")
     remarked(scene, given)

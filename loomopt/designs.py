@@ -19,11 +19,18 @@ LARGEST = 1e60
 Design = Mapping[str, float | Sequence[float]]
 """A design by label, SI and rad; parts of it may be lists of numbers."""
 _ALLOWED = "a finite number in SI units, not negative"
-_GIVE = "Give the JSON that `loomopt solve --json` prints, or its design object"
+_GIVE = "Give an answer's design, or a part of it"
+_GIVE_FILE = "Give the JSON that `loomopt solve --json` prints, or its design object"
 
 
 def read(path: Path, scene: Scene) -> dict[str, float]:
     """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
+    data = loaded(path)
+    return checked(data["design"] if isinstance(data, dict) and "design" in data else data, scene, str(path))
+
+
+def loaded(path: Path) -> object:
+    """Return what a JSON file of a design or an answer holds, unchecked. Raises BadInput."""
     import json
 
     origin = str(path)
@@ -32,18 +39,16 @@ def read(path: Path, scene: Scene) -> dict[str, float]:
             what = "it is no ordinary file" if path.exists() else "there is no such file"
             raise refusal(f"the design cannot be read: {what}", origin, remedy="Correct the path")
         if path.stat().st_size > LARGEST_FILE:
-            raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE)
-        data = json.loads(path.read_text(encoding="utf-8"))
+            raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
+        found: object = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         reason = error.strerror or str(error)
         raise refusal(f"the design cannot be read: {reason}", origin, remedy="Check the path") from None
     except BadInput:
         raise
     except (ValueError, RecursionError):
-        raise refusal("the file is not JSON", origin, remedy=_GIVE) from None
-    if isinstance(data, dict) and "design" in data:
-        data = data["design"]
-    return checked(data, scene, origin)
+        raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
+    return found
 
 
 def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float | Sequence[float]]:

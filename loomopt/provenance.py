@@ -11,14 +11,15 @@ VERSIONED = ("loomopt", "casadi", "numpy")
 
 
 def provenance(scene: Scene, **more: object) -> dict[str, str]:
-    """Return where a table comes from: scene and its hash, versions, date, and what else matters to it."""
+    """Return where a table comes from: scene, its hash and effects, versions, date, and what else matters to it."""
     import datetime
     import importlib.metadata
 
     versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     told = {name: str(value) for name, value in more.items()}
-    return {"scene": scene.name, "scene_hash": scene.hash, **told, **versions, "date": today}
+    effects = ", ".join(scene.effects) or "none"
+    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **told, **versions, "date": today}
 
 
 def csv(frame: "pd.DataFrame") -> str:

@@ -7,6 +7,7 @@ give the same float64. Angle is a dimension of its own: an angle and an angular 
 import math
 import re
 import typing
+from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
 
@@ -25,6 +26,7 @@ from loomopt.units import show as show
 
 _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque": "745", "inertia": "0.62"}
 _LONGEST_TEXT = 100
+_MOST_DIGITS, _PLAIN = 20, 16
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
@@ -56,6 +58,25 @@ def read(text: str, kind: str) -> float:
         raise _misreading(text, kind, error.problem, error.remedy) from None
     _check_dimension(unit, unit_text, number, kind)
     return _rounded(_exact(number, kind) * unit.factor, kind)
+
+
+def exact(value: float, unit_text: str, kind: str) -> str:
+    """Return the shortest text in `unit_text` that `read` turns into the same SI float64; without a unit for "1"."""
+    shared = Fraction(value) / parse_unit(unit_text).factor
+    for digits in range(1, _MOST_DIGITS):
+        number = Context(prec=digits).divide(Decimal(shared.numerator), Decimal(shared.denominator)).normalize()
+        plain = f"{number:f}" if -_PLAIN < number.adjusted() < _PLAIN else str(number)
+        text = plain if unit_text == "1" else f"{plain} {unit_text}"
+        if _reads_as(text, kind, value):
+            break
+    return text
+
+
+def _reads_as(text: str, kind: str, value: float) -> bool:
+    try:
+        return read(text, kind) == value
+    except QuantityError:
+        return False
 
 
 def unit_of(text: str) -> str:

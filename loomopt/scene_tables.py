@@ -230,7 +230,7 @@ def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: s
         for other, effect in schema.effects.items():
             given = isinstance(effect, Check) and name in {*effect.quantities, *effect.rows}
             if given and other not in on:
-                remedy = f"Put it on (--with {other}), or take the limit out"
+                remedy = f"Put {other} on, or take the limit out"
                 raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
     return {name: _limit(inner[name], schema.figures[name], name, origin) for name in inner}
 

@@ -1,10 +1,14 @@
 """What the commands share: reading their arguments, progress, remarks."""
 
+import shutil
 import sys
+import threading
 import time
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from loomopt.errors import BadInput
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
@@ -12,33 +16,63 @@ if TYPE_CHECKING:
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
 
+OPTIONS = ("accuracy", "slack", "starts", "target")
+"""Arguments of the Python functions that are options of the same name here."""
+
+SILENT = 1.0
+"""Seconds without a word of progress: what takes no longer needs none."""
+
 
 class Progress:
-    """One line on a terminal's stderr that comes after a second and goes at the end."""
+    """One line on a terminal's stderr: what is being done, from a second after the beginning until the end."""
 
     def __init__(self) -> None:
-        self.began, self.open = time.monotonic(), False
+        self.began, self.text = time.monotonic(), ""
+        self.open = self.over = False
+        self.timer: threading.Timer | None = None
+        self.lock = threading.RLock()
 
     def __enter__(self) -> "Progress":
+        if sys.stderr.isatty():
+            # A step that began early says so too: the solver lets other threads run meanwhile.
+            self.timer = threading.Timer(SILENT, self._show)
+            self.timer.daemon = True
+            self.timer.start()
         return self
 
     def say(self, text: str) -> None:
-        """Show what is being done."""
-        if sys.stderr.isatty() and time.monotonic() - self.began > 1.0:
-            self.open = True
-            print(f"\r{text}\x1b[K", end="", file=sys.stderr, flush=True)
+        """Tell what is being done from now on."""
+        self.text = text
+        if self.timer and time.monotonic() - self.began > SILENT:
+            self._show()
+
+    def _show(self) -> None:
+        with self.lock:
+            if self.text and not self.over:
+                self.open = True
+                line = self.text[: shutil.get_terminal_size().columns - 1]
+                print(f"\r{line}\x1b[K", end="", file=sys.stderr, flush=True)
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
-        if self.open:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        with self.lock:
+            self.over = True
+            if self.open:
+                print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        if self.timer:
+            self.timer.cancel()
 
 
 def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
-    """Return a scene with what the command line changes in it: effects on, then any number, then effects off."""
+    """Return a scene with what the command line changes in it."""
     from loomopt.jobs.registry import load
+
+    return changed(load(problem), sets, on, off)
+
+
+def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
+    """Return a scene with what the command line changes in it: effects on, then any number, then effects off."""
     from loomopt.scene_errors import refusal
 
-    scene = load(problem)
     own: dict[str, object] = {}
     rest: dict[str, object] = {}
     for item in sets or ():
@@ -59,11 +93,45 @@ def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: 
     return scene
 
 
-def read_design(path: Path | None, scene: "Scene") -> dict[str, float]:
-    """Return the design of a file, or none for today's."""
-    from loomopt import designs
+class Asked(NamedTuple):
+    """What a command line asks of a design: the scene it holds in, the design (SI; none for today's), the target."""
 
-    return designs.read(path, scene) if path else {}
+    scene: "Scene"
+    design: dict[str, float]
+    target: str | None
+
+
+def read_asked(
+    problem: str,
+    design: Path | None,
+    target: str | None,
+    sets: list[str] | None,
+    on: list[str] | None,
+    off: list[str] | None,
+) -> Asked:
+    """Return the scene of the file, as an answer given as the design has it, with what the command line changes.
+
+    A remark names what is otherwise than in the file, where an answer brings any of it.
+    """
+    from loomopt.jobs.registry import load
+    from loomopt.solving.asked import target_name
+
+    scene = load(problem)
+    if design is None:
+        scene, given, name = changed(scene, sets, on, off), dict[str, float](), target
+    else:
+        from loomopt import answers, designs
+        from loomopt.scene_errors import clean
+
+        handed = answers.read(design, scene)
+        own = answers.changes(scene, handed.scene)
+        scene = changed(handed.scene, sets, on, off)
+        given, name = designs.checked(handed.design, scene, str(design)), target or handed.target
+        if own:
+            here = [*(sets or ()), *(f"{each} on" for each in on or ()), *(f"{each} off" for each in off or ())]
+            then = f"; then, of this call: {', '.join(clean(each, 80) for each in here)}" if here else ""
+            remark(f"Remark: the scene is that of {clean(str(design))}: {', '.join(own)}{then}.")
+    return Asked(scene, given, target_name(scene, name) if name else None)
 
 
 def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
@@ -82,6 +150,20 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
 def remark(text: str) -> None:
     """Say something beside the result."""
     print(text, file=sys.stderr)
+
+
+def worded(error: BadInput) -> BadInput:
+    """Return an error as the command line words it: what Python calls an argument is an option here."""
+    if error.key not in OPTIONS:
+        return error
+    return BadInput(
+        error.problem,
+        file=error.file,
+        key=f"--{error.key}",
+        value=error.value,
+        allowed=error.allowed,
+        remedy=error.remedy,
+    )
 
 
 def mistake(error: Any) -> str:

@@ -10,6 +10,7 @@ from loomopt.provenance import provenance as provenance
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
+from loomopt.tolerances import SHOWN_AS_ZERO
 from loomopt.units import factor
 
 if TYPE_CHECKING:
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
 
 def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     """Return one row per design variable and figure: today, design, limits and unit, in the scene's own units."""
-    import pandas as pd
+    from loomopt.table_frame import TableFrame
 
-    frame = pd.DataFrame(rows(solution, scene))
+    frame = TableFrame(rows(solution, scene))
     more = {}
     if isinstance(solution, Solution):
         more = {"target": solution.target, "accuracy": solution.solver["accuracy"]}
@@ -29,7 +30,10 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
 
 
 def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -> list[dict[str, Any]]:
-    """Return the rows of `answer` as plain data; a figure the scene cannot have is left out; before: today's."""
+    """Return the rows of `answer` as plain data, what is only rounding as 0; before: today's.
+
+    A figure the scene cannot have is left out.
+    """
     words = Words(scene)
     before = before or (solution.before if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
@@ -44,26 +48,41 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
         numbers = {"today": old, "design": value, "min": low, "max": high}
         shown = {column: None if number is None else number / size for column, number in numbers.items()}
         found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True})
+    return _without_rounding(found)
+
+
+def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
+    sizes: dict[str, float] = {}
+    for row in found:
+        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
+    for row in found:
+        for column in ("today", "design"):
+            if row[column] is not None and abs(row[column]) <= SHOWN_AS_ZERO * sizes[row["unit"]]:
+                row[column] = 0.0
     return found
 
 
-def curves(scene: Scene, design: designs.Design, accuracy: float | None = None) -> "pd.DataFrame":
+def curves(
+    scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
+) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
+    target: what the design was found for, where that is known.
     """
     import pandas as pd
 
     job = registry.of(scene)
     rows = functools.partial(job.curves, scene, {**job.today(scene), **designs.flat(design)})
-    more: dict[str, object] = {}
+    more: dict[str, object] = {"target": target} if target else {}
     if accuracy is None:
         columns = rows()
     else:
         from loomopt.program import sparse_curves
 
         columns, error = sparse_curves.curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
-        more = {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
+        more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame

@@ -1,14 +1,27 @@
 """The public functions as a notebook uses them."""
 
 import dataclasses
+import inspect
 import pickle
+import pydoc
+import re
+import subprocess
+import sys
+from typing import Any
 
 import numpy as np
 import pytest
 
 import loomopt as lo
+from loomopt.packaged import problems
+from loomopt.solving import search, solution
+from loomopt.solving.certificate import certify
 
 SCENE = lo.load("beatup-light")
+
+
+def failing(*arguments):
+    return dataclasses.replace(certify(*arguments), passed=False, reasons=("the moon is wrong",))
 
 
 @pytest.fixture(scope="module")
@@ -131,5 +144,129 @@ def test_a_scene_from_tables_is_the_scene_from_the_file():
 
 
 def test_an_answer_travels_between_processes(answer):
-    plain = dataclasses.replace(answer, point=None, scene=None)
+    plain = dataclasses.replace(answer, point=None)
     assert pickle.loads(pickle.dumps(plain)).as_dict() == answer.as_dict()
+
+
+LISTED = "import sys, loomopt; print(*dir(loomopt)); print(*(n for n in sys.modules if n.startswith('loomopt.')))"
+
+
+def test_an_editor_completes_the_public_names_and_nothing_is_imported_for_it():
+    done = subprocess.run([sys.executable, "-c", LISTED], capture_output=True, text=True, check=True)
+    names, modules = done.stdout.split("\n")[:2]
+    assert set(names.split()) == {*lo.__all__, "__version__"}
+    assert modules == ""
+
+
+def test_help_shows_every_public_function_with_its_documentation():
+    text = pydoc.plain(pydoc.render_doc(lo))
+    for name in lo.__all__:
+        assert name in text
+        if inspect.isfunction(getattr(lo, name)):
+            assert f"{name}(" in text
+            assert inspect.getdoc(getattr(lo, name)).splitlines()[0] in text
+
+
+@pytest.mark.parametrize("given", [str, lambda path: path], ids=["text", "path"])
+def test_a_scene_may_be_given_by_its_path(tmp_path, answer, given):
+    path = tmp_path / "my.toml"
+    path.write_text(problems()["beatup-light"].read_text())
+    assert lo.solve(given(path)).design == answer.design
+    assert lo.evaluate(given(path)).figures == lo.evaluate(SCENE).figures
+    assert lo.simulate(given(path), answer).equals(answer.curves())
+    assert lo.prove(given(path), answer) == answer.prove()
+
+
+def test_a_packaged_name_does_as_well_and_a_wrong_one_is_bad_input(answer):
+    assert lo.solve("beatup-light").design == answer.design
+    for function in (lo.solve, lo.evaluate, lo.simulate, lo.prove):
+        with pytest.raises(lo.BadInput, match="beatup-lite"):
+            function("beatup-lite")
+
+
+def test_an_answer_stands_for_its_design_in_another_scene(answer):
+    heavy = lo.load("beatup-heavy").with_effect("gravity")
+    assert lo.evaluate(heavy, answer).figures == lo.evaluate(heavy, answer.design).figures
+    assert lo.evaluate(heavy, answer).figures != answer.figures
+    assert lo.simulate(heavy, answer).equals(lo.simulate(heavy, answer.design))
+    assert lo.prove(heavy, answer) == lo.prove(heavy, answer.design)
+    assert lo.evaluate(heavy, lo.evaluate(SCENE, answer)).figures == lo.evaluate(heavy, answer).figures
+
+
+def test_an_answer_of_another_job_stands_for_nothing():
+    static = lo.solve("shedding-static")
+    for function in (lo.evaluate, lo.simulate, lo.prove):
+        with pytest.raises(lo.BadInput, match="one of job shedding, the scene one of beatup"):
+            function(SCENE, static)
+
+
+def test_an_answer_is_evaluated_simulated_and_proven_in_its_own_scene_for_its_own_target():
+    scene = lo.load("shedding").with_effect("dry_friction").set("operation.speed", "400 rpm")
+    own = lo.solve(scene, "speed")
+    again = own.evaluate()
+    assert own.status == "optimal"
+    assert (again.admissible, again.effects, again.limits) == (True, own.effects, own.limits)
+    assert {n: v for n, v in again.figures.items() if v is not None} == pytest.approx(
+        {n: v for n, v in own.figures.items() if v is not None}, rel=1e-12, abs=1e-9
+    )
+    assert not lo.evaluate(scene, own).admissible, "today's speed is a limit of the default target"
+    assert lo.evaluate(scene, own, "speed").limits == again.limits
+    curves = own.simulate()
+    assert curves.equals(own.curves())
+    assert "dry_friction [N]" in curves
+    assert (curves.attrs["target"], curves.attrs["effects"]) == ("speed", ", ".join(own.effects))
+    assert len(own.simulate(accuracy=1e-3)) < len(curves)
+    assert own.prove().target == "speed"
+    assert own.prove(slack=1e-7).passed
+
+
+def test_no_message_speaks_of_the_command_line_to_python():
+    no_design: Any = [0.03]
+    calls = [
+        lambda: lo.solve(SCENE, "ballance"),
+        lambda: lo.solve(SCENE, accuracy=1.0),
+        lambda: lo.solve(SCENE, starts=0),
+        lambda: lo.prove(SCENE, slack=1.0),
+        lambda: lo.prove(SCENE, target="ballance"),
+        lambda: lo.evaluate(SCENE, None, "ballance"),
+        lambda: lo.simulate(SCENE, None, "ballance"),
+        lambda: lo.simulate(SCENE, accuracy=2.0),
+        lambda: lo.evaluate(SCENE, no_design),
+        lambda: lo.evaluate(SCENE, {"l9": 1.0}),
+        lambda: SCENE.set("limits.bearing_force.max", "1 N"),
+        lambda: SCENE.set("operation.M0", 3),
+        lambda: lo.scene({"problem": {"job": "beatup"}}),
+        lambda: lo.load("shedding").set("mechanism.law", "spline"),
+        lambda: SCENE.free(["swing"]),
+    ]
+    for call in calls:
+        with pytest.raises(lo.BadInput) as caught:
+            call()
+        assert "--" not in str(caught.value)
+        assert "loomopt solve" not in str(caught.value)
+
+
+def test_no_answer_speaks_of_the_command_line_to_python(monkeypatch):
+    assert not [text for text in solution.ADVICE.values() if "--" in text]
+    monkeypatch.setattr(search, "certify", failing)
+    assert "--" not in lo.solve(SCENE).message
+    law = lo.solve(lo.load("shedding").set("targets.law.intervals", 8), "law")
+    assert "--" not in law._repr_html_().replace("-->", "").replace("<!--", "")
+
+
+def test_each_step_is_told_before_it():
+    steps: list[str] = []
+    lo.solve(SCENE, starts=3, prove=True, on_step=steps.append)
+    told = [step for step in steps if "equations" not in step]
+    assert told == ["building the balance", *(f"start {k} of 3" for k in (1, 2, 3)), "certifying", "proving"]
+
+
+def test_what_is_looked_for_where_nothing_is_admissible_is_told_one_by_one():
+    steps: list[str] = []
+    assert lo.solve(SCENE, "retrofit", on_step=steps.append).status == "infeasible"
+    looked = [step for step in steps if re.match(r"looking for the least relaxation \d", step)]
+    places = [tuple(map(int, step.split(":")[0].split()[-3::2])) for step in looked]
+    assert places == sorted(places)
+    assert places[0][0] == 1
+    assert len({of for _, of in places}) == 1
+    assert 1 < places[-1][0] <= places[-1][1]

@@ -133,7 +133,7 @@ NAMES = [
     (("limits", "swing", "low", "20 deg"), "limits.swing.low", 'unknown key "low"', "min, max"),
     (("limits", "swng", {}), "limits.swng", 'unknown figure to limit "swng"', '"swing"'),
     (("limits", "bearing_force", {"max": "1 kN"}), "limits.bearing_force",
-     "centrifugal is off", "--with centrifugal"),
+     "centrifugal is off", "Put centrifugal on"),
     (("targets", "balanced", {}), "targets.balanced", 'unknown target "balanced"', '"balance"'),
     (("targets", "balance", "tolerance", "1"), "targets.balance.tolerance",
      'unknown key "tolerance"', "expected"),

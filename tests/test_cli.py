@@ -22,7 +22,7 @@ from loomopt.quantities import read
 from loomopt.solving import search
 from loomopt.solving.certificate import certify
 
-KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "design", "figures", "units", "limits"]
+KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
 KEYS += ["binding", "certificate", "solver", "time"]
 FIGURES = ["M3_fdc", "peak_torque", "alpha_fdc", "swing", "theta", "beta", "mu_min", "J4", "r4", "pulse_rms"]
 TIMES = ["import_s", "build_s", "solve_s", "settle_s", "certify_s", "report_s", "total_s"]

@@ -14,7 +14,7 @@ with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
     plain = importlib.import_module("plain_shedding")
 
-KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "design", "figures", "units", "limits"]
+KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
 KEYS += ["binding", "certificate", "solver", "time"]
 FIGURES = ["K1", "X0", "contact_min", "contact_max", "spring_force_max", "travel", "contact_speed", "law_acceleration"]
 FIGURES += ["pressure_angle_max", "curvature_min"]

@@ -124,7 +124,7 @@ def test_a_free_law_is_one_short_line(answer):
     scene = lo.load("shedding")
     shown = layout.render(terminal.solution(answer, scene), 100)
     law = answer.design["law"]
-    line = f"law: s'' at 9 knots, {min(law):.6g} ... {max(law):.6g}; see --json"
+    line = f"law: s'' at 9 knots, {min(law):.6g} ... {max(law):.6g}; all in design"
     assert shown.splitlines().count(line) == 1
     evaluated = layout.render(terminal.evaluation(lo.evaluate(scene, answer.design), scene, None), 100)
     assert line in evaluated.splitlines()

@@ -21,6 +21,7 @@ from loomopt.quantities import (
     Quantity,
     QuantityError,
     Speed,
+    exact,
     factor,
     kind_of,
     parse_unit,
@@ -287,3 +288,27 @@ def test_every_kind_has_units_of_its_own_kind(kind):
     if kind != "number":
         assert read(f"2 {DISPLAY_UNIT[kind]}", kind) == pytest.approx(2 * factor(DISPLAY_UNIT[kind]), rel=3e-16)
         assert DISPLAY_UNIT[kind] in quantities.described(kind)
+
+
+@given(st.floats(1e-12, 1e12), st.sampled_from(["mm", "in", "m", "um"]), st.sampled_from([1, -1]))
+def test_exact_text_reads_back_as_the_same_number(value, unit, sign):
+    assert read(exact(sign * value, unit, "length"), "length") == sign * value
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "kind", "text"),
+    [
+        (0.03, "mm", "length", "30 mm"),
+        (0.0, "mm", "length", "0 mm"),
+        (-0.0, "kg", "mass", "0 kg"),
+        (0.084060312345, "mm", "length", "84.060312345 mm"),
+        (read("-2.2 deg", "angle"), "deg", "angle", "-2.2 deg"),
+        (62.83185307179586, "rpm", "angular speed", "600 rpm"),
+        (50 / 3, "1", "number", "16.666666666666668"),
+        (1e-9, "m", "length", "0.000000001 m"),
+        (1e-30, "m", "length", "1E-30 m"),
+        (1e25, "N/m", "stiffness", "1E+25 N/m"),
+    ],
+)
+def test_exact_text_is_as_short_as_it_can_be(value, unit, kind, text):
+    assert exact(value, unit, kind) == text

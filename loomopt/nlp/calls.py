@@ -1,5 +1,6 @@
 """One program's NLP as it is called: parameters, bounds and scales in, a design out."""
 
+import functools
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -57,8 +58,11 @@ class Calls:
         while any(len(of) > slots for of in nodes):
             slots *= 2
         began = time.perf_counter()
-        nlp, fresh = transcribe(self.program, sampler, slots, self.elastic)
+        building = functools.partial(self.settings.say, "building the equations")
+        nlp, fresh = transcribe(self.program, sampler, slots, self.elastic, building)
         nlp.solver(warm, self.settings)
+        if fresh:
+            self.settings.say()
         self.built += time.perf_counter() - began if fresh else 0.0
         return nlp
 

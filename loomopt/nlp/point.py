@@ -2,8 +2,8 @@
 
 import functools
 import math
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from loomopt.cycle import Floats
@@ -19,7 +19,8 @@ class Settings:
     """How to solve.
 
     accuracy: of whole-cycle rows, relative to their size: samples and tolerance follow from it where they are not
-    given; penalty: weight between levels; callback: progress. For studies of methods: samples: of one turn; tolerance:
+    given; penalty: weight between levels; callback: of each iteration; on_step: told what is being done before it may
+    take long, `step` and what of it. For studies of methods: samples: of one turn; tolerance:
     IPOPT's; hessian: "exact" or IPOPT's own "limited-memory"; polished: whether Newton's method ends a solve; uniform:
     so many equal nodes of a turn instead of the exchange.
     """
@@ -32,6 +33,19 @@ class Settings:
     hessian: str = "exact"
     polished: bool = True
     uniform: int = 0
+    step: str = ""
+    on_step: Callable[[str], None] | None = None
+
+    def at(self, step: str) -> "Settings":
+        """Return the settings of another step, after telling it."""
+        found = replace(self, step=step)
+        found.say()
+        return found
+
+    def say(self, more: str = "") -> None:
+        """Tell the step that begins, or more of it."""
+        if self.on_step:
+            self.on_step(f"{self.step}: {more}" if self.step and more else self.step or more)
 
     @functools.cached_property
     def sampled(self) -> int:

@@ -1,7 +1,7 @@
 """From a program's structure to one parametric NLP: built once, solved for any numbers."""
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from loomopt.nlp.elimination import Elimination, Solver
@@ -77,12 +77,20 @@ class Transcription:
 _cache: OrderedDict[Hashable, Transcription] = OrderedDict()
 
 
-def transcribe(program: Program, sampler: Sampler, slots: int, elastic: bool = False) -> tuple[Transcription, bool]:
-    """Return the NLP of a program's structure, and whether it had to be built."""
+def transcribe(
+    program: Program,
+    sampler: Sampler,
+    slots: int,
+    elastic: bool = False,
+    before: Callable[[], None] | None = None,
+) -> tuple[Transcription, bool]:
+    """Return the NLP of a program's structure, and whether it had to be built; before: called where it has to be."""
     wanted = structure(program, sampler, slots, elastic)
     if wanted.key in _cache:
         _cache.move_to_end(wanted.key)
         return _cache[wanted.key], False
+    if before:
+        before()
     _cache[wanted.key] = Transcription(wanted)
     if len(_cache) > CACHE_SIZE:
         _cache.popitem(last=False)

@@ -13,7 +13,7 @@ def target_name(scene: Scene, target: str | None) -> str:
         raise BadInput(
             f"job {scene.job} has no target {name}",
             file=scene.origin,
-            key="--target",
+            key="target",
             value=name,
             allowed=", ".join(scene.schema.targets),
             remedy="Choose one of them.",
@@ -26,16 +26,16 @@ def check_numbers(accuracy: float, starts: int | None) -> None:
     if not TIGHTEST <= accuracy <= COARSEST:
         raise BadInput(
             "the accuracy is out of range",
-            key="--accuracy",
+            key="accuracy",
             value=f"{accuracy:g}",
             allowed=f"{TIGHTEST:g} to {COARSEST:g}",
-            remedy="Write --accuracy 1e-8, or leave it out.",
+            remedy="Give 1e-8, or leave it out.",
         )
     if starts is not None and not 1 <= starts <= MOST_STARTS:
         raise BadInput(
             "the number of starts is out of range",
-            key="--starts",
+            key="starts",
             value=str(starts),
             allowed=f"1 to {MOST_STARTS}",
-            remedy="Write --starts 20, or leave it out.",
+            remedy="Give 20, or leave it out.",
         )

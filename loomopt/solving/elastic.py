@@ -44,8 +44,10 @@ def clash(program: Program, nearest: Point, settings: Settings, words: Words) ->
     needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
-    for ways in dict.fromkeys(way for way in program.ways.values() if way not in known):
-        single = _alone(program, ways, nearest, settings)
+    single_ways = list(dict.fromkeys(way for way in program.ways.values() if way not in known))
+    for place, ways in enumerate(single_ways, 1):
+        step = settings.at(f"looking for the least relaxation {place} of {len(single_ways)}")
+        single = _alone(program, ways, nearest, step)
         if single:
             found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single.items()]
     return Clash(_priced(program, nearest, words), tuple(found), nearest.x)

@@ -17,7 +17,6 @@ from loomopt.solving.asked import ACCURACY, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
-from loomopt.solving.strategy import searched
 from loomopt.solving.words import Words
 
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
@@ -27,9 +26,20 @@ NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI; today's without one), nothing optimised.
 
-    Raises BadInput for a design that does not assemble.
+    target: whose limits, the job's default without one. A limit that is exceeded by less than the rounding of the
+    digits given says so. Raises BadInput for a design that does not assemble.
     """
-    return _evaluated(scene, registry.of(scene), target or scene.schema.default_target, design or {})
+    job, name = registry.of(scene), target_name(scene, target)
+    if target:
+        job.demand(scene, name)
+    full = {**job.today(scene), **{scene.full(of): value for of, value in (design or {}).items()}}
+    evaluate = functools.partial(_evaluated, scene, job, name)
+    found = evaluate(full)
+    if found.admissible:
+        return found
+    from loomopt.solving.rounding import told_apart
+
+    return told_apart(found, scene, full, evaluate)
 
 
 def _evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:
@@ -48,6 +58,7 @@ def solve(
     prove: bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
+    on_step: Callable[[str], None] | None = None,
 ) -> Solution:
     """Return the certified optimum of a scene's target, or what stands in its way.
 
@@ -56,7 +67,8 @@ def solve(
     near: an answer to start warm from (one of another structure is no help and is left alone);
     prove: whether to prove every limit of the answer at every crank angle;
     on_iteration: called with each iteration's number;
-    on_start: called with each start's number and how many there are.
+    on_start: called with each start's number and how many there are;
+    on_step: called with what is being done, before each step that may take long.
     Raises BadInput for an unknown target or one the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     forget()
@@ -64,18 +76,21 @@ def solve(
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
     check_numbers(accuracy, starts)
+    settings = Settings(accuracy, callback=_callback(on_iteration), on_step=on_step).at(f"building the {target}")
     imported = _import_solver()
     begun = time.perf_counter()
     program = job.program(scene, target)
     made = time.perf_counter() - begun
-    settings = Settings(accuracy, callback=_callback(on_iteration))
     today, warm = job.values(program, job.today(scene)), near.point if near else None
     search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
     search, answer, reported = _answer(scene, target, search)
     for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
-        options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
+        options: dict[str, Any] = {"accuracy": accuracy, "starts": starts or 1, "seed": seed, "on_start": on_start}
+        options["on_step"] = replace(settings, step=f"trying sizes of {name}").say
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
-    answer = _proven(scene, target, answer) if prove and answer.certificate else answer
+    if prove and answer.certificate:
+        settings.at("proving")
+        answer = _proven(scene, target, answer)
     solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error
@@ -100,6 +115,8 @@ def solve_program(
     machine by variable, SI, one more place to look for an admissible design from. The rest is as in `solve`. Raises
     KeyboardInterrupt on Ctrl-C.
     """
+    from loomopt.solving.strategy import searched
+
     same = near is not None and near.structure == program.structure
     return searched(Search(job, program, settings, today or {}), starts, seed, near if same else None, on_start)
 

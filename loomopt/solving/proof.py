@@ -7,7 +7,7 @@ touches its limit, so it is proven up to a slack: a share of the quantity's larg
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -44,6 +44,16 @@ class Proof:
     slack: float
     boxes: int
     angle: float | None = None
+    kind: Literal["limit", "assembly", "peak"] = "limit"
+
+    @property
+    def said(self) -> str:
+        """What it is of, in a few words."""
+        return self.limit.removeprefix(f"{self.kind} ") if self.kind == "peak" else self.text
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {name: value for name, value in vars(self).items() if name != "kind"}
 
 
 @dataclass(frozen=True)
@@ -61,7 +71,7 @@ class Proofs:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `prove --json` prints."""
-        return {"problem": self.problem, "target": self.target, "proofs": [dict(vars(proof)) for proof in self.proofs]}
+        return {"problem": self.problem, "target": self.target, "proofs": [proof.as_dict() for proof in self.proofs]}
 
 
 def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, slack: float = SLACK) -> Proofs:
@@ -71,8 +81,8 @@ def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, 
     """
     if not LEAST_SLACK <= slack <= MOST_SLACK:
         allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
-        remedy = "Write --slack 1e-8, or leave it out."
-        raise BadInput("the slack is out of range", key="--slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
+        remedy = "Give 1e-8, or leave it out."
+        raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
     job, name = registry.of(scene), target_name(scene, target)
     job.demand(scene, name)
     full = {**job.today(scene), **design}
@@ -111,6 +121,7 @@ class _Claim:
     bound: float
     peak: float
     where: Where | None = None
+    kind: Literal["limit", "assembly", "peak"] = "limit"
 
 
 def _readings(
@@ -138,11 +149,13 @@ def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) 
         else:
             yield _single(own, limit, text)
     for name, (quantity, most) in whole.sampler.model.assembly.items():
-        yield _over_cycle(whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity)))
+        yield _over_cycle(whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity), kind="assembly"))
     for figure, quantity in job.peaks(whole.sampler.model).items():
         peak = whole.sampler.peak(quantity)
         if math.isfinite(peak):
-            yield _over_cycle(whole, _Claim(f"peak {figure}", f"{figure} as claimed", quantity, peak, peak))
+            yield _over_cycle(
+                whole, _Claim(f"peak {figure}", f"{figure} as claimed", quantity, peak, peak, kind="peak")
+            )
 
 
 def _over_cycle(read: _Read, claim: _Claim) -> Proof:
@@ -153,7 +166,7 @@ def _over_cycle(read: _Read, claim: _Claim) -> Proof:
     worst = max(found, key=lambda each: RANK[each.status])
     count = sum(each.boxes for each in found)
     angle = None if worst.angle is None else worst.angle % (2 * math.pi)
-    return Proof(claim.limit, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle)
+    return Proof(claim.limit, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle, claim.kind)
 
 
 def _single(read: _Read, limit: Limit, text: str) -> Proof:
@@ -178,6 +191,7 @@ def _largest(sampler: Sampler, quantity: str) -> float:
 def proven(scene: Scene, target: str, answer: Solution) -> Solution:
     """Return an answer whose certificate says that everything is proven, or why it is not."""
     found = prove(scene, designs.flat(answer.design), target)
+    answer = replace(answer, proofs=found)
     assert answer.certificate is not None
     if found.passed:
         return replace(answer, certificate=replace(answer.certificate, whole_cycle="proven"))

@@ -32,6 +32,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         figures=figures,
         units={name: words.si(name) for name in (*shown, *figures)},
         limits=_findings(program, figures, named, job.sampler(scene, design)),
+        scene=scene,
     )
 
 
@@ -85,7 +86,7 @@ def with_optimum(
         message = " ".join([headline, _stops(prices), searched]).strip()
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
-        message = f"A design was reached but not certified: {reasons}. Try more starts (--starts 20)."
+        message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
     return Solution(
         **vars(here),
         target=target,
@@ -136,7 +137,7 @@ def without_optimum(
         ).strip()
     else:
         status = str(solver["status"])
-        message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts (--starts 20).')}"
+        message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts, such as 20.')}"
     return Solution(
         **vars(here),
         target=target,

@@ -98,6 +98,11 @@ class Search:
         return sorted(self.reached, key=functools.cmp_to_key(compared))
 
 
+def at(search: Search, step: str) -> Search:
+    """Return the search at another step, which is told."""
+    return replace(search, settings=search.settings.at(step))
+
+
 def tried(search: Search, start: Mapping[str, float], warm: Point | None = None, known: Known | None = None) -> Search:
     """Return the search after one more solve."""
     began = time.perf_counter()
@@ -191,6 +196,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
 def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, float], Certificate]:
     """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate."""
     job, program, began = search.job, search.program, time.perf_counter()
+    search.settings.at("certifying")
     settled, said = settle(program, job.tidy(program, x))
     at = time.perf_counter()
     exact = job.values(program, job.design(program, settled))

@@ -3,19 +3,24 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
+from loomopt.scene_document import copied
 from loomopt.solving.verdict import Certificate
+
+if TYPE_CHECKING:
+    from loomopt.scenes import Scene
+    from loomopt.solving.proof import Proofs
 
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",
-    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts (--starts 20).",
+    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts, such as 20.",
     "Infeasible_Problem_Detected": "IPOPT found no point that keeps all limits; loosen one of them.",
-    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts (--starts 20).",
-    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts (--starts 20).",
-    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts (--starts 20).",
+    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts, such as 20.",
+    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts, such as 20.",
+    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts, such as 20.",
     "Diverging_Iterates": "The objective falls without end; bound every variable.",
     "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of the lengths.",
     "Not_Enough_Degrees_Of_Freedom": "More is fixed than the design can follow; free a dimension.",
@@ -26,13 +31,21 @@ ADVICE = {
 
 @dataclass(frozen=True)
 class Finding:
-    """One limit beside its figure, SI; min or max is None where the limit has no such side."""
+    """One limit beside its figure, SI; min or max is None where the limit has no such side.
+
+    rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
+    """
 
     name: str
     value: float
     min: float | None
     max: float | None
     ok: bool
+    rounding: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data; what is not exceeded says nothing of rounding."""
+        return {name: value for name, value in vars(self).items() if value or name != "rounding"}
 
 
 @dataclass(frozen=True)
@@ -80,6 +93,8 @@ class Evaluation:
     figures: Mapping[str, float | None]
     units: Mapping[str, str]
     limits: tuple[Finding, ...]
+    scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
+    """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -98,7 +113,7 @@ class Evaluation:
             "design": dict(self.design),
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
-            "limits": [vars(limit) for limit in self.limits],
+            "limits": [limit.as_dict() for limit in self.limits],
         }
 
 
@@ -120,6 +135,8 @@ class Solution(Evaluation):
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    proofs: "Proofs | None" = None
+    """What was proven at every crank angle, where that was asked for."""
     today: Callable[[], Evaluation] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -137,12 +154,15 @@ class Solution(Evaluation):
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""
         base = super().as_dict()
-        head = {
+        head: dict[str, Any] = {
             "problem": self.problem,
             "target": self.target,
             "status": self.status,
             "message": self.message,
+            "effects": base["effects"],
         }
+        if self.scene:
+            head["scene"] = _scene_dict(self.scene)
         tail: dict[str, Any] = {
             "binding": [
                 {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}
@@ -152,6 +172,8 @@ class Solution(Evaluation):
             "solver": dict(self.solver),
             "time": dict(self.time),
         }
+        if self.proofs:
+            tail["proofs"] = self.proofs.as_dict()["proofs"]
         if self.relaxation:
             tail["clash"] = list(self.clash)
             tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]
@@ -182,6 +204,11 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
         "unique": certificate.unique,
         "settled": list(certificate.settled),
     }
+
+
+def _scene_dict(scene: "Scene") -> dict[str, Any]:
+    """Return a scene as JSON data from which it can be made again."""
+    return {"hash": scene.hash, "document": copied(scene.document, scene.origin)}
 
 
 def _finite(value: float | None) -> float | None:

@@ -3,14 +3,17 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, sampler_at
 from loomopt.solving.elastic import least
-from loomopt.solving.screening import Screening
-from loomopt.solving.search import OnStart, Search, judged, tried
+from loomopt.solving.search import OnStart, Search, at, judged, tried
 from loomopt.solving.sizes import BETTER, DESIGNS, FLIPS, SCREENED_STARTS
 from loomopt.tolerances import MORE_STARTS
+
+if TYPE_CHECKING:
+    from loomopt.solving.screening import Screening
 
 
 def searched(search: Search, count: int | None, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
@@ -20,7 +23,7 @@ def searched(search: Search, count: int | None, seed: int, near: Point | None, o
     certified; where no start leads to a design, only if one is admissible as far as can be seen.
     """
     if near is not None:
-        search = tried(search, near.x, near)
+        search = tried(at(search, "start nearby"), near.x, near)
         search = judged(search) if search.candidates[-1].point.reached else search
         if search.passed:
             return replace(search, stayed=True)
@@ -34,7 +37,7 @@ def searched(search: Search, count: int | None, seed: int, near: Point | None, o
         for place, start in enumerate(chosen[done:], done + 1):
             if on_start:
                 on_start(place, len(chosen))
-            search = tried(search, start)
+            search = tried(at(search, f"start {place} of {len(chosen)}"), start)
         done = max(done, len(chosen))
         search = judged(search)
         if not search.reached and search.nearest is None:
@@ -50,12 +53,10 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     From the best, each variable in turn is put to its far end: basins lie side by side along bounds.
     """
     own = exchange.starts(search.program, 1, seed)
-    screening = _screening(search, own)
-    if screening is None:
-        return search
+    search = at(search, "looking at designs")
     began = time.perf_counter()
-    wide = not search.program.single and len(screening.free) > 0
-    drawn = _completed(search, screening.starts(seed)) if wide else []
+    screening = None if search.program.single else _screening(search, own)
+    drawn = _completed(search, screening.starts(seed)) if screening else []
     search = replace(search, designs=len(drawn) and DESIGNS, solved=search.solved + time.perf_counter() - began)
     steps = _Steps(on_start, len(own) + len(drawn))
     for start in own:
@@ -66,8 +67,8 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
                 return search
     for start in drawn:
         search = steps.explored(search, start)
-    for _ in range(FLIPS if drawn else 0):
-        if not search.reached:
+    for _ in range(FLIPS):
+        if screening is None or not search.reached:
             break
         before = search.ranked[0]
         flipped = _completed(search, screening.flipped(before.point.x))
@@ -92,18 +93,25 @@ class _Steps:
         self.done += 1
         if self.on_start:
             self.on_start(self.done, self.count)
+        search = at(search, f"start {self.done} of {self.count}")
         if not search.reached:
             return tried(search, start)
         best = search.ranked[0]
         return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
 
 
-def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> Screening | None:
-    """Return what looks at many designs, by the nodes of the first start that has a cycle; None without one."""
+def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> "Screening | None":
+    """Return what looks at many designs, by the nodes of the first start that has a cycle.
+
+    None without one, and where nothing is free.
+    """
+    from loomopt.solving.screening import Screening
+
     for start in (*own, search.today):
         sampler = sampler_at(search.program, start) if start else None
         if sampler is not None:
-            return Screening(search.program, sampler)
+            found = Screening(search.program, sampler)
+            return found if len(found.free) else None
     return None
 
 
@@ -115,6 +123,7 @@ def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[di
 def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
     """Return the search with where its limits' excesses are least; solved from there where there are none."""
     began = time.perf_counter()
+    search = at(search, "looking for the least relaxation")
     places = [*starts, *([search.today] if search.today else [])]
     nearest = least(search.program, places, search.settings)
     search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)

@@ -2,7 +2,7 @@
 
 import functools
 import io
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from loomopt.tolerances import REPRODUCED_DESIGN, REPRODUCED_OBJECTIVE
 if TYPE_CHECKING:
     import pandas as pd
 
+OnStep = Callable[[str], None]
 LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""
 LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
@@ -35,15 +36,15 @@ class Outcome:
     differences: tuple[str, ...]
 
 
-def check(problems: Iterable[str] = (), folder: Path | None = None) -> Iterable[Outcome]:
+def check(problems: Iterable[str] = (), folder: Path | None = None, on_step: OnStep | None = None) -> Iterable[Outcome]:
     """Yield an outcome for every target of the named scenes (all packaged ones, and plug-ins', without a name).
 
-    Raises BadInput for a name that is not packaged.
+    on_step: called with what is being done, before it is. Raises BadInput for a name that is not packaged.
     """
     for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
-            found = engine.solve(scene, target)
+            found = _solved(scene, target, on_step)
             path = (folder or registry.results(scene)) / f"{name}.{target}.csv"
             yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
 
@@ -99,7 +100,14 @@ def reference(found: Solution, scene: Scene) -> "pd.DataFrame":
     return frame
 
 
-def write(folder: Path, problems: Iterable[str] = ()) -> list[Path]:
+def _solved(scene: Scene, target: str, on_step: OnStep | None) -> Solution:
+    """Return the answer of a target, after telling which it is."""
+    if on_step:
+        on_step(f"solving {scene.name}, {target}")
+    return engine.solve(scene, target)
+
+
+def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = None) -> list[Path]:
     """Write the reference table of every target of the named scenes (all without a name); returns the files."""
     from loomopt.files import atomically
 
@@ -107,7 +115,7 @@ def write(folder: Path, problems: Iterable[str] = ()) -> list[Path]:
     for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
-            text = tables.csv(reference(engine.solve(scene, target), scene))
+            text = tables.csv(reference(_solved(scene, target, on_step), scene))
             path = folder / f"{name}.{target}.csv"
             atomically(path, functools.partial(_put, text))
             written.append(path)

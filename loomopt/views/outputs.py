@@ -61,7 +61,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     contents = {
         "answer.json": document(solution) + "\n",
         "table.csv": tables.csv(tables.answer(solution, scene)),
-        "curves.csv": tables.csv(tables.curves(scene, solution.design)),
+        "curves.csv": tables.csv(tables.curves(scene, solution.design, target=solution.target)),
     }
     view = registry.of(scene).views
     if not view.missing(scene):
@@ -86,10 +86,13 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
 
 
-def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = None) -> None:
-    """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows."""
+def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = None, target: str | None = None) -> None:
+    """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
+
+    target: what the design was found for, to be named in the table.
+    """
     ending = suffix(path, CURVES)
-    frame = tables.curves(scene, design, accuracy)
+    frame = tables.curves(scene, design, accuracy, target)
     if ending == ".csv":
         text(path, tables.csv(frame))
     elif ending == ".parquet":

@@ -4,11 +4,12 @@ import math
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
+from loomopt.quantities import exact
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tables import rows
-from loomopt.tolerances import SHOWN_AS_ZERO
+from loomopt.tolerances import SLACK
 from loomopt.units import factor
 from loomopt.views.layout import Grid, joined
 
@@ -31,8 +32,9 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     parts.append(comparison(answer, scene, answer.before, heading))
     parts += lists(answer, scene)
     if answer.certificate:
-        parts.append(_binding(answer))
+        parts += [retyped(answer, scene), _binding(answer)]
         parts += certificate(answer)
+    parts += proven(answer.proofs) if answer.proofs else []
     if answer.solver.get("starts", 1) > 1:
         parts.append(_starts(answer, scene))
     time = answer.time
@@ -45,8 +47,11 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
 
 def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> list[str | Grid]:
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
-    broken = ", ".join(limit.name for limit in found.limits if not limit.ok)
+    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
+    rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
     held = f"NOT admissible: {broken}" if broken else "all limits held"
+    if rounded:
+        held += f"{';' if broken else ','} but for the rounding of the digits given: {rounded}"
     table = comparison(found, scene, before, "design" if before else "today")
     return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
@@ -54,20 +59,16 @@ def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> li
 def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits."""
     table = rows(found, scene, before)
-    sizes: dict[str, float] = {}
-    for row in table:
-        largest = max(abs(row["design"]), abs(row["today"] or 0.0))
-        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), largest)
+    missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in found.limits}
     lines = []
     for row in table:
-        size = sizes[row["unit"]]
-        today = [] if before is None else ["" if row["today"] is None else _number(row["today"], size)]
-        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else "  <- not held"))
+        today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
+        limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
         unit = "" if row["unit"] == "1" else row["unit"]
-        lines.append((row["name"], *today, _number(row["design"], size), unit, limit))
+        lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit))
     shown = {row["name"] for row in table}
     lines += [
-        (limit.name, *([""] if before else []), "", "", joined("<- not held"))
+        (limit.name, *([""] if before else []), "", "", joined(f"<- {missed[limit.name]}"))
         for limit in found.limits
         if limit.name not in shown and not limit.ok
     ]
@@ -79,15 +80,20 @@ def lists(found: Evaluation, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
     told = registry.of(scene).views.lists
     return [
-        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; see --json"
+        f"{name}: {told[name].format(count=len(values))}, {min(values):.6g} ... {max(values):.6g}; all in design"
         for name, values in found.design.items()
         if name in told and values
     ]
 
 
-def _number(value: float, size: float) -> str:
-    """Return six significant digits; what is only rounding beside `size` is 0."""
-    return "0" if abs(value) <= SHOWN_AS_ZERO * size else f"{value:.6g}"
+def retyped(found: Evaluation, scene: Scene) -> str:
+    """Return a design to type again, with the digits it takes to be the same: a JSON object, text with units."""
+    words, told = Words(scene), []
+    for name, value in found.design.items():
+        if name not in scene.schema.lists:
+            text, unit = exact(value, words.unit(name), words.kind(name)), words.unit(name)
+            told.append(joined(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
+    return f"to retype: {{{', '.join(told)}}}"
 
 
 def _limit(low: float | None, high: float | None) -> str:
@@ -146,6 +152,20 @@ def _starts(answer: Solution, scene: Scene) -> str:
         for figures, count in answer.optima[1:]
     ]
     return text + (f". Other optima: {'; '.join(others)}" if others else "")
+
+
+def proven(found: "Proofs") -> list[str]:
+    """Return what was proven, and what was not, in a few lines."""
+    groups = {"limit": "limits", "assembly": "assembly", "peak": "peaks as claimed"}
+    shown = {
+        said: [joined(proof.said) for proof in found.proofs if proof.kind == kind and proof.status == "proven"]
+        for kind, said in groups.items()
+    }
+    missed = [joined(f"{proof.text} ({proof.status})") for proof in found.proofs if proof.status != "proven"]
+    boxes = sum(proof.boxes for proof in found.proofs)
+    head = f"Proven at every crank angle, up to {SLACK:.0e} of each quantity's largest magnitude, in {boxes} boxes:"
+    lines = [f"    {said}: {', '.join(texts)}" for said, texts in shown.items() if texts]
+    return ["\n".join([head, *lines])] * bool(lines) + ([f"NOT proven: {', '.join(missed)}"] if missed else [])
 
 
 def proofs(found: "Proofs") -> list[str | Grid]:

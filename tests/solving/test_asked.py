@@ -18,17 +18,18 @@ def test_the_ends_of_what_is_allowed_are_allowed(accuracy, starts):
 @pytest.mark.parametrize(
     ("accuracy", "starts", "key"),
     [
-        (TIGHTEST * 0.999, 1, "--accuracy"),
-        (COARSEST * 1.001, 1, "--accuracy"),
-        (float("nan"), 1, "--accuracy"),
-        (1e-8, 0, "--starts"),
-        (1e-8, MOST_STARTS + 1, "--starts"),
+        (TIGHTEST * 0.999, 1, "accuracy"),
+        (COARSEST * 1.001, 1, "accuracy"),
+        (float("nan"), 1, "accuracy"),
+        (1e-8, 0, "starts"),
+        (1e-8, MOST_STARTS + 1, "starts"),
     ],
 )
 def test_what_lies_beyond_is_bad_input_under_its_own_name(accuracy, starts, key):
     with pytest.raises(BadInput) as found:
         check_numbers(accuracy, starts)
-    assert key in str(found.value)
+    assert found.value.key == key
+    assert str(found.value).startswith(f"{key}: ")
 
 
 def test_the_default_target_is_the_jobs():

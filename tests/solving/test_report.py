@@ -118,7 +118,7 @@ def test_what_did_not_pass_says_why():
     refused = replace(PASSED, passed=False, reasons=("one", "two"))
     answer = told(refused)
     assert answer.status == "uncertified"
-    assert answer.message == "A design was reached but not certified: one; two. Try more starts (--starts 20)."
+    assert answer.message == "A design was reached but not certified: one; two. Try more starts, such as 20."
     beyond = told(PASSED, evaluated((("p", 1, 1.0),), {"x": 1.0, "y": 1.0}))
     assert beyond.status == "uncertified"
     assert "a limit does not hold on independent evaluation" in beyond.message
@@ -157,7 +157,7 @@ def test_an_infeasible_target_says_what_clashes_and_what_helps(relaxations, said
     ("status", "said"),
     [
         ("Diverging_Iterates", "The objective falls without end; bound every variable."),
-        ("Never_Heard_Of", "try more starts (--starts 20)."),
+        ("Never_Heard_Of", "try more starts, such as 20."),
     ],
 )
 def test_a_failure_passes_on_the_solvers_word_with_advice(status, said):

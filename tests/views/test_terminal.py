@@ -1,6 +1,8 @@
 """What a person reads: tables and sentences that fit the terminal and lose nothing."""
 
 import dataclasses
+import json
+import re
 
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,8 @@ from hypothesis import strategies as st
 from loomopt import api
 from loomopt.effects import found
 from loomopt.jobs.registry import load
+from loomopt.quantities import read
+from loomopt.solving.words import Words
 from loomopt.views import layout, scene_view, terminal
 from loomopt.views.layout import Grid
 
@@ -180,3 +184,49 @@ def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
     assert len(front) == 2
     assert front[0] != front[1]
     assert "-0.0 " not in wide
+
+
+@pytest.mark.parametrize("name", ["beatup-light", "rapier", "shedding", "shedding-static"])
+def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
+    found = api.solve(name)
+    shown = text(*terminal.solution(found, found.scene))
+    (line,) = re.findall(r"^to retype: (\{.*?\})", shown, re.MULTILINE | re.DOTALL)
+    words, typed = Words(found.scene), json.loads(line)
+    assert list(typed) == list(found.design)
+    back = {k: read(v, words.kind(k)) if isinstance(v, str) else v for k, v in typed.items()}
+    assert back == found.design
+    assert api.evaluate(found.scene, back, found.target).admissible
+    assert all(isinstance(v, str) == (words.unit(k) != "1") for k, v in typed.items())
+    assert max(map(len, shown.splitlines())) <= 80
+    assert shown.index(f"\n{found.table().index[-1]} ") < shown.index("to retype: ") < shown.index("What binds")
+
+
+def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(answer):
+    assert "Proven" not in text(*terminal.solution(answer, SCENE))
+    found = api.solve(SCENE, prove=True)
+    assert found.proofs.passed
+    shown = text(*terminal.solution(found, SCENE), columns=None)
+    lines = shown[shown.index("Proven at every crank angle") :].splitlines()
+    block = [lines[0], *(line for line in lines if line.startswith("    "))]
+    boxes = sum(proof.boxes for proof in found.proofs.proofs)
+    assert block[0].endswith(f"up to 1e-08 of each quantity's largest magnitude, in {boxes} boxes:")
+    assert [line.split(":")[0].strip() for line in block[1:]] == ["limits", "assembly", "peaks as claimed"]
+    assert all(proof.said in shown for proof in found.proofs.proofs)
+    assert "NOT proven" not in shown
+
+
+def test_what_was_not_proven_is_told_beside_what_was(answer):
+    found = api.prove(SCENE, {**answer.design, "l1": 0.02})
+    assert not found.passed
+    shown = text(*terminal.proven(found), columns=None)
+    missed = [proof for proof in found.proofs if proof.status != "proven"]
+    assert shown.splitlines()[-1] == "NOT proven: " + ", ".join(f"{each.text} ({each.status})" for each in missed)
+    assert all(each.text not in shown.splitlines()[1] for each in missed)
+    none = dataclasses.replace(found, proofs=tuple(missed))
+    assert text(*terminal.proven(none)).startswith("NOT proven: ")
+
+
+def test_the_proofs_stand_in_the_json_as_prove_prints_them():
+    found = api.solve(SCENE, prove=True)
+    assert found.as_dict()["proofs"] == api.prove(SCENE, found).as_dict()["proofs"]
+    assert "proofs" not in api.solve(SCENE).as_dict()

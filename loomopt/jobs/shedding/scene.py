@@ -182,7 +182,7 @@ def check_law(scene: Scene) -> None:
 def _coefficients(scene: Scene) -> tuple[float, ...]:
     found = scene.table(Frame).law_coefficients
     if found is None:
-        remedy = "Give s'' at evenly spaced knots, as `loomopt solve --target law --json` finds them"
+        remedy = "Give s'' at evenly spaced knots, as target law finds them"
         raise refusal("law spline needs its coefficients", scene.origin, "mechanism.law_coefficients", remedy=remedy)
     return tuple(found)
 
