@@ -27,6 +27,7 @@ _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque"
 _LONGEST_TEXT = 100
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_PLAIN = re.compile(_NUMBER)
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
 _FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*)")
@@ -56,6 +57,14 @@ def read(text: str, kind: str) -> float:
         raise _misreading(text, kind, error.problem, error.remedy) from None
     _check_dimension(unit, unit_text, number, kind)
     return _rounded(_exact(number, kind) * unit.factor, kind)
+
+
+def plain_number(text: str) -> float | None:
+    """Return the number that text is by the same pattern, without a unit; None for anything else."""
+    if len(text) > _LONGEST_TEXT or not _PLAIN.fullmatch(text):
+        return None
+    value, nothing = float(text), not re.search("[1-9]", re.split("[eE]", text)[0])
+    return value if nothing or _SMALLEST < abs(value) < _LARGEST else None
 
 
 def unit_of(text: str) -> str:
