@@ -81,7 +81,7 @@ def _columns(rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: st
 
 
 def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterator[_Column]:
-    """Yield the columns that a header names. Raises BadInput for one that is not there once, with a unit it may have."""
+    """Yield the columns that a header names. Raises BadInput for one that is not there once, with its unit."""
     headings = [_HEADING.fullmatch(cell.strip()) for cell in head]
     for name, kind in kinds.items():
         named = [(place, each[2]) for place, each in enumerate(headings) if each and each[1] == name]
