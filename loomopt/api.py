@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from loomopt import designs
-from loomopt.designs import Design
+from loomopt.designs import Given
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
@@ -77,12 +77,15 @@ def solve(
     return Answer(**fields, scene=scene)
 
 
-def evaluate(scene: Scene, design: Design | None = None) -> Evaluation:
-    """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput."""
+def evaluate(scene: Scene, design: Given | None = None) -> Evaluation:
+    """Return figures and limits of a design (SI, rad, or text with units; today's where it names nothing).
+
+    Raises BadInput.
+    """
     return engine.evaluate(scene, designs.checked(design, scene) if design else None)
 
 
-def prove(scene: Scene, design: Design | None = None, target: str | None = None, *, slack: float = 1e-8) -> "Proofs":
+def prove(scene: Scene, design: Given | None = None, target: str | None = None, *, slack: float = 1e-8) -> "Proofs":
     """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
     target: whose limits, the job's default without one. slack: what binding limits leave open, relative to each
@@ -93,7 +96,7 @@ def prove(scene: Scene, design: Design | None = None, target: str | None = None,
     return proof.prove(scene, designs.checked(design, scene) if design else {}, target, slack)
 
 
-def simulate(scene: Scene, design: Design | None = None, *, accuracy: float | None = None) -> "pd.DataFrame":
+def simulate(scene: Scene, design: Given | None = None, *, accuracy: float | None = None) -> "pd.DataFrame":
     """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
 
     accuracy: as few rows as show each column's largest magnitude to it; every half degree without. Raises BadInput.

@@ -24,6 +24,8 @@ MEANT = {"length": "metres", "angle": "radians"}
 """What a bare number of a kind of quantity is in, where it may be taken for something else."""
 Design = Mapping[str, float | Sequence[float]]
 """A design by label, SI and rad; parts of it may be lists of numbers."""
+Given = Mapping[str, float | str | Sequence[float | str]]
+"""A design as it is given: numbers, or text with units."""
 _ALLOWED = "a finite number in SI units, not negative"
 _PLACE = re.compile("0|[1-9][0-9]{0,2}")
 _GIVE = "Give the JSON that `loomopt solve --json` prints, or its design object"

@@ -73,11 +73,11 @@ def _columns(rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: st
         raise refusal(found, origin, allowed=f"{FEWEST_ROWS} to {MOST_ROWS}", remedy="Give more, or fewer")
     for line, row in enumerate(rows[1:], 2):
         _check_length(row, rows[0], line, origin)
-    found = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
-    for column, values in zip(columns, found, strict=True):
+    values = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
+    for column, numbers in zip(columns, values, strict=True):
         if column.kind == "angle":
-            _check_angles(column.name, values, origin)
-    return found
+            _check_angles(column.name, numbers, origin)
+    return values
 
 
 def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterator[_Column]:

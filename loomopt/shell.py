@@ -1,5 +1,6 @@
 """What the commands share: reading their arguments, progress, remarks."""
 
+import contextlib
 import sys
 import time
 from pathlib import Path
@@ -80,8 +81,9 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
 
 
 def remark(text: str) -> None:
-    """Say something beside the result."""
-    print(text, file=sys.stderr)
+    """Say something beside the result; where nobody can hear it, the exit status still tells."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr)
 
 
 def mistake(error: Any) -> str:

@@ -17,7 +17,7 @@ JOBS = registry.own_names()
 
 ROOMS = (
     "jets tracing",
-    "maths errors frozen tolerances lazy",
+    "maths errors frozen interrupts tolerances lazy",
     "units",
     "quantities",
     "schema files",
@@ -35,7 +35,7 @@ ROOMS = (
     "tables",
     "studies",
     "views",
-    "api shell commands cli",
+    "api shell commands cli __main__",
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}

@@ -1,6 +1,7 @@
 """Designs from files and mappings: a design object or a whole answer, names, numbers and assembly checked."""
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -62,7 +63,14 @@ def test_a_design_or_a_whole_answer_is_read(tmp_path, content):
 
 
 def test_text_with_units_is_read_as_in_a_scene(tmp_path):
-    told = {"l1": "3 cm", "l2": "77 mm", "l3": 0.148, "l4": "0.167 m", "m4e": "6300 g", "r4e": "80 mm"}
+    told: dict[str, float | str | Sequence[float | str]] = {
+        "l1": "3 cm",
+        "l2": "77 mm",
+        "l3": 0.148,
+        "l4": "0.167 m",
+        "m4e": "6300 g",
+        "r4e": "80 mm",
+    }
     assert designs.checked(told, SCENE) == DESIGN
     path = tmp_path / "design.json"
     path.write_text(json.dumps({"design": told}))
