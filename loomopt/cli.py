@@ -71,8 +71,12 @@ def solve(
         answer = api.solve(
             scene, target, **settings, prove=proven, on_start=lambda number, of: progress.say(f"start {number} of {of}")
         )
+    unwritten = None
     if out:
-        remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+        try:
+            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+        except BadInput as error:
+            unwritten = error
     remarked(scene, answer.design)
     if as_json:
         printed(answer)
@@ -80,6 +84,8 @@ def solve(
         from loomopt.views import layout, terminal
 
         layout.show(*terminal.solution(answer, scene))
+    if unwritten:
+        raise unwritten
     raise typer.Exit(EXIT[answer.status])
 
 

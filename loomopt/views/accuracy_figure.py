@@ -8,6 +8,7 @@ from typing import Any
 
 from loomopt import tables
 from loomopt.files import atomically, suffix
+from loomopt.files import check as check_file
 from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
@@ -59,6 +60,7 @@ def _knee(study: Study, name: str) -> str:
 def check(path: Path) -> None:
     """Raise BadInput, before anything is computed, where a study cannot be written as this file."""
     suffix(path, FORMATS)
+    check_file(path)
 
 
 def write(study: Study, path: Path) -> None:
