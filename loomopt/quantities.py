@@ -13,6 +13,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from loomopt.tolerances import NARROWEST
 from loomopt.units import DISPLAY_UNIT as DISPLAY_UNIT
 from loomopt.units import SI_UNIT as SI_UNIT
 from loomopt.units import UNITS as UNITS
@@ -258,7 +259,7 @@ Length = Annotated[float, Quantity("length", least=0)]
 Coordinate = Annotated[float, Quantity("length")]
 PositiveLength = Annotated[float, Quantity("length", above=0)]
 Angle = Annotated[float, Quantity("angle")]
-PulseAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
+PulseAngle = Annotated[float, Quantity("angle", least=NARROWEST, below=2 * math.pi)]
 SegmentAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", above=0, below=math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]

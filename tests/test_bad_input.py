@@ -73,6 +73,8 @@ VALUES = [
     (("operation", "M0", "745 Nm"), "operation.M0", '"Nm" is not a unit', '"N*m"'),
     (("operation", "M0", "745 N m"), "operation.M0", '"N m" is not a unit', '"N*m"'),
     (("effects", "resistance", "pulse", "29.8"), "effects.resistance.pulse", "unit is missing", "deg"),
+    (("effects", "resistance", "pulse", "1e-40 deg"), "effects.resistance.pulse",
+     "out of range", "at least 5.72958e-09 deg"),
     (("effects", "resistance", "pulse", "360 deg"), "effects.resistance.pulse",
      "out of range", "less than 360 deg"),
     (("effects", "inertia", "J4", "0.62 kg*m"), "effects.inertia.J4", "not a unit of inertia", "kg*m^2"),

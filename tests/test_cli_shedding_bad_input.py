@@ -22,6 +22,7 @@ def cli(capsys):
 BAD = [
     ("--set mechanism.rise=121~deg", ["segments add to 361 deg", "360 deg together"]),
     ("--set mechanism.rise=0~deg --set mechanism.far_dwell=180~deg", ["mechanism.rise", "no cam angle"]),
+    ("--set mechanism.return=1e-40~deg --set mechanism.far_dwell=180~deg", ["mechanism.return", "no cam angle"]),
     ("--set mechanism.law=cycloid", ["mechanism.law", '"cycloidal"']),
     ("--set mechanism.law=spline", ["mechanism.law_coefficients", "needs its coefficients"]),
     ("--set mechanism.law=table", ["mechanism.law_table", "needs its file"]),

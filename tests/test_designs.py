@@ -89,6 +89,20 @@ def test_a_number_without_a_unit_is_asked_about_where_it_is_far_beyond_the_machi
     assert "metres?" in refused(designs.checked, {"X0": 78}, load("shedding")).problem
 
 
+@pytest.mark.parametrize("changes", [{"rise": 0.0}, {"return": 1e-12}])
+def test_a_cam_that_moves_in_no_time_does_not_assemble(changes):
+    """Its speed would be infinite, or, told from none by nothing, its return left out."""
+    assert "takes no cam angle" in refused(designs.checked, changes, load("shedding")).problem
+
+
+@pytest.mark.parametrize("pulse", [1e-10, 1e-8, 1e-3])
+def test_a_figure_of_the_narrowest_pulse_is_a_number(pulse, recwarn):
+    """The mean over it is, to what rounding of an angle leaves of its width, that over any pulse."""
+    figures = lo.evaluate(SCENE.set("effects.resistance.pulse", f"{pulse} rad")).figures
+    assert figures["pulse_rms"] == pytest.approx(347.1821, rel=max(1e-6, 1e-15 / pulse))
+    assert not recwarn.list
+
+
 @pytest.mark.parametrize("digits", ["1" * 5000, "999", "01", "-1", "1_0", "\u00b2", "\u0661", "1.0", ""])
 def test_only_the_places_of_a_list_are_numbers_of_it(tmp_path, digits):
     """`int` would take digits of any script, and stops at 4300 of them with an error of its own."""
