@@ -7,6 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from loomopt.errors import clean
+
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
 
@@ -88,6 +90,6 @@ def remark(text: str) -> None:
 
 def mistake(error: Any) -> str:
     """Return what is wrong with a command line, in one line, and where help is."""
-    problem = " ".join(error.format_message().split()).rstrip(".")
+    problem = clean(" ".join(error.format_message().split()).rstrip("."))
     stop = "" if problem.endswith("?") else "."
     return f"{problem}{stop} See `{error.ctx.command_path if error.ctx else 'loomopt'} --help`."

@@ -4,7 +4,7 @@ import contextlib
 import functools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +71,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
         contents["linkage.svg"] = svg.render(view.linkage(scene, flat(solution.design)))
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
-        _make(folder)
+        _make(folder, made)
         together({folder / name: functools.partial(_put, content) for name, content in contents.items()})
     except BaseException:
         for place in made:
@@ -81,21 +81,23 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     return [folder / name for name in contents]
 
 
-def _make(folder: Path) -> None:
+def _make(folder: Path, missing: Sequence[Path]) -> None:
+    """Make the missing folders on the way to a folder, the innermost of which is named first."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for place in reversed(missing):
+            place.mkdir(exist_ok=True)
     except OSError as error:
         raise _no_folder(folder, error.strerror or str(error)) from None
 
 
 def check_folder(folder: Path) -> None:
     """Raise BadInput, before anything is computed, where an answer's folder or its files cannot be."""
-    taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
-    if not taken.is_dir():
-        raise _no_folder(folder, f"{taken} is a file")
-    for name in ANSWER if folder == taken else ():
-        check(folder / name)
     try:
+        taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+        if not taken.is_dir():
+            raise _no_folder(folder, f"{taken} is a file")
+        for name in ANSWER if folder == taken else ():
+            check(folder / name)
         check_room(taken)
     except OSError as error:
         raise _no_folder(folder, error.strerror or str(error)) from None

@@ -116,6 +116,12 @@ def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, m
     assert json.loads((here / "answer" / "answer.json").read_text())["problem"] == "beatup-light"
 
 
+def test_a_folder_may_stand_deep(here):
+    answer = lo.solve(lo.load("beatup"))
+    outputs.answer(Path("x/" * 1200), answer, answer.scene)
+    assert (Path("x/" * 1200) / "answer.json").is_file()
+
+
 def put(place):
     place.write_text("new")
 
