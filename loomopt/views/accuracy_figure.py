@@ -74,7 +74,7 @@ def write(study: Study, path: Path) -> None:
 def draw(study: Study, path: Path) -> None:
     """Write the figure as PNG, PDF or SVG: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
-    with _own_style():
+    with _own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
         page = _figure(9.0, 2.5 * high + 0.5)
         page.set_layout_engine("constrained")

@@ -118,8 +118,13 @@ def test_an_earlier_answer_stays_whole_where_a_new_one_cannot_be_written(here, m
 
 def test_a_folder_may_stand_deep(here):
     answer = lo.solve(lo.load("beatup"))
-    outputs.answer(Path("x/" * 1200), answer, answer.scene)
-    assert (Path("x/" * 1200) / "answer.json").is_file()
+    deep = Path("x/" * 1200)
+    files_made = outputs.answer(deep, answer, answer.scene)
+    assert [path.parent for path in files_made] == [deep] * len(NAMES)
+    for path in files_made:
+        path.unlink()
+    for place in (deep, *deep.parents[:-1]):  # pytest's own way of removing goes a call deeper with each
+        place.rmdir()
 
 
 def put(place):
