@@ -74,6 +74,8 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
     from loomopt.scene_errors import refusal
 
     try:
+        if "_" in text or not text.isascii():  # which Python takes for digits and their separators
+            raise ValueError
         return kind(text)
     except ValueError:
         what = "a whole number" if kind is int else "a number"
