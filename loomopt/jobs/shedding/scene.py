@@ -137,8 +137,7 @@ def check(scene: Scene) -> None:
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
         if not scene.mechanism[name] >= NARROWEST:
-            least = f"at least {math.degrees(NARROWEST):.6g} deg"
-            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
+            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", f"{NARROWEST:g} rad and more")
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
         raise BadInput(
@@ -222,10 +221,8 @@ def fault(numbers: Mapping[str, Any]) -> str:
     dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
-    for name in ("rise", "return"):
-        if not numbers[name] >= NARROWEST:
-            return f"the {name} takes no cam angle"
-    return _follower(numbers)
+    short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
+    return f"the {short[0]} takes no cam angle" if short else _follower(numbers)
 
 
 SCHEMA = SceneSchema(
