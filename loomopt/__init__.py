@@ -4,9 +4,7 @@
 >>> answer = lo.solve(lo.load("beatup-light"), target="balance")
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
     from loomopt.api import Answer, evaluate, load, prove, scene, simulate, solve
     from loomopt.errors import BadInput
@@ -31,11 +29,13 @@ _HOMES = {
 __all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import the public names when they are first asked for: the command line starts without what it does not use."""
+    from importlib import import_module
+
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -8,6 +8,7 @@ from loomopt import designs
 from loomopt.errors import BadInput
 from loomopt.scene_document import looked_up
 from loomopt.scene_errors import clean, refusal, shown
+from loomopt.scene_paths import Paths
 from loomopt.scenes import Scene, build
 
 MOST_TOLD, LONGEST_TOLD = 8, 200
@@ -44,7 +45,9 @@ def _resumed(own: object, scene: Scene, origin: str) -> Scene:
     if document == scene.document:
         return scene
     try:
-        return build(document, scene.jobs, scene.origin)
+        # Somebody else may have made the file: what it names is bound as what a scene file names.
+        paths = Paths(scene.paths.folder or Path(origin).resolve().parent)
+        return build(document, scene.jobs, scene.origin, paths)
     except BadInput as error:
         raise refusal(error.problem, origin, f"{key}.{error.key}", allowed=error.allowed, remedy=error.remedy) from None
 

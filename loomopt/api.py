@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from loomopt import designs
-from loomopt.designs import Design
+from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine

@@ -1,6 +1,7 @@
 """The `loomopt` command: words only, every one of them thin over the library."""
 
 import atexit
+import contextlib
 import gc
 import os
 import sys
@@ -19,13 +20,13 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import typer  # noqa: E402
 
-from loomopt import __version__, commands  # noqa: E402
+from loomopt import __version__, commands, interrupts  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark, worded  # noqa: E402
 
-EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
-BAD_INPUT, INTERRUPTED = 2, 130
+EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
+BAD_INPUT = 2
 SUMMARY = "Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs."
 CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 """Click's base exception, which Typer carries inside itself or imports, by version."""
@@ -69,8 +70,12 @@ def solve(
         outputs.check_folder(out)
     with Progress() as progress:
         answer = api.solve(scene, target, **settings, prove=proven, on_step=progress.say)
+    unwritten = None
     if out:
-        remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+        try:
+            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+        except BadInput as error:
+            unwritten = error
     remarked(scene, answer.design)
     if as_json:
         printed(answer)
@@ -78,6 +83,8 @@ def solve(
         from loomopt.views import layout, terminal
 
         layout.show(*terminal.solution(answer, scene))
+    if unwritten:
+        raise unwritten
     raise typer.Exit(EXIT[answer.status])
 
 
@@ -181,34 +188,35 @@ def run(arguments: list[str] | None = None) -> int:
         remark(f"loomopt: {mistake(error)}")
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
-        status = INTERRUPTED
+        status = interrupts.INTERRUPTED
     except (BrokenPipeError, SystemExit):  # nobody reads on: Click leaves by SystemExit
         return 0
     except OSError as error:
         remark(f"loomopt: the output cannot be written: {error.strerror or error}")
         return BAD_INPUT
-    if status == INTERRUPTED:
-        remark("loomopt: stopped; nothing was left half-written.")
+    if status == interrupts.INTERRUPTED:
+        remark(interrupts.STOPPED)
     return status
 
 
 def main() -> None:
-    """Enter from the shell; leave without taking the interpreter apart object by object, a tenth of the whole time."""
+    """Run as a process; leave without taking the interpreter apart object by object, a tenth of the whole time."""
     gc.disable()
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure:
             reconfigure(errors="replace")
-    status = run()
+    status = interrupts.stoppable(run)
     atexit._run_exitfuncs()
     try:
         sys.stdout.flush()
-        sys.stderr.flush()
     except BrokenPipeError:
-        pass
+        status = 0
     except OSError as error:
         remark(f"loomopt: the output cannot be written: {error.strerror}")
         status = BAD_INPUT
+    with contextlib.suppress(OSError):
+        sys.stderr.flush()
     os._exit(status)
 
 

@@ -1,4 +1,20 @@
-"""The one error a user can cause."""
+"""The one error a user can cause.
+
+Text from outside is shortened, and stripped of whatever a terminal would obey.
+"""
+
+LONGEST_MESSAGE = 2000
+"""Characters, so that a message is read; what it quotes is shortened part by part."""
+_LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 480, "remedy": 240}
+
+
+def clean(text: str, longest: int = 1000) -> str:
+    """Return text without control characters, shortened to about `longest` characters."""
+    ending = f"... ({len(text)} characters)" if len(text) > longest else ""
+    kept = text[:longest]
+    if not kept.isprintable():
+        kept = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in kept)[:longest]
+    return kept + ending
 
 
 class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch it by this name)
@@ -19,6 +35,8 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
     ) -> None:
         self.problem, self.file, self.key = problem, file, key
         self.value, self.allowed, self.remedy = value, allowed, remedy
+        parts = {"file": file, "key": key, "problem": problem, "value": value, "allowed": allowed, "remedy": remedy}
+        file, key, problem, value, allowed, remedy = (clean(text, _LONGEST[name]) for name, text in parts.items())
         place = ": ".join(part for part in (file, key) if part)
         shown = f" (given: {value})" if value else ""
         sentences = [f"{problem}{shown}", f"Allowed: {allowed}" if allowed else "", remedy]

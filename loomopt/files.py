@@ -4,10 +4,13 @@ import contextlib
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from loomopt.errors import BadInput
+
+PROBE = 1_000_000
+"""Bytes for which a disk must have room before anything long is computed: four times the largest packaged answer."""
 
 
 def atomically(path: Path, write: Callable[[Path], None]) -> None:
@@ -16,16 +19,42 @@ def atomically(path: Path, write: Callable[[Path], None]) -> None:
     After any exception or Ctrl-C nothing is left behind and an existing file is as it was; links stay links.
     Raises BadInput where the file cannot be written: no such folder, no permission, not a file, no space.
     """
-    place = Path(os.path.realpath(path))
-    new = place.with_name(f".{secrets.token_hex(8)}{place.suffix}")
+    together({path: write})
+
+
+def together(writes: Mapping[Path, Callable[[Path], None]]) -> None:
+    """Fill several files as `atomically` does, and rename none before all of them are complete."""
+    staged: list[tuple[Path, Path]] = []
+    at = Path()
     try:
-        _check(place, path)
-        write(new)
-        if place.exists():
-            shutil.copymode(place, new)
-        new.replace(place)
+        for at, write in writes.items():
+            place = Path(os.path.realpath(at))
+            _check(place, at)
+            new = place.with_name(f".{secrets.token_hex(8)}{place.suffix}")
+            staged.append((new, place))
+            write(new)
+            if place.exists():
+                shutil.copymode(place, new)
+        for new, at in staged:
+            new.replace(at)
     except OSError as error:
-        raise _unwritable(path, error.strerror or str(error)) from error
+        raise _unwritable(at, error.strerror or str(error)) from error
+    finally:
+        for new, _ in staged:
+            with contextlib.suppress(OSError):
+                new.unlink()
+
+
+def check(path: Path) -> None:
+    """Raise BadInput where a file may not be written, its disk's room apart."""
+    _check(Path(os.path.realpath(path)), path)
+
+
+def check_room(folder: Path) -> None:
+    """Raise OSError where a folder takes no new file of `PROBE` bytes, by trying; nothing is left behind."""
+    new = folder / f".{secrets.token_hex(8)}"
+    try:
+        new.write_bytes(bytes(PROBE))
     finally:
         with contextlib.suppress(OSError):
             new.unlink()

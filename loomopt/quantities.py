@@ -14,6 +14,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from loomopt.tolerances import NARROWEST
 from loomopt.units import DISPLAY_UNIT as DISPLAY_UNIT
 from loomopt.units import SI_UNIT as SI_UNIT
 from loomopt.units import UNITS as UNITS
@@ -26,9 +27,10 @@ from loomopt.units import show as show
 
 _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque": "745", "inertia": "0.62"}
 _LONGEST_TEXT = 100
-_MOST_DIGITS, _PLAIN = 20, 16
+_MOST_DIGITS, _MOST_ZEROS = 20, 16
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_PLAIN = re.compile(_NUMBER)
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
 _FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*)")
@@ -65,7 +67,7 @@ def exact(value: float, unit_text: str, kind: str) -> str:
     shared = Fraction(value) / parse_unit(unit_text).factor
     for digits in range(1, _MOST_DIGITS):
         number = Context(prec=digits).divide(Decimal(shared.numerator), Decimal(shared.denominator)).normalize()
-        plain = f"{number:f}" if -_PLAIN < number.adjusted() < _PLAIN else str(number)
+        plain = f"{number:f}" if -_MOST_ZEROS < number.adjusted() < _MOST_ZEROS else str(number)
         text = plain if unit_text == "1" else f"{plain} {unit_text}"
         if _reads_as(text, kind, value):
             break
@@ -77,6 +79,14 @@ def _reads_as(text: str, kind: str, value: float) -> bool:
         return read(text, kind) == value
     except QuantityError:
         return False
+
+
+def plain_number(text: str) -> float | None:
+    """Return the number that text is by the same pattern, without a unit; None for anything else."""
+    if len(text) > _LONGEST_TEXT or not _PLAIN.fullmatch(text):
+        return None
+    value, nothing = float(text), not re.search("[1-9]", re.split("[eE]", text)[0])
+    return value if nothing or _SMALLEST < abs(value) < _LARGEST else None
 
 
 def unit_of(text: str) -> str:
@@ -270,7 +280,7 @@ Length = Annotated[float, Quantity("length", least=0)]
 Coordinate = Annotated[float, Quantity("length")]
 PositiveLength = Annotated[float, Quantity("length", above=0)]
 Angle = Annotated[float, Quantity("angle")]
-PulseAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
+PulseAngle = Annotated[float, Quantity("angle", least=NARROWEST, below=2 * math.pi)]
 SegmentAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", above=0, below=math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]

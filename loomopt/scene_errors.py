@@ -1,7 +1,4 @@
-"""Messages about a scene: one line each, with file, key, value, what is allowed and what to do.
-
-Text from outside is shortened, and stripped of whatever a terminal would obey.
-"""
+"""Messages about a scene: one line each, with file, key, value, what is allowed and what to do."""
 
 import difflib
 from collections.abc import Iterable
@@ -9,10 +6,11 @@ from collections.abc import Iterable
 from pydantic import BaseModel, ValidationError
 
 from loomopt.errors import BadInput
+from loomopt.errors import clean as clean
 from loomopt.quantities import described, quantity_of
 from loomopt.units import QuantityError
 
-_LONGEST_VALUE, _LONGEST_PART = 80, 1000
+_LONGEST_VALUE, _LONGEST_PART = 80, 450
 _NOTHING = object()
 _PROBLEMS = {
     "dict_type": "it is not a table",
@@ -23,15 +21,6 @@ _PROBLEMS = {
     "int_parsing": "it is not a whole number",
     "int_from_float": "it is not a whole number",
 }
-
-
-def clean(text: str, longest: int = _LONGEST_PART) -> str:
-    """Return text without control characters, shortened to about `longest` characters."""
-    ending = f"... ({len(text)} characters)" if len(text) > longest else ""
-    kept = text[:longest]
-    if not kept.isprintable():
-        kept = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in kept)
-    return kept + ending
 
 
 def shown(value: object) -> str:
@@ -52,12 +41,12 @@ def refusal(
 ) -> BadInput:
     """Return the error for one problem; value: as given, where one is given."""
     return BadInput(
-        clean(problem),
-        file=clean(origin),
+        clean(problem, _LONGEST_PART),
+        file=clean(origin, _LONGEST_PART),
         key=clean(key, 2 * _LONGEST_VALUE),
         value="" if value is _NOTHING else shown(value),
-        allowed=clean(allowed),
-        remedy=clean(remedy),
+        allowed=clean(allowed, _LONGEST_PART),
+        remedy=clean(remedy, _LONGEST_PART),
     )
 
 

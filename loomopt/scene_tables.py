@@ -1,5 +1,6 @@
 """The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from loomopt.scenes import Jobs
 
 _Model = TypeVar("_Model", bound=Table)
+_NAME = re.compile(r"[^\W_][\w-]{0,63}")
+_TAKEN = {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in "0123456789¹²³")}
+"""Names that Windows keeps for its devices."""
 
 
 class Problem(Table):
@@ -81,9 +85,9 @@ def checked(model: type[_Model], raw: object, origin: str, path: str) -> _Model:
 def problem(raw: object, jobs: "Jobs", origin: str) -> Problem:
     """Return [problem], its name fit for a file name and its job one of `jobs`."""
     found = checked(Problem, raw, origin, "problem")
-    if not found.name.replace("-", "").replace("_", "").isalnum() or len(found.name) > 64:
-        remedy = "Name it as a file could be named, such as beatup-wide"
-        allowed = "up to 64 letters, digits, - and _"
+    if not _NAME.fullmatch(found.name) or found.name.lower() in _TAKEN:
+        remedy = "Name it as a file could be named anywhere, such as beatup-wide"
+        allowed = "up to 64 letters, digits, - and _, a letter or digit first, but for CON, NUL and the like"
         raise refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy)
     if found.job not in jobs:
         raise unknown("job", found.job, jobs.names(), origin, "problem.job")

@@ -11,6 +11,7 @@ from loomopt.owned import label, owned
 from loomopt.quantities import unit_of
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
+from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Table
@@ -42,6 +43,7 @@ class Scene:
     operation, mechanism: numbers given or defaulted; tables: both as their models, words and lists too.
     effects: tables of those that are on, in the order of the job, by name; active: the effects themselves.
     bounds: by label of number; limits: by name of figure; targets: every target of the job.
+    paths: where the files lie that it names.
     """
 
     document: Mapping[str, Any] = field(repr=False)
@@ -59,14 +61,15 @@ class Scene:
     bounds: Mapping[str, Bound]
     limits: Mapping[str, Limit]
     targets: Mapping[str, Table] = field(repr=False)
+    paths: Paths = field(repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
         freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
 
-    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str]]:
+    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths]]:
         """Return how to make it again: from its tables, for formulas do not pickle."""
-        return build, (self.document, self.jobs, self.origin)
+        return build, (self.document, self.jobs, self.origin, self.paths)
 
     @property
     def job(self) -> str:
@@ -126,7 +129,7 @@ class Scene:
             if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
                 document = replaced(document, own, {}, self.origin, key)
             document = replaced(document, parts, value, self.origin, key)
-        return self._rebuilt(document)
+        return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
 
     def with_effect(self, name: str) -> "Scene":
         """Return the scene with an effect put on, its values from [available.NAME]."""
@@ -191,7 +194,7 @@ class Scene:
         raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
 
     def _rebuilt(self, document: Mapping[str, Any]) -> "Scene":
-        return build(document, self.jobs, self.origin)
+        return build(document, self.jobs, self.origin, self.paths)
 
     def _effect(self, name: str) -> Effect:
         """Return a declared effect; of an instance, its kind."""
@@ -216,10 +219,11 @@ def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
     return on if own is None else removed(on, ("available", *effect))
 
 
-def build(document: Mapping[str, Any], jobs: Jobs, origin: str) -> Scene:
+def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None) -> Scene:
     """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
 
-    Raises BadInput for the first thing that is wrong.
+    paths: where the files lie that it names; without, they are the caller's own. Raises BadInput for the first thing
+    that is wrong.
     """
     original = copied(document, origin)
     for name in original:
@@ -255,6 +259,7 @@ def build(document: Mapping[str, Any], jobs: Jobs, origin: str) -> Scene:
         bounds=read.bounds(raw["bounds"], schema, places, origin),
         limits=read.limits(raw["limits"], schema, tuple(active), origin),
         targets=read.named(own_targets, targets, "target", origin, "targets"),
+        paths=paths or Paths(),
     )
     schema.check(scene)
     return scene

@@ -1,5 +1,6 @@
 """What the commands share: reading their arguments, progress, remarks."""
 
+import contextlib
 import shutil
 import sys
 import threading
@@ -8,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from loomopt.errors import BadInput
+from loomopt.errors import BadInput, clean
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
@@ -139,6 +140,8 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
     from loomopt.scene_errors import refusal
 
     try:
+        if "_" in text or not text.isascii():  # which Python takes for digits and their separators
+            raise ValueError
         return kind(text)
     except ValueError:
         what = "a whole number" if kind is int else "a number"
@@ -148,8 +151,9 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
 
 
 def remark(text: str) -> None:
-    """Say something beside the result."""
-    print(text, file=sys.stderr)
+    """Say something beside the result; where nobody can hear it, the exit status still tells."""
+    with contextlib.suppress(OSError):
+        print(text, file=sys.stderr)
 
 
 def worded(error: BadInput) -> BadInput:
@@ -168,6 +172,6 @@ def worded(error: BadInput) -> BadInput:
 
 def mistake(error: Any) -> str:
     """Return what is wrong with a command line, in one line, and where help is."""
-    problem = " ".join(error.format_message().split()).rstrip(".")
+    problem = clean(" ".join(error.format_message().split()).rstrip("."))
     stop = "" if problem.endswith("?") else "."
     return f"{problem}{stop} See `{error.ctx.command_path if error.ctx else 'loomopt'} --help`."

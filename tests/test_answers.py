@@ -128,3 +128,17 @@ def test_what_is_wrong_with_an_answer_is_named_with_its_file(file, changes, prob
     assert str(caught.value).startswith(str(caught.value.file))
     assert caught.value.file.endswith("answer.json")
     assert caught.value.remedy
+
+
+def test_an_answers_scene_names_files_beside_it_only(tmp_path):
+    """Somebody else's answer must not reach the reader's own files."""
+    scene = lo.load("shedding")
+    document = json.loads(json.dumps(scene.document))
+    path = tmp_path / "answer.json"
+    for named in ("/proc/self/environ", "../secret.csv"):
+        document["mechanism"] = {**document["mechanism"], "law_table": named}
+        path.write_text(json.dumps({"design": {}, "target": "stiffness", "scene": {"document": document}}))
+        with pytest.raises(lo.BadInput) as refused:
+            answers.read(path, scene)
+        assert "law_table" in refused.value.key
+        assert "HOME" not in str(refused.value)

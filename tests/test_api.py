@@ -98,7 +98,7 @@ def test_an_answers_design_evaluates_to_its_figures(answer):
         assert again.figures[name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9))
 
 
-@pytest.mark.parametrize("design", [{"l9": 1.0}, {"l1": "30 mm"}, {"l1": 0.0}, {"l4": 0.5}, {"m4e": -1.0}, "l1"])
+@pytest.mark.parametrize("design", [{"l9": 1.0}, {"l1": "30 kg"}, {"l1": 0.0}, {"l4": 0.5}, {"m4e": -1.0}, "l1"])
 @pytest.mark.parametrize("function", ["evaluate", "simulate"])
 def test_a_bad_design_is_bad_input(function, design):
     with pytest.raises(lo.BadInput):

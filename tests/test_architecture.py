@@ -17,14 +17,14 @@ JOBS = registry.own_names()
 
 ROOMS = (
     "jets tracing",
-    "maths errors frozen tolerances lazy",
+    "maths errors frozen interrupts tolerances lazy",
     "units",
     "quantities",
     "schema files",
     "mechanisms",
     "effects",
     "scene_errors owned scene_schema",
-    "scene_document scene_tables packaged",
+    "scene_document scene_paths scene_tables packaged",
     "scenes balance cycle",
     "designs answers",
     "scene_csv provenance",
@@ -36,7 +36,7 @@ ROOMS = (
     "tables table_frame",
     "studies",
     "views",
-    "api shell commands cli",
+    "api shell commands cli __main__",
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}

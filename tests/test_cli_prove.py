@@ -161,7 +161,7 @@ def test_bad_input_is_one_line_and_exit_status_2(cli, arguments, named):
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("text", ["{}", '{"design": {"l1": "31 mm"}}', '{"l9": 1}', '{"l1": NaN}', "[]", '{"l1": 1}'])
+@pytest.mark.parametrize("text", ["{}", '{"design": {"l1": "31 kg"}}', '{"l9": 1}', '{"l1": NaN}', "[]", '{"l1": 1}'])
 def test_a_design_that_is_none_is_refused(cli, tmp_path, text):
     path = tmp_path / "bad.json"
     path.write_text(text)

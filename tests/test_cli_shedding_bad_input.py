@@ -22,6 +22,7 @@ def cli(capsys):
 BAD = [
     ("--set mechanism.rise=121~deg", ["segments add to 361 deg", "360 deg together"]),
     ("--set mechanism.rise=0~deg --set mechanism.far_dwell=180~deg", ["mechanism.rise", "no cam angle"]),
+    ("--set mechanism.return=1e-40~deg --set mechanism.far_dwell=180~deg", ["mechanism.return", "no cam angle"]),
     ("--set mechanism.law=cycloid", ["mechanism.law", '"cycloidal"']),
     ("--set mechanism.law=spline", ["mechanism.law_coefficients", "needs its coefficients"]),
     ("--set mechanism.law=table", ["mechanism.law_table", "needs its file"]),
@@ -32,7 +33,7 @@ BAD = [
     ("--set mechanism.law=table --set mechanism.law_table=head.csv", ["head.csv", "no column angle", "s [mm]"]),
     ("--set mechanism.law=table --set mechanism.law_table=units.csv", ["units.csv", "no column s", "s [mm]"]),
     ("--set mechanism.law=table --set mechanism.law_table=few.csv", ["few.csv", "3 rows"]),
-    ("--set mechanism.law=table --set mechanism.law_table=word.csv", ["word.csv", "no number", "ten"]),
+    ("--set mechanism.law=table --set mechanism.law_table=word.csv", ["word.csv", "row 11", "no number under s"]),
     ("--set mechanism.travel=-1~mm", ["mechanism.travel", "at least 0 mm"]),
     ("--set mechanism.X0=-1~mm", ["mechanism.X0", "at least 0 mm"]),
     ("--set mechanism.K1=-1~N/m", ["mechanism.K1", "at least 0 N/m"]),

@@ -1,10 +1,12 @@
 """Designs from files and mappings: a design object or a whole answer, names, numbers and assembly checked."""
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
+import loomopt as lo
 from loomopt import designs
 from loomopt.errors import BadInput
 from loomopt.jobs.registry import load
@@ -21,7 +23,16 @@ BAD = [
     ({"l9": 1.0}, "design.l9", 'unknown design variable "l9"', '"l'),
     ({"r5": 0.1}, "design.r5", "unknown design variable", '"r4'),
     ({1: 2.0}, "design.1", "unknown design variable", "l1, l2"),
-    ({"l1": "30 mm"}, "design.l1", "no design can have it", "SI"),
+    ({"l1": "30"}, "design.l1", "unit is missing", '"30 mm"'),
+    ({"l1": "30 kg"}, "design.l1", "unit of mass", "mm"),
+    ({"l1": "0 mm"}, "design.l1", "out of range", "more than 0 mm"),
+    ({"l1": "-30 mm"}, "design.l1", "out of range", "more than 0 mm"),
+    ({"l1": ""}, "design.l1", "empty", "a length"),
+    ({"l1": 38}, "design.l1", "metres?", '"38 mm", or "38 m"'),
+    ({"l1": 31, "l2": 65, "l3": 155, "l4": 167}, "design.l1", "metres?", '"31 mm"'),
+    ({"l4": 167.0}, "design.l4", "metres?", '"167 mm", or "167 m"'),
+    ({"r4e": 80}, "design.r4e", "metres?", '"80 mm"'),
+    ({"l1": "38 m"}, "design", "does not assemble", "metres"),
     ({"l1": None}, "design.l1", "no design can have it", "SI"),
     ({"l1": True}, "design.l1", "no design can have it", "SI"),
     ({"l1": [0.03]}, "design.l1", "no design can have it", "SI"),
@@ -49,6 +60,81 @@ def test_a_design_or_a_whole_answer_is_read(tmp_path, content):
     path = tmp_path / "design.json"
     path.write_text(json.dumps(content))
     assert designs.read(path, SCENE) == DESIGN
+
+
+def test_text_with_units_is_read_as_in_a_scene(tmp_path):
+    told: dict[str, float | str | Sequence[float | str]] = {
+        "l1": "3 cm",
+        "l2": "77 mm",
+        "l3": 0.148,
+        "l4": "0.167 m",
+        "m4e": "6300 g",
+        "r4e": "80 mm",
+    }
+    assert designs.checked(told, SCENE) == DESIGN
+    path = tmp_path / "design.json"
+    path.write_text(json.dumps({"design": told}))
+    assert designs.read(path, SCENE) == DESIGN
+    assert lo.evaluate(SCENE, told).figures == lo.evaluate(SCENE, DESIGN).figures
+
+
+def test_a_number_without_a_unit_is_asked_about_where_it_is_far_beyond_the_machine():
+    """With text, and within a bound, any size is as it is given; other scenes have other sizes."""
+    mills = {"l1": "31 m", "l2": "65 m", "l3": "155 m", "l4": "167 m"}
+    assert designs.checked(mills, SCENE) == {"l1": 31.0, "l2": 65.0, "l3": 155.0, "l4": 167.0}
+    wide = SCENE.update({"bounds.r4e.min": "0 m", "bounds.r4e.max": "100 m"})
+    assert designs.checked({"r4e": 80}, wide) == {"r4e": 80.0}
+    assert designs.checked({"m4e": 80}, SCENE) == {"m4e": 80.0}
+    assert "radians?" in refused(designs.checked, {"alpha": 28}, load("rapier")).problem
+    assert "metres?" in refused(designs.checked, {"X0": 78}, load("shedding")).problem
+
+
+@pytest.mark.parametrize("changes", [{"rise": 0.0}, {"return": 1e-12}])
+def test_a_cam_that_moves_in_no_time_does_not_assemble(changes):
+    """Its speed would be infinite, or, told from none by nothing, its return left out."""
+    assert "takes no cam angle" in refused(designs.checked, changes, load("shedding")).problem
+
+
+@pytest.mark.parametrize("pulse", [1e-10, 1e-8, 1e-3])
+def test_a_figure_of_the_narrowest_pulse_is_a_number(pulse, recwarn):
+    """The mean over it is, to what rounding of an angle leaves of its width, that over any pulse."""
+    figures = lo.evaluate(SCENE.set("effects.resistance.pulse", f"{pulse} rad")).figures
+    assert figures["pulse_rms"] == pytest.approx(347.1821, rel=max(1e-6, 1e-15 / pulse))
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize("digits", ["1" * 5000, "999", "01", "-1", "1_0", "\u00b2", "\u0661", "1.0", ""])
+def test_only_the_places_of_a_list_are_numbers_of_it(tmp_path, digits):
+    """`int` would take digits of any script, and stops at 4300 of them with an error of its own."""
+    path = tmp_path / "design.json"
+    path.write_text(json.dumps({f"law_{digits}": 1.0}))
+    assert refused(designs.read, path, load("shedding")).key.startswith("design.law")
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        ({"law_0": 6.0, "law_5": -6.0}, "missing"),
+        ({"law_1": 6.0}, "missing"),
+        ({"law_0": 6.0, "law": [6.0, 0.0]}, "as a list and by number"),
+        ({"law": [1.0, "x"]}, "number is missing"),
+    ],
+)
+def test_a_list_has_all_its_numbers_once(data, problem):
+    assert problem in refused(designs.checked, data, load("shedding")).problem
+
+
+def test_numbers_of_a_list_may_be_text():
+    law = [value / 0.88 for value in (0, 6, 4, -4, -6, 0)]
+    found = designs.checked({"law": [repr(value) for value in law]}, load("shedding"))
+    assert found == {f"law_{k}": value for k, value in enumerate(law)}
+
+
+@pytest.mark.parametrize("text", ['{"l1": 0.03, "l1": 0.031}', '{"design": {"l1": 0.03}, "design": {"l1": 0.031}}'])
+def test_a_name_that_comes_twice_is_refused(tmp_path, text):
+    path = tmp_path / "design.json"
+    path.write_text(text)
+    assert "twice" in refused(designs.read, path, SCENE).problem
 
 
 def test_a_part_of_a_design_is_enough_and_integers_and_numpy_numbers_are_numbers():

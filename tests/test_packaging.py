@@ -75,7 +75,7 @@ def tracked():
 def test_the_project_says_what_the_package_is():
     project = PROJECT["project"]
     assert project["version"] == loomopt.__version__
-    assert project["scripts"] == {"loomopt": "loomopt.cli:main"}
+    assert project["scripts"] == {"loomopt": "loomopt.__main__:main"}
     assert project["requires-python"] == ">=3.11"
     assert {"test", "notebook", "dask"} <= set(project["optional-dependencies"])
     included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
@@ -120,7 +120,7 @@ def test_the_wheel_names_its_licence_and_command(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = {name.split("/", 1)[1]: name for name in archive.namelist() if ".dist-info/" in name}
         metadata = email.parser.Parser().parsestr(archive.read(names["METADATA"]).decode())
-        assert "loomopt = loomopt.cli:main" in archive.read(names["entry_points.txt"]).decode()
+        assert "loomopt = loomopt.__main__:main" in archive.read(names["entry_points.txt"]).decode()
     assert (metadata["Name"], metadata["Version"]) == ("loomopt", loomopt.__version__)
     assert metadata["License-Expression"] == "MIT"
     assert "licenses/LICENSE" in names

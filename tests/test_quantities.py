@@ -30,6 +30,7 @@ from loomopt.quantities import (
     show,
     unit_of,
 )
+from loomopt.tolerances import NARROWEST
 
 COMPOUND_UNITS = [
     "turn/min",
@@ -239,7 +240,7 @@ def test_a_field_knows_its_kind():
         "angular speed",
         "number",
     ]
-    assert quantity_of(Model, "pulse") == Quantity("angle", above=0, below=2 * math.pi)
+    assert quantity_of(Model, "pulse") == Quantity("angle", least=NARROWEST, below=2 * math.pi)
     assert quantity_of(Model, "name") is None
     with pytest.raises(LookupError):
         kind_of(Model, "name")

@@ -279,3 +279,8 @@ def test_the_scene_type_is_frozen():
 def test_an_effect_without_values_names_the_keys_to_set():
     with pytest.raises(BadInput, match=r"effects\.gravity\.tilt, effects\.gravity\.offset"):
         scene(edited({"available": {}})).with_effect("gravity")
+
+
+@pytest.mark.parametrize("name", ["a", "7", "beatup-wide_2", "织机-1", "Webstuhl-Öl", "console", "nul-1", "a" * 64])
+def test_a_scene_may_be_named_as_a_file_anywhere(name):
+    assert BEATUP.set("problem.name", name).name == name

@@ -18,6 +18,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs.base import Job
 from loomopt.scene_document import read_document
 from loomopt.scene_errors import unknown
+from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene, build
 
@@ -185,14 +186,18 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
     given = os.fspath(name_or_path)
     if packaged.is_path(name_or_path):
         path = Path(given)
-        return build(read_document(path), REGISTERED, path.name if path.stem == given else given)
+        return _read(path, path.name if path.stem == given else given)
     own = packaged.problems()
     if given in own:
-        return build(read_document(own[given]), REGISTERED, own[given].name)
+        return _read(own[given], own[given].name)
     others, faults = brought()
     if given in others:
-        return build(read_document(others[given]), REGISTERED, str(others[given]))
+        return _read(others[given], str(others[given]))
     raise packaged.unknown_problem(given, own | others, faults)
+
+
+def _read(path: Path, origin: str) -> Scene:
+    return build(read_document(path), REGISTERED, origin, Paths(path.parent.absolute()))
 
 
 def scene(document: Mapping[str, Any]) -> Scene:

@@ -8,6 +8,7 @@ from typing import Any
 
 from loomopt import tables
 from loomopt.files import atomically, suffix
+from loomopt.files import check as check_file
 from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
@@ -59,6 +60,7 @@ def _knee(study: Study, name: str) -> str:
 def check(path: Path) -> None:
     """Raise BadInput, before anything is computed, where a study cannot be written as this file."""
     suffix(path, FORMATS)
+    check_file(path)
 
 
 def write(study: Study, path: Path) -> None:
@@ -72,7 +74,7 @@ def write(study: Study, path: Path) -> None:
 def draw(study: Study, path: Path) -> None:
     """Write the figure as PNG, PDF or SVG: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
-    with _own_style():
+    with _own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
         page = _figure(9.0, 2.5 * high + 0.5)
         page.set_layout_engine("constrained")

@@ -1,6 +1,7 @@
 """Figures by matplotlib: a drawing, or curves over the crank angle. No window, no global state."""
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,7 +26,7 @@ from loomopt.picture.shapes import (
     extent,
     plain,
 )
-from loomopt.views import svg
+from loomopt.views import fonts, svg
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +54,7 @@ def draw(drawing: Drawing, path: Path) -> None:
     box = extent(drawing)
     scale = _PAGE / max(box.right - box.left, box.top - box.bottom)
     inches = scale / 25.4
-    with _own_style():
+    with _own_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
         figure = _figure((box.right - box.left) * inches, (box.top - box.bottom) * inches)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
         axes.set(xlim=(box.left, box.right), ylim=(box.bottom, box.top), xticks=[], yticks=[])
@@ -84,7 +85,7 @@ def curves(
     panels = panels or each(frame.columns)
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
-    with _own_style():
+    with _own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.label, *panel.columns))):
         figure, placed = _grid(panels)
         figure.suptitle(plain(title), fontsize=11, parse_math=False)
         for place, (axes, panel, first, last) in enumerate(placed):
@@ -287,11 +288,13 @@ def _append(axes: Any, primitive: Primitive, layer: Layer, text_height: float, p
 
 
 @contextmanager
-def _own_style() -> Iterator[None]:
-    """Draw in matplotlib's own defaults, whatever the user's settings."""
+def _own_style(*texts: str) -> Iterator[None]:
+    """Draw texts in matplotlib's own defaults, whatever the user's settings; a character no font has is a box."""
     from matplotlib import style
 
-    with style.context(["default", _STYLE]):
+    own = {**_STYLE, "font.family": fonts.families("".join(texts))}
+    with warnings.catch_warnings(), style.context(["default", own]):
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         yield
 
 

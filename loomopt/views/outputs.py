@@ -1,16 +1,17 @@
 """Files for people and other programs: answers, curves and drawings, each written whole or not at all."""
 
+import contextlib
 import functools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt import __version__, tables
 from loomopt.designs import Design, flat
 from loomopt.errors import BadInput
-from loomopt.files import atomically, suffix
+from loomopt.files import atomically, check, check_room, suffix, together
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
 DRAWINGS = (".svg", ".dxf", ".csv")
+ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
+"""Files of an answer."""
 
 
 def document(found: Evaluation) -> str:
@@ -54,7 +57,7 @@ def _put(content: str, place: Path) -> None:
 def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg where there is one to draw.
 
-    Returns the files.
+    All of them or, where one cannot be written, none. Returns the files. Raises BadInput.
     """
     from loomopt.views import svg
 
@@ -66,24 +69,43 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     view = registry.of(scene).views
     if not view.missing(scene):
         contents["linkage.svg"] = svg.render(view.linkage(scene, flat(solution.design)))
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _no_folder(folder, error.strerror or str(error)) from None
-    for name, content in contents.items():
-        text(folder / name, content)
+        _make(folder, made)
+        together({folder / name: functools.partial(_put, content) for name, content in contents.items()})
+    except BaseException:
+        for place in made:
+            with contextlib.suppress(OSError):
+                place.rmdir()
+        raise
     return [folder / name for name in contents]
 
 
+def _make(folder: Path, missing: Sequence[Path]) -> None:
+    """Make the missing folders on the way to a folder, the innermost of which is named first."""
+    try:
+        for place in reversed(missing):
+            place.mkdir(exist_ok=True)
+    except OSError as error:
+        raise _no_folder(folder, error.strerror or str(error)) from None
+
+
 def check_folder(folder: Path) -> None:
-    """Raise BadInput, before anything is computed, where an answer's folder cannot be."""
-    taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
-    if not taken.is_dir():
-        raise _no_folder(folder, f"{taken} is a file")
+    """Raise BadInput, before anything is computed, where an answer's folder or its files cannot be."""
+    try:
+        taken = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+        if not taken.is_dir():
+            raise _no_folder(folder, f"{taken} is a file")
+        for name in ANSWER if folder == taken else ():
+            check(folder / name)
+        check_room(taken)
+    except OSError as error:
+        raise _no_folder(folder, error.strerror or str(error)) from None
 
 
 def _no_folder(folder: Path, reason: str) -> BadInput:
-    return BadInput(f"the folder cannot be made: {reason}", file=str(folder), key="--out", remedy="Name another folder")
+    remedy = "Name another folder, on a disk with space left"
+    return BadInput(f"the answer cannot be written there: {reason}", file=str(folder), key="--out", remedy=remedy)
 
 
 def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = None, target: str | None = None) -> None:

@@ -175,7 +175,7 @@ def test_an_existing_file_is_replaced_whole(here, capsys):
 def test_a_folder_that_cannot_be_is_refused_before_solving(here):
     (here / "file").write_text("")
     for taken in ("file", "file/deeper"):
-        with pytest.raises(BadInput, match="cannot be made"):
+        with pytest.raises(BadInput, match="cannot be written there"):
             outputs.check_folder(here / taken)
     outputs.check_folder(here / "new/deep")
     assert not (here / "new").exists()

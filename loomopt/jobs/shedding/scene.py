@@ -27,6 +27,7 @@ from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
+from loomopt.tolerances import NARROWEST
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -135,8 +136,8 @@ def check(scene: Scene) -> None:
     """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
-        if not scene.mechanism[name] > 0.0:
-            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", "more than 0 deg")
+        if not scene.mechanism[name] >= NARROWEST:
+            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", f"{NARROWEST:g} rad and more")
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
         raise BadInput(
@@ -220,7 +221,8 @@ def fault(numbers: Mapping[str, Any]) -> str:
     dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
-    return _follower(numbers)
+    short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
+    return f"the {short[0]} takes no cam angle" if short else _follower(numbers)
 
 
 SCHEMA = SceneSchema(

@@ -1,0 +1,59 @@
+"""Ctrl-C: at once where nothing can be left half-done, else as KeyboardInterrupt; never a traceback."""
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+INTERRUPTED = 130
+"""Exit status."""
+STOPPED = "loomopt: stopped; nothing was left half-written."
+
+
+def leave() -> NoReturn:
+    """End the process, whatever it is at."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(OSError):
+        os.write(2, f"{STOPPED}\n".encode())
+    os._exit(INTERRUPTED)
+
+
+def leave_at_once() -> None:
+    """Have Ctrl-C end the process: while modules are imported, and once all is said, there is nothing to clean up."""
+    _handle(lambda number, frame: leave())
+
+
+def stoppable(run: Callable[[], int]) -> int:
+    """Return the exit status of `run`; after Ctrl-C 130, whatever an import or a library has made of it."""
+    stopped: list[int] = []
+
+    def stop(number: int, frame: "FrameType | None") -> None:
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    def swallowed(what: "sys.UnraisableHookArgs") -> None:
+        if stopped:
+            leave()
+        sys.__unraisablehook__(what)
+
+    _handle(stop)
+    sys.unraisablehook = swallowed
+    try:
+        status = run()
+    except BaseException:
+        if not stopped:
+            raise
+        leave()
+    leave_at_once()
+    return status
+
+
+def _handle(handler: Callable[[int, "FrameType | None"], None]) -> None:
+    """Set what Ctrl-C does, but where whoever started the process has it ignored."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, handler)

@@ -1,0 +1,135 @@
+"""Ctrl-C from the first moment on: exit status 130 and one line, whatever is being imported; and closed streams."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+HIT = """
+import os, signal, sys
+
+class Hit:
+    def find_spec(self, name, path=None, target=None):
+        if name == hit:
+            os.kill(os.getpid(), signal.SIGINT)
+            len(name)  # signals are seen between two steps of the interpreter
+
+hit = sys.argv.pop(1)
+sys.meta_path.insert(0, Hit())
+from loomopt.__main__ import main
+main()
+"""
+"""The command as the shell starts it; Ctrl-C arrives while one module is looked for."""
+SWALLOWED = """
+import os, signal
+from loomopt import interrupts
+
+class Closed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        len("")
+
+def run():
+    {what}
+    return 0
+
+raise SystemExit(interrupts.stoppable(run))
+"""
+COMMAND = [sys.executable, "-m", "loomopt"]
+
+
+def called(*command, **streams):
+    return subprocess.run(command, capture_output=not streams, text=True, timeout=120, **streams)
+
+
+def is_stopped(done):
+    return (done.returncode, done.stdout, done.stderr) == (
+        130, "", "loomopt: stopped; nothing was left half-written.\n")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["loomopt.cli", "typer", "pydantic", "loomopt.errors", "loomopt.jobs.beatup.job", "loomopt.scenes",
+     "numpy.linalg", "casadi", "numpy", "loomopt.solving.certificate", "rich.table", "loomopt.solving.engine"],
+)  # fmt: skip
+def test_ctrl_c_during_an_import_stops_cleanly(module):
+    assert is_stopped(called(sys.executable, "-c", HIT, module, "solve", "beatup"))
+
+
+@pytest.mark.parametrize(
+    "what",
+    ["os.kill(os.getpid(), signal.SIGINT)", "Closed()",
+     "try:\n        os.kill(os.getpid(), signal.SIGINT)\n    except KeyboardInterrupt:\n        raise ImportError"],
+    ids=["raised", "swallowed", "turned into another error"],
+)  # fmt: skip
+def test_ctrl_c_stops_whatever_a_library_makes_of_it(what):
+    assert is_stopped(called(sys.executable, "-c", SWALLOWED.format(what=what)))
+
+
+def test_an_error_without_ctrl_c_is_an_error():
+    done = called(sys.executable, "-c", SWALLOWED.format(what="raise ImportError"))
+    assert done.returncode == 1
+    assert "ImportError" in done.stderr
+
+
+def test_ctrl_c_stays_ignored_where_it_was():
+    """As in a shell's background job."""
+    code = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n" + HIT
+    done = called(sys.executable, "-c", code, "typer", "list")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "beatup" in done.stdout
+
+
+def test_ctrl_c_at_any_moment_of_a_start_leaves_no_traceback():
+    """By the clock, from where the interpreter itself has started."""
+    for wait in (0.05, 0.1, 0.2, 0.3, 0.45):
+        with subprocess.Popen(
+            [sys.executable, "-c", "from loomopt.__main__ import main\nprint(flush=True)\nmain()", "solve", "rapier"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        ) as process:  # fmt: skip
+            process.stdout.readline()
+            time.sleep(wait)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+        assert "Traceback" not in err
+        assert process.returncode == 130 or (process.returncode == 0 and "rapier" in out)  # it may have been quicker
+
+
+@pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup", "--version", "solve betup"])
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_a_stream_closed_from_the_start_is_bad_input(closed, words):
+    done = called("sh", "-c", f'"$0" -m loomopt {words} {closed}', sys.executable)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == (closed == ">&-")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup", "simulate beatup", "--help"])
+def test_a_reader_that_leaves_is_no_error(words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = called(*COMMAND, *words.split(), stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_listener_that_leaves_does_not_change_the_exit_status():
+    for words, status in (("solve betup", 2), ("list", 0)):
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = called(*COMMAND, *words.split(), stdout=subprocess.PIPE, stderr=writing)
+        os.close(writing)
+        assert done.returncode == status
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no such device here")
+@pytest.mark.parametrize("words", ["list", "solve beatup --json", "evaluate beatup"])
+def test_output_on_a_full_disk_is_bad_input(words):
+    with open("/dev/full", "w") as full:
+        done = called(*COMMAND, *words.split(), stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "No space left on device" in done.stderr
