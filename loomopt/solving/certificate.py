@@ -94,7 +94,7 @@ def judged_levels(local: Local) -> list[JudgedLevel]:
 
 def _judged_level(local: Local, place: int, earlier: Sequence[Multipliers]) -> JudgedLevel:
     """Solve one level's KKT system and judge its curvature."""
-    system = kkt.system(local.active, place, earlier)
+    system = kkt.system(local.active, place, earlier, local.program.fixed)
     first = kkt.solved(local.gradients, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     if local.active.zero[place]:

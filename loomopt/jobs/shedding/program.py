@@ -14,7 +14,7 @@ from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.design import CYCLE
 from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
-from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen
+from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
 from loomopt.owned import owned
@@ -46,7 +46,7 @@ def numbers(scene: Scene) -> dict[str, float]:
 def model(scene: Scene, law: CamLaw | None = None) -> JobModel:
     """Return the frame with the effects the scene calls for; law: another than the scene's."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
-    dwells = (free or scene.mechanism["far_dwell"] > 0.0, free or scene.mechanism["near_dwell"] > 0.0)
+    dwells = (True, True) if free else dwelt(scene.mechanism)
     words = scene_numbers.words(scene)
     return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)))
 
@@ -214,12 +214,11 @@ class _Task:
     def _contact(self) -> list[Limit]:
         """Return the limit that is the job: contact all round, or where the warp's pull is known."""
         least, size = self.known["N_min"], self.sizes.force
-        arcs = self.physics.known_in or (None,)
-        found = [Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0, where=w) for w in arcs]
+        found = Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0)
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            found += [replace(each, name="contact", value=0.0, relaxable=False, hidden=True) for each in found]
-        return found
+            return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True)]
+        return [found]
 
     def _angles(self) -> list[Limit]:
         """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""

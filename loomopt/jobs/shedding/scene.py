@@ -8,10 +8,12 @@ from pydantic import create_model
 
 from loomopt import scene_csv
 from loomopt.effects import found
+from loomopt.effects.kinds import Load
 from loomopt.errors import BadInput
-from loomopt.jobs.shedding.model import FOLLOWER
+from loomopt.jobs.shedding.model import DWELLS, FOLLOWER
 from loomopt.mechanisms import cam_follower, cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.program.numbers import words as scene_words
 from loomopt.quantities import (
     Angle,
     Force,
@@ -27,6 +29,7 @@ from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
+from loomopt.tolerances import SAME_ANGLE
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -146,10 +149,34 @@ def check(scene: Scene) -> None:
             allowed="360 deg together",
             remedy="Correct one of them.",
         )
+    _check_known(scene)
     check_law(scene)
     reason = _follower(scene.mechanism)
     if reason:
         raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
+
+
+def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
+    """Say whether there is a far and a near dwell: one no longer than two roundings of an angle is none.
+
+    The near one takes what the others leave of the turn, which decimals may miss.
+    """
+    rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
+    return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
+
+
+def _check_known(scene: Scene) -> None:
+    """Raise BadInput where a load is known in dwells only and the cam has none of them."""
+    if any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
+        return
+    there = {("segment", float(segment)) for segment, on in zip(DWELLS, dwelt(scene.mechanism), strict=True) if on}
+    for effect in (effect for effect in scene.active if isinstance(effect, Load)):
+        words = {key: word for name, key, word in scene_words(scene) if name == effect.name}
+        places = effect.known_in(words)
+        if places and not there.intersection(places):
+            keys = ", ".join(f"effects.{effect.name}.{key}" for key in words)
+            problem = f"{effect.name} is known in the dwells only, and the cam has none"
+            raise _refused(scene, keys, problem, "another one, or a dwell in which it is known")
 
 
 def _refused(scene: Scene, key: str, problem: str, allowed: str) -> BadInput:
