@@ -33,6 +33,7 @@ from loomopt.program.sampling import Extreme, Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
+from loomopt.tolerances import ACCURACY
 from loomopt.units import show
 
 CYCLE = {
@@ -101,9 +102,15 @@ def contact(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
     found["contact_speed"] = None
     if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
-        speed = speed_reached(physics, sampled.values, "lift", -scene.operation["N_min"])
+        speed = survived(sampled, scene.operation["N_min"])
         found["contact_speed"] = speed if math.isfinite(speed) else None
     return found
+
+
+def survived(sampled: Sampler, least: float) -> float:
+    """Return the speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
+    slack = ACCURACY * abs(sampled.static["spring_force_max"])
+    return speed_reached(sampled.model, sampled.values, "lift", -least, slack)
 
 
 def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CYCLE
+from loomopt.jobs.shedding.design import CYCLE, survived
 from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
@@ -23,7 +23,6 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.program.speeds import speed_reached
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
@@ -77,7 +76,7 @@ def demand(scene: Scene, target: str) -> None:
 
 def _survived(scene: Scene) -> float:
     """Return the speed, rad/s, up to which today's spring keeps contact."""
-    return speed_reached(model(scene), numbers(scene), "lift", -scene.operation["N_min"])
+    return survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
 
 
 def program(scene: Scene, target: str) -> Program:
@@ -108,8 +107,8 @@ class _Task:
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
         if target == "speed":
-            survived = _survived(scene)
-            self.fastest = survived if 0.0 < survived < math.inf else self.known["speed"]
+            fastest = _survived(scene)
+            self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
     def program(self) -> Program:
         variables = self._variables()
