@@ -36,6 +36,9 @@ from loomopt.tolerances import (
     STATIONARY,
 )
 
+SECOND_ORDER_OPEN = "second order open"
+"""The reason of a certificate that neither curvature nor higher orders decide."""
+
 
 @dataclass(frozen=True)
 class JudgedLevel:
@@ -202,9 +205,11 @@ def _not_least(levels: Sequence[JudgedLevel]) -> Iterator[str]:
             yield f"a limit that is not met exactly carries a price: {level.complementarity:.2g}"
         if level.price > LARGEST_PRICE:
             yield f"the price of limit {level.dearest} is without measure: {level.price:.2g}, no KKT point"
-    falling = [each.level.objective for each in levels if each.curvature and each.curvature.falls]
+    falling = [each.level.objective for each in levels if each.curvature and each.curvature.higher == "falls"]
     if falling:
         yield f"second order does not decide: {falling[-1]} falls along a direction without curvature"
+    elif any(each.curvature.higher == "open" for each in levels if each.curvature):
+        yield SECOND_ORDER_OPEN
     if not all(each.curvature.minimum for each in levels if each.curvature):
         yield "second order fails: along some direction the objective falls (a saddle or a maximum)"
 

@@ -8,7 +8,8 @@ ones without a multiplier bound the cone.
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
 decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
 (`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
-Lagrangian is read at a few steps along the line (`lagrangian`: what falls along a curve only is not looked for).
+Lagrangian is read at a few steps along the line, and where it falls there at designs that keep the binding rows
+(`feasible_curve`: what falls along a curve only is not looked for).
 """
 
 import math
@@ -23,6 +24,7 @@ from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
 from loomopt.solving.cone import least_on_cone
 from loomopt.solving.derivatives import Derivatives
+from loomopt.solving.feasible_curve import FeasibleCurve, Verdict
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
@@ -51,14 +53,14 @@ class Local:
 class Curvature:
     """What second order says of one level.
 
-    minimum: nothing falls along a curved direction; unique: along every open direction something rises; falls: the
-    Lagrangian falls along a direction without curvature; settled: a single design is left, but for moves that change
+    minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
+    higher orders do along directions without curvature; settled: a single design is left, but for moves that change
     nothing; step: Newton's, in natural sizes, empty where there is nothing to correct.
     """
 
     minimum: bool = True
     unique: bool = True
-    falls: bool = False
+    higher: Verdict = "holds"
     settled: bool = False
     step: Floats = field(default_factory=lambda: np.zeros(0))
     figures: Floats = field(default_factory=lambda: np.zeros(0))
@@ -69,10 +71,11 @@ class Curvature:
 class Critical:
     """What binding rows leave open: basis (variables, k) of the directions that none forbids.
 
-    back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis;
-    figures: what was compared with a threshold, each over its own.
+    sums: (m, rows), sums of binding rows, each of which stays as it is; back: the shortest step onto them; slopes: of
+    touching rows without a multiplier, along the basis; figures: what was compared with a threshold, each over its own.
     """
 
+    sums: Floats
     basis: Floats
     back: Floats
     slopes: Floats
@@ -106,7 +109,7 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
     slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
     rises = np.abs(slopes).max(axis=1, initial=0.0)
-    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]))
+    return Critical(sums, basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]))
 
 
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
@@ -134,7 +137,11 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
             return replace(found, minimum=False, unique=False)
     unique = not any(cone.ways(vector) for vector in vectors.T[values <= FLAT])
     ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
-    return replace(found, unique=unique, falls=bool(ways) and _falls(local, level, multipliers, ways))
+    if not ways:
+        return replace(found, unique=unique)
+    bent = values > FAINT
+    curve, lagrangian = _curve(local, cone, vectors[:, bent], values[bent]), _lagrangian(local, level, multipliers)
+    return replace(found, unique=unique, higher=_higher(lagrangian, curve, ways, multipliers.residual))
 
 
 def _lines(level: Floats) -> list[Floats]:
@@ -176,8 +183,16 @@ def _is_open(basis: Floats, way: Floats) -> bool:
     return bool(np.linalg.norm(way - basis @ (basis.T @ way)) <= RANK)
 
 
-def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats]) -> bool:
-    """Say whether the Lagrangian falls along directions without curvature."""
+def _curve(local: Local, cone: Critical, curved: Floats, bends: Floats) -> FeasibleCurve:
+    """Return the designs that keep the binding rows; curved, bends: directions in the cone's basis that curve."""
+    scales = dict(zip(local.derivatives.names, map(float, local.scales), strict=True))
+    jacobian = cone.sums @ local.gradients
+    rows = local.active.rows
+    return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends)
+
+
+def _lagrangian(local: Local, level: int, multipliers: Multipliers) -> Lagrangian:
+    """Return one level's Lagrangian as the program's own values have it."""
     active = local.active
     prices: dict[int, float] = {}
     for k in sorted(multipliers.positive):
@@ -185,10 +200,17 @@ def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats
             place = active.rows[k].place
             prices[place] = prices.get(place, 0.0) + float(multipliers.of[k])
     held = {k: held_multiplier(active, k, multipliers) for k in range(level)}
-    weights = {k: weight for k, weight in held.items() if weight}
-    lagrangian = Lagrangian(local.program, local.x, level, prices, weights)
-    found = (dict(zip(local.derivatives.names, map(float, way * local.scales), strict=True)) for way in ways)
-    return any(lagrangian.falls(direction, multipliers.residual) for direction in found)
+    return Lagrangian(local.program, local.x, level, prices, {k: weight for k, weight in held.items() if weight})
+
+
+def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], slope: float) -> Verdict:
+    """Return what higher orders do along directions (variables) without curvature: what falls straight is followed."""
+    found: set[Verdict] = set()
+    for way in ways:
+        along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
+        if lagrangian.falls(along, slope):
+            found.add(curve.judged(lagrangian, curve.basis.T @ way, slope))
+    return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 
 
 def held_multiplier(active: ActiveSet, level: int, multipliers: Multipliers) -> float:
