@@ -7,7 +7,7 @@ figure that decides is too near its threshold for floats, all is judged again in
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,14 +91,15 @@ def judged_levels(local: Local) -> list[JudgedLevel]:
             none = Multipliers(np.zeros(len(local.active.rows)), 0.0)
             found.append(JudgedLevel(Level(objective.figure, 0.0, 0.0, 0.0), none))
         else:
-            found.append(_judged_level(local, place, [each.multipliers for each in found]))
+            found.append(_judged_level(local, place, found))
     return found
 
 
-def _judged_level(local: Local, place: int, earlier: Sequence[Multipliers]) -> JudgedLevel:
-    """Solve one level's KKT system and judge its curvature."""
-    system = kkt.system(local.active, place, earlier, local.program.fixed)
-    first = kkt.solved(local.gradients, system)
+def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> JudgedLevel:
+    """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
+    local = replace(whole, closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
+    system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
+    first = kkt.solved(local.slopes, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     if local.active.zero[place]:
         return alone
@@ -118,8 +119,8 @@ def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple
     curvature = second_order.judged(local, place, system, first)
     if curvature.minimum and curvature.unique:
         return first, curvature
-    for k in kkt.replaceable(local.gradients, system, first, STATIONARY):
-        other = kkt.solved(local.gradients, system.without(k))
+    for k in kkt.replaceable(local.slopes, system, first, STATIONARY):
+        other = kkt.solved(local.slopes, system.without(k))
         if other.residual <= STATIONARY:
             found = second_order.judged(local, place, system, other)
             if (found.minimum, found.unique) > (curvature.minimum, curvature.unique):

@@ -21,7 +21,7 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import Row
-from loomopt.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET, PROBES, SAME_NODE
+from loomopt.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET, PROBES, RANK, SAME_NODE
 
 Design = dict[str, float]
 Verdict = Literal["holds", "falls", "open"]
@@ -66,6 +66,35 @@ class FeasibleCurve:
             better += lower
         return "falls" if any(map(self._is_kept, better)) else "open"
 
+    def bent(self, lagrangian: Lagrangian, lines: Floats, ways: Floats) -> Floats | None:
+        """Return (c, n, n): the Lagrangian's third derivatives along lines (k, c), once, and ways (k, n), twice.
+
+        Central differences of its slopes along the lines; None where a design beside x cannot be read.
+        """
+        step, count = PROBES[-1], ways.shape[1]
+        found = np.zeros((lines.shape[1], count, count))
+        for i in range(count):
+            for j in range(i + 1):
+                both = [sign * (ways[:, i] + side * ways[:, j]) / 2 for side in (1.0, -1.0) for sign in (1.0, -1.0)]
+                slopes = [self._slopes(lagrangian, lines, step * way) for way in both]
+                if any(each is None for each in slopes):
+                    return None
+                # w_i w_j = ((w_i + w_j)/2)² − ((w_i − w_j)/2)²; the slope at x itself cancels.
+                sums = np.array(slopes, dtype=np.float64)
+                found[:, i, j] = found[:, j, i] = (sums[0] + sums[1] - sums[2] - sums[3]) / step**2
+        return found
+
+    def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
+        """Return the Lagrangian's slopes along lines (k, c) at coordinates in the basis."""
+        step, found = PROBES[-1], []
+        for line in lines.T:
+            ends = [self.at(place + sign * step * line) for sign in (1.0, -1.0)]
+            high, low = (lagrangian.value(x) if x else None for x in ends)
+            if high is None or low is None:
+                return None
+            found.append((high - low) / (2 * step))
+        return np.array(found)
+
     def at(self, place: Floats) -> Design | None:
         """Return the design (SI) at coordinates (k,) in the basis that keeps the rows; None where none is found."""
         moved, before = self.basis @ place, math.inf
@@ -84,13 +113,10 @@ class FeasibleCurve:
 
     def _lowest(self, lagrangian: Lagrangian, step: float, way: Floats) -> list[Design]:
         """Return the design a step along a direction, and the one moved along what is curved to the least there."""
-        slopes = []
-        for line in self.curved.T:
-            ends = [self.at(step * (way + sign * line)) for sign in (1.0, -1.0)]
-            high, low = (lagrangian.value(x) if x else None for x in ends)
-            slopes.append(0.0 if high is None or low is None else (high - low) / (2 * step))
-        shift = self.curved @ (np.array(slopes) / self.bends)
-        places = [step * way, step * way - shift] if np.any(shift) else [step * way]
+        slopes = self._slopes(lagrangian, self.curved, step * way)
+        places = [step * way]
+        if slopes is not None and np.any(slopes):
+            places.append(step * way - self.curved @ (slopes / self.bends))
         return [x for x in map(self.at, places) if x]
 
     def _is_kept(self, x: Mapping[str, float]) -> bool:
@@ -108,7 +134,7 @@ class FeasibleCurve:
     @lazy
     def _back(self) -> Floats:
         """The shortest step (variables, m) that changes each sum by 1."""
-        return np.linalg.pinv(self.jacobian)
+        return np.linalg.pinv(self.jacobian, rcond=RANK)
 
     @lazy
     def _here(self) -> Floats | None:

@@ -32,8 +32,35 @@ from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 
 
 @dataclass(frozen=True)
+class Closed:
+    """Directions that a level closes to those after it: it rises along them, though to second order only.
+
+    directions: (c, variables), orthonormal; bends: (c,), its curvatures; curve, lagrangian: of that level; first:
+    whether no level before it closes any.
+    """
+
+    directions: Floats
+    bends: Floats
+    curve: FeasibleCurve
+    lagrangian: Lagrangian
+    first: bool
+
+    def moves(self, basis: Floats) -> Floats | None:
+        """Return (c, k, k): second derivatives of where that level is least, along directions (variables, k).
+
+        None where they cannot be read.
+        """
+        ways, lines = self.curve.basis.T @ basis, self.curve.basis.T @ self.directions.T
+        found = self.curve.bent(self.lagrangian, lines, ways)
+        return None if found is None else -found / self.bends[:, None, None]
+
+
+@dataclass(frozen=True)
 class Local:
-    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them."""
+    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
+
+    closed: by each earlier level.
+    """
 
     program: Program
     x: Mapping[str, float]
@@ -41,6 +68,17 @@ class Local:
     active: ActiveSet
     derivatives: Derivatives
     gradients: Floats
+    closed: tuple[Closed, ...] = ()
+
+    @property
+    def shut(self) -> Floats:
+        """The closed directions (c, variables) of all earlier levels."""
+        return np.vstack([np.zeros((0, len(self.derivatives.names))), *(each.directions for each in self.closed)])
+
+    @property
+    def slopes(self) -> Floats:
+        """The slopes (rows, variables) along what is not closed."""
+        return self.gradients - (self.gradients @ self.shut.T) @ self.shut
 
     @property
     def scales(self) -> Floats:
@@ -55,7 +93,7 @@ class Curvature:
 
     minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
     higher orders do along directions without curvature; settled: a single design is left, but for moves that change
-    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct.
+    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; closed: to later levels.
     """
 
     minimum: bool = True
@@ -65,21 +103,23 @@ class Curvature:
     step: Floats = field(default_factory=lambda: np.zeros(0))
     figures: Floats = field(default_factory=lambda: np.zeros(0))
     largest: float = 0.0
+    closed: Closed | None = None
 
 
 @dataclass(frozen=True)
 class Critical:
     """What binding rows leave open: basis (variables, k) of the directions that none forbids.
 
-    sums: (m, rows), sums of binding rows, each of which stays as it is; back: the shortest step onto them; slopes: of
-    touching rows without a multiplier, along the basis; figures: what was compared with a threshold, each over its own.
+    back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis;
+    figures: what was compared with a threshold, each over its own; sums: (m, rows), sums of binding rows, each of which
+    stays as it is.
     """
 
-    sums: Floats
     basis: Floats
     back: Floats
     slopes: Floats
     figures: Floats = field(default_factory=lambda: np.zeros(0))
+    sums: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def ways(self, line: Floats) -> list[Floats]:
         """Return the directions (variables) of a line, in the cone's basis, that touching rows leave open."""
@@ -99,17 +139,17 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     shared = [[k for k in group if k in bound] for group in system.groups]
     apart = [unit[k] - unit[of[0]] for of in shared for k in of[1:]]
     sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
-    jacobian = sums @ local.gradients
+    jacobian = np.vstack([sums @ local.slopes, local.shut])
     left, sizes, rows = np.linalg.svd(jacobian)
     least = RANK * max(1.0, sizes.max(initial=0.0))
     rank = int(np.sum(sizes > least))
     basis = rows[rank:].T
     excess = np.array([row.excess for row in active.rows])
-    missed = sums @ np.where(np.isfinite(excess), excess, 0.0)
+    missed = np.append(sums @ np.where(np.isfinite(excess), excess, 0.0), np.zeros(len(local.shut)))
     back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
     slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
     rises = np.abs(slopes).max(axis=1, initial=0.0)
-    return Critical(sums, basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]))
+    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
 
 
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
@@ -122,6 +162,10 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         return Curvature(settled=True, step=step, figures=cone.figures)
     bends = local.derivatives.curvatures(cone.basis)
     hessian = np.tensordot(weights, bends, axes=1)
+    followed = _followed(local, cone.basis, slope)
+    if followed is None:
+        return Curvature(unique=False, higher="open", figures=cone.figures)
+    hessian += followed
     values, vectors = np.linalg.eigh(hessian)
     curved = values > NEWTON_CURVED
     found = Curvature(
@@ -135,13 +179,34 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         found = replace(found, figures=np.append(found.figures, abs(least) / FLAT))
         if least < -FLAT:
             return replace(found, minimum=False, unique=False)
-    unique = not any(cone.ways(vector) for vector in vectors.T[values <= FLAT])
-    ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
-    if not ways:
-        return replace(found, unique=unique)
-    bent = values > FAINT
+    found = replace(found, unique=not any(cone.ways(vector) for vector in vectors.T[values <= FLAT]))
+    bent, rising = values > FAINT, values > FLAT
     curve, lagrangian = _curve(local, cone, vectors[:, bent], values[bent]), _lagrangian(local, level, multipliers)
-    return replace(found, unique=unique, higher=_higher(lagrangian, curve, ways, multipliers.residual))
+    if rising.any() and values.min() >= -FLAT:
+        directions = (cone.basis @ vectors[:, rising]).T
+        found = replace(found, closed=Closed(directions, values[rising], curve, lagrangian, not local.closed))
+    ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
+    higher = _higher(lagrangian, curve, ways, multipliers.residual)
+    if higher == "falls" and np.abs(local.shut @ slope).max(initial=0.0) > FLAT:
+        # A design that is better here may be worse at an earlier level, whose least bends away.
+        higher = "open"
+    return replace(found, higher=higher)
+
+
+def _followed(local: Local, basis: Floats, slope: Floats) -> Floats | None:
+    """Return (k, k): what a level gains along a basis by following where earlier levels are least; None: not known.
+
+    slope: of its Lagrangian; along closed directions it need not vanish.
+    """
+    found = np.zeros((basis.shape[1],) * 2)
+    for closed in local.closed:
+        pull = closed.directions @ slope
+        if np.abs(pull).max(initial=0.0) > FLAT:
+            moves = closed.moves(basis) if closed.first else None
+            if moves is None:
+                return None
+            found += np.tensordot(pull, moves, axes=1)
+    return found
 
 
 def _lines(level: Floats) -> list[Floats]:
@@ -186,7 +251,7 @@ def _is_open(basis: Floats, way: Floats) -> bool:
 def _curve(local: Local, cone: Critical, curved: Floats, bends: Floats) -> FeasibleCurve:
     """Return the designs that keep the binding rows; curved, bends: directions in the cone's basis that curve."""
     scales = dict(zip(local.derivatives.names, map(float, local.scales), strict=True))
-    jacobian = cone.sums @ local.gradients
+    jacobian = cone.sums @ local.slopes
     rows = local.active.rows
     return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends)
 
