@@ -8,8 +8,8 @@ ones without a multiplier bound the cone.
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
 decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
 (`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
-Lagrangian is read at a few steps along the line, and where it falls there at designs that keep the binding rows
-(`feasible_curve`: what falls along a curve only is not looked for).
+Lagrangian is read at a few steps along the line and at designs beside it that keep the binding rows
+(`feasible_curve`); of many such directions only what falls along a straight line is followed.
 """
 
 import math
@@ -29,6 +29,10 @@ from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
 from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
+
+FOLLOWED = 3
+"""Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall
+along a straight line."""
 
 
 @dataclass(frozen=True)
@@ -185,8 +189,9 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
     if rising.any() and values.min() >= -FLAT:
         directions = (cone.basis @ vectors[:, rising]).T
         found = replace(found, closed=Closed(directions, values[rising], curve, lagrangian, not local.closed))
-    ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
-    higher = _higher(lagrangian, curve, ways, multipliers.residual)
+    faint = vectors.T[values <= FAINT]
+    ways = [way for line in _lines(faint) for way in cone.ways(line)]
+    higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
     if higher == "falls" and np.abs(local.shut @ slope).max(initial=0.0) > FLAT:
         # A design that is better here may be worse at an earlier level, whose least bends away.
         higher = "open"
@@ -268,13 +273,18 @@ def _lagrangian(local: Local, level: int, multipliers: Multipliers) -> Lagrangia
     return Lagrangian(local.program, local.x, level, prices, {k: weight for k, weight in held.items() if weight})
 
 
-def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], slope: float) -> Verdict:
-    """Return what higher orders do along directions (variables) without curvature: what falls straight is followed."""
+def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], slope: float, every: bool) -> Verdict:
+    """Return what higher orders do along directions (variables) without curvature.
+
+    every: whether each is followed, not only what falls along a straight line.
+    """
     found: set[Verdict] = set()
     for way in ways:
         along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
-        if lagrangian.falls(along, slope):
-            found.add(curve.judged(lagrangian, curve.basis.T @ way, slope))
+        straight = lagrangian.falls(along, slope)
+        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope) if straight or every else "holds"
+        if straight or verdict == "falls":
+            found.add(verdict)
     return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 
 

@@ -148,7 +148,7 @@ def higher(local, level, found, ways):
     """Return what higher orders do where nothing falls along a straight line: no design beside is asked for."""
     cone = second_order.Critical(np.eye(2), np.zeros(2), np.zeros((0, 2)), sums=np.zeros((0, len(local.active.rows))))
     curve = second_order._curve(local, cone, np.zeros((2, 0)), np.zeros(0))
-    return second_order._higher(second_order._lagrangian(local, level, found), curve, ways, found.residual)
+    return second_order._higher(second_order._lagrangian(local, level, found), curve, ways, found.residual, every=False)
 
 
 def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read):
