@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import toy
 
+import loomopt as lo
 from loomopt.solving.certificate import certify, judged_levels
 from loomopt.solving.exact import Exact
 from loomopt.solving.forward import Forward
@@ -110,3 +111,34 @@ def test_a_solve_ends_where_curvature_alone_holds_the_first_level():
     assert answer.status == "optimal", answer.message
     assert answer.design["a"] == pytest.approx(0.0, abs=1e-8)
     assert answer.design["b"] == pytest.approx(2.0, abs=1e-6)
+
+
+ROOMY = {
+    "operation.M0": "100 N*m",
+    "bounds.l1": {"min": "10 mm", "max": "90 mm"},
+    "bounds.l2": {"min": "10 mm", "max": "520 mm"},
+    "bounds.l3": {"min": "40 mm", "max": "550 mm"},
+    "bounds.l4": {"min": "140 mm", "max": "550 mm"},
+    "limits.theta": {"min": "1 deg", "max": "10 deg"},
+    "limits.swing": {"min": "20 deg", "max": "23.4 deg"},
+    "limits.mu_min.min": "5 deg",
+}
+
+
+def test_a_reed_torque_that_curves_and_leaves_the_scale_open_has_no_price_without_measure():
+    """Two limits bind and |M3| curves along what is left of the shape; the rod's inertia then asks for a small one."""
+    answer = lo.solve(lo.load("beatup-light").update(ROOMY).with_effect("rod_inertia"))
+    assert answer.status == "optimal", answer.message
+    peak = next(level for level in answer.certificate.levels if level.objective == "peak_torque")
+    assert 0.0 < peak.price < 1e3
+    assert "l1" in [price.limit for price in answer.binding if "peak_torque" in price.worth]
+
+
+@pytest.mark.parametrize("least", [0.0, 0.5, 1.0])
+def test_a_point_that_curvature_alone_isolates_leaves_later_levels_nothing_to_choose(least):
+    """l1, l4 and theta bind; along what is left |M3| curves, but for a radius that changes nothing."""
+    answer = lo.solve(lo.load("beatup-light").set("limits.theta.min", f"{least} deg"))
+    assert answer.status == "optimal", answer.message
+    assert {price.limit for price in answer.binding} >= {"l1", "l4", "theta"}
+    if least == 0.0:
+        assert abs(answer.figures["M3_fdc"]) == pytest.approx(88.530879, abs=1e-6)
