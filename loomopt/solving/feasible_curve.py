@@ -134,7 +134,7 @@ class FeasibleCurve:
     @lazy
     def _back(self) -> Floats:
         """The shortest step (variables, m) that changes each sum by 1."""
-        return np.linalg.pinv(self.jacobian, rcond=RANK)
+        return np.asarray(np.linalg.pinv(self.jacobian, rcond=RANK), dtype=np.float64)
 
     @lazy
     def _here(self) -> Floats | None:

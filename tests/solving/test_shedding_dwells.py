@@ -56,7 +56,7 @@ def test_variables_without_room_are_held_on_both_sides():
 
 def test_a_cam_without_the_dwells_in_which_a_load_is_known_is_refused():
     turned = {"rise": "180 deg", "far_dwell": "0 deg", "return": "180 deg", "near_dwell": "0 deg"}
-    with pytest.raises(BadInput, match="warp_tension is known in the dwells only, and the cam has none"):
+    with pytest.raises(BadInput, match="warp_tension is known in the dwells only, and there are none"):
         STATIC.update({f"mechanism.{name}": value for name, value in turned.items()})
 
 

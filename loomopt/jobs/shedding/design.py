@@ -12,16 +12,7 @@ from loomopt import balance, maths
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.base import Figures
-from loomopt.jobs.shedding.model import (
-    FAR_DWELL,
-    NEAR_DWELL,
-    RETURN,
-    RETURN_SPRING,
-    RISE,
-    SEGMENT,
-    FramePose,
-    frame,
-)
+from loomopt.jobs.shedding.model import RETURN, RETURN_SPRING, RISE, FramePose, frame
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, LawTarget
 from loomopt.maths import Number
 from loomopt.mechanisms import cam_limit
@@ -51,7 +42,6 @@ GAVE_WAY = 1e-7
 """A number that a target keeps has given way when it is off by this, in its natural size."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
-DWELL_NAMES = {"far": FAR_DWELL, "near": NEAR_DWELL}
 MOVES = " The moves, where not every force is known, are not judged."
 LIMIT = "law_acceleration"
 PROBES = ((RISE, 0.25, 0.125, 0.0, 0.0), (RISE, 0.75, 0.5, 1.5, -2.0), (RETURN, 0.125, 0.375, 2.0, 3.0))
@@ -123,9 +113,9 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
 
 def judged(model: JobModel) -> str:
     """Return the dwells, in words, that the cam force is judged in; "" where it is known all round."""
-    there = [name for name, segment in DWELL_NAMES.items() if segment in frame(model).segments]
-    known = [name for name in there if (SEGMENT, float(DWELL_NAMES[name])) in model.known_in]
-    return "both dwells" if len(known) > 1 else f"the {known[0]} dwell" if known else ""
+    names = [SEGMENTS[int(value)] for _, value in model.known_in if int(value) in frame(model).segments]
+    known = [name.replace("_", " ") for name in names]
+    return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
 
 
 def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 from loomopt import maths
 from loomopt.cycle import Floats
 from loomopt.effects.kinds import Check
-from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.design import CYCLE, survived
@@ -23,6 +22,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler, sampled
+from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
@@ -54,24 +54,16 @@ def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
     base.demand(scene, target)
     if target == "speed" and (model(scene).known_in or math.isinf(_survived(scene))):
-        raise BadInput(
-            "nothing limits the speed: as the scene stands, the roller stays on the cam at any",
-            file=scene.origin,
-            key="effects.inertia.M, mechanism.travel, effects.warp_tension.shape",
-            allowed="a moving mass, a travel, and a warp tension that is known in the moves (linear, step)",
-            remedy="Correct them, or choose another target.",
-        )
+        problem = "nothing limits the speed: as the scene stands, the roller stays on the cam at any"
+        keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
+        allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
+        raise refusal(problem, scene.origin, keys, allowed=allowed, remedy="Correct them, or choose another target.")
     own = scene.table(LawTarget)
     fewest, most = cam_spline.FEWEST, cam_spline.MOST
     if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
-        raise BadInput(
-            "a law cannot have so many intervals",
-            file=scene.origin,
-            key="targets.law.intervals",
-            value=str(own.intervals),
-            allowed=f"{fewest} to {most}, an even number for a symmetric law",
-            remedy="Write intervals = 16.",
-        )
+        problem, key = "a law cannot have so many intervals", "targets.law.intervals"
+        allowed = f"{fewest} to {most}, an even number for a symmetric law"
+        raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
 
 
 def _survived(scene: Scene) -> float:

@@ -8,12 +8,11 @@ from pydantic import create_model
 
 from loomopt import scene_csv
 from loomopt.effects import found
-from loomopt.effects.kinds import Load
 from loomopt.errors import BadInput
-from loomopt.jobs.shedding.model import DWELLS, FOLLOWER
+from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
 from loomopt.mechanisms import cam_follower, cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
-from loomopt.program.numbers import words as scene_words
+from loomopt.program.numbers import check_known
 from loomopt.quantities import (
     Angle,
     Force,
@@ -142,14 +141,11 @@ def check(scene: Scene) -> None:
             raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", "more than 0 deg")
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-        raise BadInput(
-            f"the cam's segments add to {math.degrees(total):.9g} deg: {given}",
-            file=scene.origin,
-            key=f"mechanism.{', '.join(SEGMENTS)}",
-            allowed="360 deg together",
-            remedy="Correct one of them.",
-        )
-    _check_known(scene)
+        problem, keys = f"the cam's segments add to {math.degrees(total):.9g} deg: {given}", ", ".join(SEGMENTS)
+        raise _refused(scene, f"mechanism.{keys}", problem, "360 deg together", "Correct one of them.")
+    if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
+        dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
+        check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
     check_law(scene)
     reason = _follower(scene.mechanism)
     if reason:
@@ -157,30 +153,13 @@ def check(scene: Scene) -> None:
 
 
 def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Say whether there is a far and a near dwell: one no longer than two roundings of an angle is none.
-
-    The near one takes what the others leave of the turn, which decimals may miss.
-    """
+    """Say whether there is a far dwell, and a near one in what the others leave of the turn: rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
 
 
-def _check_known(scene: Scene) -> None:
-    """Raise BadInput where a load is known in dwells only and the cam has none of them."""
-    if any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
-        return
-    there = {("segment", float(segment)) for segment, on in zip(DWELLS, dwelt(scene.mechanism), strict=True) if on}
-    for effect in (effect for effect in scene.active if isinstance(effect, Load)):
-        words = {key: word for name, key, word in scene_words(scene) if name == effect.name}
-        places = effect.known_in(words)
-        if places and not there.intersection(places):
-            keys = ", ".join(f"effects.{effect.name}.{key}" for key in words)
-            problem = f"{effect.name} is known in the dwells only, and the cam has none"
-            raise _refused(scene, keys, problem, "another one, or a dwell in which it is known")
-
-
-def _refused(scene: Scene, key: str, problem: str, allowed: str) -> BadInput:
-    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy="Correct it.")
+def _refused(scene: Scene, key: str, problem: str, allowed: str, remedy: str = "Correct it.") -> BadInput:
+    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy=remedy)
 
 
 def chosen(scene: Scene) -> CamLaw:
