@@ -128,7 +128,7 @@ def test_a_spring_too_soft_exits_with_3_and_says_what_would_help(cli):
     assert any("K1 <= 50000 N/m" in limit for limit in data["clash"])
     assert any("speed" in limit for limit in data["clash"])
     for relaxation in data["relaxation"]:
-        assert list(relaxation) == ["limit", "side", "value", "needed", "alone", "text"]
+        assert list(relaxation) == ["limit", "side", "value", "needed", "alone", "text", "in_proportion"]
     status, out, _ = cli("solve", "shedding", *TOO_SOFT)
     assert status == 3
     assert "rpm" in out

@@ -195,7 +195,7 @@ def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
 def _uniform(sampler: Sampler, family: Family, count: int) -> tuple[Extreme, ...]:
     """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
     pieces, u = sampler.cycle.located(TURN * np.arange(count) / count)
-    on = sampler.cycle.on(family.where)[pieces]
+    on = sampler.on(family.row, family.where)[pieces]
     places = list(zip(pieces[on].tolist(), u[on].tolist(), strict=True))
     if family.row in sampler.model.signed:
         return tuple(Extreme(*place, 0.0, signed=True) for place in places)

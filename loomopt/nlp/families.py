@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from loomopt.cycle import Where
 from loomopt.program.program import Program
+from loomopt.schema import Values
 
 
 class Epigraph(NamedTuple):
@@ -19,12 +20,21 @@ class Epigraph(NamedTuple):
 
 
 class Family(NamedTuple):
-    """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place."""
+    """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place.
+
+    where: the pieces they are asked for, every one without it; known: those where the quantity is known at all.
+    """
 
     row: str
     epigraph: int = -1
     limit: int = -1
     where: Where | None = None
+    known: tuple[Where, ...] = ()
+
+    def counts(self, switch: Values) -> bool:
+        """Say whether it has rows on the pieces of a switch."""
+        asked = self.where is None or switch.get(self.where[0]) == self.where[1]
+        return asked and (not self.known or any(switch.get(name) == value for name, value in self.known))
 
 
 def epigraphs(program: Program, elastic: bool = False) -> tuple[Epigraph, ...]:
@@ -38,7 +48,8 @@ def families(program: Program, elastic: bool = False) -> list[Family]:
     above = enumerate(epigraphs(program, elastic))
     peaks = [(k, epigraph) for k, epigraph in above if program.objectives[epigraph.objective].form == "peak"]
     limits = [(k, limit) for k, limit in enumerate(program.limits) if limit.family == "cycle"]
+    known = program.model.known_of
     return [
-        *(Family(row, epigraph=k) for k, epigraph in peaks for row in epigraph.rows),
-        *(Family(limit.row, limit=k, where=limit.where) for k, limit in limits),
+        *(Family(row, epigraph=k, known=known(row)) for k, epigraph in peaks for row in epigraph.rows),
+        *(Family(limit.row, limit=k, where=limit.where, known=known(limit.row)) for k, limit in limits),
     ]

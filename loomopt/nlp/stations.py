@@ -14,8 +14,7 @@ from loomopt.schema import Values
 
 def held(switches: Sequence[Values], family: Family) -> list[int]:
     """Return the places of the stations, of these switches, where a family has a row."""
-    on = family.where
-    return [k for k, switch in enumerate(switches) if on is None or switch.get(on[0]) == on[1]]
+    return [k for k, switch in enumerate(switches) if family.counts(switch)]
 
 
 def owners(program: Program, families: Sequence[Family], rows: int) -> list[int]:

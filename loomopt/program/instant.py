@@ -68,13 +68,15 @@ class Quantity(NamedTuple):
     """A whole-cycle quantity; figure: whether its largest |value| is one.
 
     signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
-    bound between points is proven with every answer.
+    bound between points is proven with every answer; loaded: it reads the sum of the loads, so that it is known only
+    where all of them are.
     """
 
     formula: Formula
     figure: bool = True
     signed: bool = False
     bounded: bool = False
+    loaded: bool = False
 
 
 class Row(NamedTuple):

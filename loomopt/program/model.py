@@ -91,6 +91,10 @@ class JobModel:
         loads = [load for load in self.loads if isinstance(load, Load)]
         return next((found for load in loads if (found := load.known_in(self.words_of(load.name)))), ())
 
+    def known_of(self, name: str) -> tuple[Where, ...]:
+        """Return the pieces where a whole-cycle quantity is known; empty for all of the cycle."""
+        return self.known_in if self._quantities[self._cased.get(name, (name, 0))[0]].loaded else ()
+
     # Quantities and rows.
 
     @lazy
@@ -167,12 +171,9 @@ class JobModel:
     @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
         """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
-        found = {
-            phrase: (prefix + name, 1.0)
-            for prefix, group in self.kinematics.groups.items()
-            for phrase, name in group.closes.items()
-        }
-        return found | dict(self.assembled)
+        groups = self.kinematics.groups.items()
+        closes = {phrase: (prefix + name, 1.0) for prefix, group in groups for phrase, name in group.closes.items()}
+        return closes | dict(self.assembled)
 
     @property
     def demands(self) -> tuple[tuple[Check[Any], Demand], ...]:
@@ -278,8 +279,7 @@ class JobModel:
 
     def quantity(self, maths: Maths, given: Given, name: str, node: Node) -> Number:
         """Return a whole-cycle quantity, SI, at a node."""
-        plain, case = self._cased.get(name, (name, -1))
-        return self._quantities[plain].formula(self._instant(maths, given, node, case))
+        return self.together(maths, given, node)(name)
 
     def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
         """Return what reads whole-cycle quantities by name, SI, at a node whose pose is computed once for all."""

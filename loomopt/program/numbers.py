@@ -1,10 +1,11 @@
 """A scene's numbers by one name each, whatever table they stand in; what its effects say of them."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Literal
 
-from loomopt.effects.kinds import Check
+from loomopt.cycle import Where
+from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
 from loomopt.owned import label, owned
 from loomopt.program.model import JobModel
@@ -117,6 +118,21 @@ def demand_figures(scene: Scene, model: JobModel, rows: Mapping[str, Sequence[st
                 key=f"limits.{name}",
                 allowed="figures whose numbers and effects the scene has",
                 remedy=remedy.format(name=name),
+            )
+
+
+def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
+    """Raise BadInput where a load is known on pieces of the cycle only, and none of them is there; called: these."""
+    for effect in (effect for effect in scene.active if isinstance(effect, Load)):
+        own = {key: word for name, key, word in words(scene) if name == effect.name}
+        places = effect.known_in(own)
+        if places and not set(places) & set(there):
+            raise BadInput(
+                f"{effect.name} is known in the {called} only, and there are none",
+                file=scene.origin,
+                key=", ".join(f"effects.{effect.name}.{key}" for key in own),
+                allowed=f"another word, or {called} in which it is known",
+                remedy="Correct it.",
             )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt import maths
 from loomopt.balance import Given
@@ -196,8 +197,13 @@ class Sampler:
         if name not in self._extremes:
             self._extremes[name] = self._find_extremes(name)
         found = self._extremes[name]
-        on = self.cycle.on(where)
+        on = self.on(name, where)
         return [e for e in found if on[e.piece]]
+
+    def on(self, name: str, where: Where | None = None) -> NDArray[np.bool_]:
+        """Say of each piece, of those `where` alone, whether a quantity is known there and counts."""
+        known, asked = [self.cycle.on(place) for place in self.model.known_of(name)], self.cycle.on(where)
+        return asked & np.any(known, axis=0) if known else asked
 
     def _find_extremes(self, name: str) -> list[Extreme]:
         pieces, u = self.grid()

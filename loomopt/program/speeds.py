@@ -13,19 +13,27 @@ from loomopt.program.traced import Quantities
 from loomopt.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
 
 
-def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float) -> float:
+def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float, slack: float = 0.0) -> float:
     """Return the speed, rad/s, up to which a signed quantity stays at most `most`, SI; infinite where it always does.
 
     It is quadratic in the speed at every crank angle: the first root is sampled, then followed by Newton's method
-    with the refined largest value. 0 where the bound is broken at rest.
+    with the refined largest value. 0 where the bound is broken at rest. slack, SI: an excess that counts as none, at
+    rest and up to the mechanism's own speed: what a solve leaves of a bound that is met exactly.
     """
-    unit = float(values["speed"])
+    own = float(values["speed"])
     at_rest = sampled(model, {**values, "speed": 0.0})
+    speed = _reached(at_rest, own, name, most, slack)
+    tied = slack > 0.0 and speed < own <= _reached(at_rest, own, name, most + slack, slack)
+    return own if tied else speed
+
+
+def _reached(at_rest: Sampler, unit: float, name: str, most: float, slack: float) -> float:
+    """Return the speed, rad/s, up to which a quantity stays at most `most`; unit: a speed to read it at, rad/s."""
     nodes = at_rest.node(*at_rest.grid())
     rest, ahead, back = -_at_speeds(at_rest, name, nodes, (0.0, unit, -unit))
     rounding = SPEED_AT_REST * float(np.abs([rest, ahead]).max())
     spare = rest + most
-    if spare.min() < -rounding:
+    if spare.min() < -max(rounding, slack):
         return 0.0
     square, linear = (ahead + back) / 2 - rest, (ahead - back) / 2
     shares = _first_roots(square, linear, np.maximum(spare, 0.0), rounding)

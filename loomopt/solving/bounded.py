@@ -75,7 +75,7 @@ class Boxes(Reading):
     def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> Bound:
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
         cycle, used = self.cycle, 0
-        for piece in map(int, np.flatnonzero(cycle.on(where))):
+        for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
             tops = self._tops(name, sign, piece)
             boxes = [Box(0.0, 1.0)]
             while boxes:
@@ -203,7 +203,7 @@ def between_points(sampler: Sampler, rows: Sequence[CycleRow], points: int) -> f
     values = sampler.together(list(dict.fromkeys(name for name, _, _ in rows)), pieces, u)
     worst = 0.0
     for name, scale, where in rows:
-        on = sampler.cycle.on(where)[pieces]
+        on = sampler.on(name, where)[pieces]
         highest = float(sampler.heights(name, values[name][on]).max(initial=-np.inf))
         worst = max(worst, (highest - sampler.peak(name, where)) / scale)
     return worst

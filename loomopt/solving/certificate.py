@@ -7,7 +7,7 @@ figure that decides is too near its threshold for floats, all is judged again in
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,9 @@ from loomopt.tolerances import (
     POSITIVE,
     STATIONARY,
 )
+
+SECOND_ORDER_OPEN = "second order open"
+"""The reason of a certificate that neither curvature nor higher orders decide."""
 
 
 @dataclass(frozen=True)
@@ -88,14 +91,15 @@ def judged_levels(local: Local) -> list[JudgedLevel]:
             none = Multipliers(np.zeros(len(local.active.rows)), 0.0)
             found.append(JudgedLevel(Level(objective.figure, 0.0, 0.0, 0.0), none))
         else:
-            found.append(_judged_level(local, place, [each.multipliers for each in found]))
+            found.append(_judged_level(local, place, found))
     return found
 
 
-def _judged_level(local: Local, place: int, earlier: Sequence[Multipliers]) -> JudgedLevel:
-    """Solve one level's KKT system and judge its curvature."""
-    system = kkt.system(local.active, place, earlier)
-    first = kkt.solved(local.gradients, system)
+def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> JudgedLevel:
+    """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
+    local = replace(whole, closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
+    system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
+    first = kkt.solved(local.slopes, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     if local.active.zero[place]:
         return alone
@@ -115,8 +119,8 @@ def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple
     curvature = second_order.judged(local, place, system, first)
     if curvature.minimum and curvature.unique:
         return first, curvature
-    for k in kkt.replaceable(local.gradients, system, first, STATIONARY):
-        other = kkt.solved(local.gradients, system.without(k))
+    for k in kkt.replaceable(local.slopes, system, first, STATIONARY):
+        other = kkt.solved(local.slopes, system.without(k))
         if other.residual <= STATIONARY:
             found = second_order.judged(local, place, system, other)
             if (found.minimum, found.unique) > (curvature.minimum, curvature.unique):
@@ -202,9 +206,11 @@ def _not_least(levels: Sequence[JudgedLevel]) -> Iterator[str]:
             yield f"a limit that is not met exactly carries a price: {level.complementarity:.2g}"
         if level.price > LARGEST_PRICE:
             yield f"the price of limit {level.dearest} is without measure: {level.price:.2g}, no KKT point"
-    falling = [each.level.objective for each in levels if each.curvature and each.curvature.falls]
+    falling = [each.level.objective for each in levels if each.curvature and each.curvature.higher == "falls"]
     if falling:
         yield f"second order does not decide: {falling[-1]} falls along a direction without curvature"
+    elif any(each.curvature.higher == "open" for each in levels if each.curvature):
+        yield SECOND_ORDER_OPEN
     if not all(each.curvature.minimum for each in levels if each.curvature):
         yield "second order fails: along some direction the objective falls (a saddle or a maximum)"
 

@@ -5,7 +5,7 @@ by multipliers that sum to 1. A limit or an earlier objective that binds is an e
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,11 +71,15 @@ class Multipliers:
         return weights
 
 
-def system(active: ActiveSet, level: int, earlier: Sequence[Multipliers]) -> System:
-    """Return one level's system; earlier: the multipliers of the levels before it."""
+def system(
+    active: ActiveSet, level: int, earlier: Sequence[Multipliers], fixed: Collection[str] = frozenset()
+) -> System:
+    """Return one level's system; earlier: the multipliers of the levels before it; fixed: variables without room."""
     bound = {k for each in earlier for k in each.positive}
     limits = [row.limit for row in active.rows[: active.limits]]
-    equal = tuple(k for k, limit in enumerate(limits) if limit and (limit.sign == 0 or k in bound))
+    equal = tuple(
+        k for k, limit in enumerate(limits) if limit and (limit.sign == 0 or limit.row in fixed or k in bound)
+    )
     unequal = tuple(k for k in range(active.limits) if k not in equal)
     held = [sums for place in range(level) for sums in _held(active, place, bound)]
     return System(active.levels[level], unequal, equal, np.array(held).reshape(-1, len(active.rows)))

@@ -25,19 +25,21 @@ class Lagrangian:
 
     def falls(self, direction: Mapping[str, float], slope: float) -> bool:
         """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
-        base = self._base
-        if base is None:
-            return False
-        found = ((step, self._value(step, direction)) for step in PROBES)
-        return all(value is not None and value - base < -(FALL_MARGIN * slope * step + FALLEN) for step, value in found)
+        found = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
+        return all(self.is_lower(there, step, slope) for step, there in found)
+
+    def is_lower(self, there: Mapping[str, float], step: float, slope: float) -> bool:
+        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains."""
+        base, value = self._base, self.value(there)
+        return base is not None and value is not None and value - base < -(FALL_MARGIN * slope * step + FALLEN)
 
     @functools.cached_property
     def _base(self) -> float | None:
-        return self._value(0.0, {})
+        return self.value(self.x)
 
-    def _value(self, step: float, direction: Mapping[str, float]) -> float | None:
-        """Return its value at a step along a direction; None where the linkage has no real position."""
-        sampler = sampler_at(self.program, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()})
+    def value(self, there: Mapping[str, float]) -> float | None:
+        """Return its value at a design (SI); None where the linkage has no real position."""
+        sampler = sampler_at(self.program, there)
         if sampler is None:
             return None
         weights = {self.level: 1.0, **self.held}

@@ -1,5 +1,7 @@
 """What a limit costs: its multiplier in the units a designer reads, and the figure that it is told of."""
 
+from dataclasses import replace
+
 from loomopt.program.program import Limit, Objective
 from loomopt.program.sampling import Sampler
 from loomopt.solving.verdict import Binding
@@ -13,7 +15,11 @@ def figure_of(sampler: Sampler, objective: Objective) -> float:
 
 
 def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
-    """Return a binding limit with its multiplier in SI units of objective per limit."""
+    """Return a binding limit with its multiplier in SI units of objective per limit.
+
+    A number that is kept, and would rather be on the other side of its limit, is told as a limit of that side.
+    """
+    limit = replace(limit, sign=-limit.sign) if multiplier < 0.0 else limit
     weight = sampler.single(limit.weight) if limit.weight else 1.0
     worth = abs(multiplier) * objective.scale / limit.scale * weight
     if objective.power != 1:

@@ -1,6 +1,6 @@
 """From a judged design to what a person and a script read."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from loomopt import designs
@@ -9,7 +9,7 @@ from loomopt.program import numbers
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Solution
+from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
 from loomopt.tolerances import FEASIBLE
@@ -117,6 +117,16 @@ def _stops(prices: tuple[Price, ...]) -> str:
     return f"Limits that stop {figure}: {listed}."
 
 
+def _helps(relaxations: Sequence[Relaxation]) -> str:
+    """Return what helps as sentences, the first one begun already."""
+    first, *others = remedies(relaxations)
+    said = ", ".join(each.text for each in first) + "."
+    alone = "; ".join(each.text for remedy in others for each in remedy if each.alone)
+    together = ", ".join(each.text for remedy in others for each in remedy if not each.alone)
+    said += f" By itself, any one of these would do{' too' if first[0].alone else ''}: {alone}." if alone else ""
+    return said + (f" So would all of these together: {together}." if together else "")
+
+
 def without_optimum(
     target: str,
     here: Evaluation,
@@ -127,13 +137,9 @@ def without_optimum(
 ) -> Solution:
     """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
     if found.relaxations:
-        together = ", ".join(r.text for r in found.relaxations if not r.alone) or found.relaxations[0].text
-        alone = [r.text for r in found.relaxations if r.alone and r.text != together]
-        also = " too" if found.relaxations[0].alone else ""
-        single = f" By itself, any one of these would do{also}: {'; '.join(alone)}." if alone else ""
         message = (
             f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
-            f"The least relaxation that helps: {together}.{single} {explanation}"
+            f"The least relaxation that helps: {_helps(found.relaxations)} {explanation}"
         ).strip()
     else:
         status = str(solver["status"])
@@ -143,7 +149,7 @@ def without_optimum(
         target=target,
         status="infeasible" if found.relaxations else "failed",
         message=message,
-        relaxation=found.relaxations,
+        relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
         clash=found.limits,
         explanation=explanation if found.relaxations else "",
         solver=solver,

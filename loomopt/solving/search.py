@@ -186,7 +186,10 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         close = certificate.residual <= precise and certificate.error <= accuracy
         if not certificate.correction or close:
             break
-        search, moved, better = _settled(search, _stepped(search.program, x, certificate.correction))
+        stepped = _stepped(search.program, x, certificate.correction)
+        if sampler_at(search.program, stepped) is None:
+            break
+        search, moved, better = _settled(search, stepped)
         if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
             break
         x, certificate = moved, better

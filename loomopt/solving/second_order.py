@@ -8,7 +8,8 @@ ones without a multiplier bound the cone.
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
 decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
 (`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
-Lagrangian is read at a few steps along the line (`lagrangian`: what falls along a curve only is not looked for).
+Lagrangian is read at a few steps along the line and at designs beside it that keep the binding rows
+(`feasible_curve`); of many such directions only what falls along a straight line is followed.
 """
 
 import math
@@ -23,15 +24,47 @@ from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
 from loomopt.solving.cone import least_on_cone
 from loomopt.solving.derivatives import Derivatives
+from loomopt.solving.feasible_curve import FeasibleCurve, Verdict
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
 from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 
+FOLLOWED = 3
+"""Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall
+along a straight line."""
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Directions that a level closes to those after it: it rises along them, though to second order only.
+
+    directions: (c, variables), orthonormal; bends: (c,), its curvatures; curve, lagrangian: of that level; first:
+    whether no level before it closes any.
+    """
+
+    directions: Floats
+    bends: Floats
+    curve: FeasibleCurve
+    lagrangian: Lagrangian
+    first: bool
+
+    def moves(self, basis: Floats) -> Floats | None:
+        """Return (c, k, k): second derivatives of where that level is least, along directions (variables, k).
+
+        None where they cannot be read.
+        """
+        ways, lines = self.curve.basis.T @ basis, self.curve.basis.T @ self.directions.T
+        found = self.curve.bent(self.lagrangian, lines, ways)
+        return None if found is None else -found / self.bends[:, None, None]
+
 
 @dataclass(frozen=True)
 class Local:
-    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them."""
+    """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
+
+    closed: by each earlier level.
+    """
 
     program: Program
     x: Mapping[str, float]
@@ -39,6 +72,17 @@ class Local:
     active: ActiveSet
     derivatives: Derivatives
     gradients: Floats
+    closed: tuple[Closed, ...] = ()
+
+    @property
+    def shut(self) -> Floats:
+        """The closed directions (c, variables) of all earlier levels."""
+        return np.vstack([np.zeros((0, len(self.derivatives.names))), *(each.directions for each in self.closed)])
+
+    @property
+    def slopes(self) -> Floats:
+        """The slopes (rows, variables) along what is not closed."""
+        return self.gradients - (self.gradients @ self.shut.T) @ self.shut
 
     @property
     def scales(self) -> Floats:
@@ -51,18 +95,19 @@ class Local:
 class Curvature:
     """What second order says of one level.
 
-    minimum: nothing falls along a curved direction; unique: along every open direction something rises; falls: the
-    Lagrangian falls along a direction without curvature; settled: a single design is left, but for moves that change
-    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct.
+    minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
+    higher orders do along directions without curvature; settled: a single design is left, but for moves that change
+    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; closed: to later levels.
     """
 
     minimum: bool = True
     unique: bool = True
-    falls: bool = False
+    higher: Verdict = "holds"
     settled: bool = False
     step: Floats = field(default_factory=lambda: np.zeros(0))
     figures: Floats = field(default_factory=lambda: np.zeros(0))
     largest: float = 0.0
+    closed: Closed | None = None
 
 
 @dataclass(frozen=True)
@@ -70,13 +115,15 @@ class Critical:
     """What binding rows leave open: basis (variables, k) of the directions that none forbids.
 
     back: the shortest step onto the binding rows; slopes: of touching rows without a multiplier, along the basis;
-    figures: what was compared with a threshold, each over its own.
+    figures: what was compared with a threshold, each over its own; sums: (m, rows), sums of binding rows, each of which
+    stays as it is.
     """
 
     basis: Floats
     back: Floats
     slopes: Floats
     figures: Floats = field(default_factory=lambda: np.zeros(0))
+    sums: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def ways(self, line: Floats) -> list[Floats]:
         """Return the directions (variables) of a line, in the cone's basis, that touching rows leave open."""
@@ -96,17 +143,17 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     shared = [[k for k in group if k in bound] for group in system.groups]
     apart = [unit[k] - unit[of[0]] for of in shared for k in of[1:]]
     sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
-    jacobian = sums @ local.gradients
+    jacobian = np.vstack([sums @ local.slopes, local.shut])
     left, sizes, rows = np.linalg.svd(jacobian)
     least = RANK * max(1.0, sizes.max(initial=0.0))
     rank = int(np.sum(sizes > least))
     basis = rows[rank:].T
     excess = np.array([row.excess for row in active.rows])
-    missed = sums @ np.where(np.isfinite(excess), excess, 0.0)
+    missed = np.append(sums @ np.where(np.isfinite(excess), excess, 0.0), np.zeros(len(local.shut)))
     back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
     slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
     rises = np.abs(slopes).max(axis=1, initial=0.0)
-    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]))
+    return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
 
 
 def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
@@ -119,6 +166,10 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         return Curvature(settled=True, step=step, figures=cone.figures)
     bends = local.derivatives.curvatures(cone.basis)
     hessian = np.tensordot(weights, bends, axes=1)
+    followed = _followed(local, cone.basis, slope)
+    if followed is None:
+        return Curvature(unique=False, higher="open", figures=cone.figures)
+    hessian += followed
     values, vectors = np.linalg.eigh(hessian)
     curved = values > NEWTON_CURVED
     found = Curvature(
@@ -132,9 +183,35 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         found = replace(found, figures=np.append(found.figures, abs(least) / FLAT))
         if least < -FLAT:
             return replace(found, minimum=False, unique=False)
-    unique = not any(cone.ways(vector) for vector in vectors.T[values <= FLAT])
-    ways = [way for line in _lines(vectors.T[values <= FAINT]) for way in cone.ways(line)]
-    return replace(found, unique=unique, falls=bool(ways) and _falls(local, level, multipliers, ways))
+    found = replace(found, unique=not any(cone.ways(vector) for vector in vectors.T[values <= FLAT]))
+    bent, rising = values > FAINT, values > FLAT
+    curve, lagrangian = _curve(local, cone, vectors[:, bent], values[bent]), _lagrangian(local, level, multipliers)
+    if rising.any() and values.min() >= -FLAT:
+        directions = (cone.basis @ vectors[:, rising]).T
+        found = replace(found, closed=Closed(directions, values[rising], curve, lagrangian, not local.closed))
+    faint = vectors.T[values <= FAINT]
+    ways = [way for line in _lines(faint) for way in cone.ways(line)]
+    higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
+    if higher == "falls" and np.abs(local.shut @ slope).max(initial=0.0) > FLAT:
+        # A design that is better here may be worse at an earlier level, whose least bends away.
+        higher = "open"
+    return replace(found, higher=higher)
+
+
+def _followed(local: Local, basis: Floats, slope: Floats) -> Floats | None:
+    """Return (k, k): what a level gains along a basis by following where earlier levels are least; None: not known.
+
+    slope: of its Lagrangian; along closed directions it need not vanish.
+    """
+    found = np.zeros((basis.shape[1],) * 2)
+    for closed in local.closed:
+        pull = closed.directions @ slope
+        if np.abs(pull).max(initial=0.0) > FLAT:
+            moves = closed.moves(basis) if closed.first else None
+            if moves is None:
+                return None
+            found += np.tensordot(pull, moves, axes=1)
+    return found
 
 
 def _lines(level: Floats) -> list[Floats]:
@@ -176,8 +253,16 @@ def _is_open(basis: Floats, way: Floats) -> bool:
     return bool(np.linalg.norm(way - basis @ (basis.T @ way)) <= RANK)
 
 
-def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats]) -> bool:
-    """Say whether the Lagrangian falls along directions without curvature."""
+def _curve(local: Local, cone: Critical, curved: Floats, bends: Floats) -> FeasibleCurve:
+    """Return the designs that keep the binding rows; curved, bends: directions in the cone's basis that curve."""
+    scales = dict(zip(local.derivatives.names, map(float, local.scales), strict=True))
+    jacobian = cone.sums @ local.slopes
+    rows = local.active.rows
+    return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends)
+
+
+def _lagrangian(local: Local, level: int, multipliers: Multipliers) -> Lagrangian:
+    """Return one level's Lagrangian as the program's own values have it."""
     active = local.active
     prices: dict[int, float] = {}
     for k in sorted(multipliers.positive):
@@ -185,10 +270,22 @@ def _falls(local: Local, level: int, multipliers: Multipliers, ways: list[Floats
             place = active.rows[k].place
             prices[place] = prices.get(place, 0.0) + float(multipliers.of[k])
     held = {k: held_multiplier(active, k, multipliers) for k in range(level)}
-    weights = {k: weight for k, weight in held.items() if weight}
-    lagrangian = Lagrangian(local.program, local.x, level, prices, weights)
-    found = (dict(zip(local.derivatives.names, map(float, way * local.scales), strict=True)) for way in ways)
-    return any(lagrangian.falls(direction, multipliers.residual) for direction in found)
+    return Lagrangian(local.program, local.x, level, prices, {k: weight for k, weight in held.items() if weight})
+
+
+def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], slope: float, every: bool) -> Verdict:
+    """Return what higher orders do along directions (variables) without curvature.
+
+    every: whether each is followed, not only what falls along a straight line.
+    """
+    found: set[Verdict] = set()
+    for way in ways:
+        along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
+        straight = lagrangian.falls(along, slope)
+        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope) if straight or every else "holds"
+        if straight or verdict == "falls":
+            found.add(verdict)
+    return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 
 
 def held_multiplier(active: ActiveSet, level: int, multipliers: Multipliers) -> float:

@@ -1,7 +1,7 @@
 """What a solve or an evaluation says: plain data, ready for JSON."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +64,10 @@ class Price:
 
 @dataclass(frozen=True)
 class Relaxation:
-    """How far a limit must be loosened to make a design possible, SI; alone: this one limit suffices."""
+    """How far a limit must be loosened to make a design possible, SI.
+
+    alone: this one limit suffices; in_proportion: it gives way by no more than a designer may think of.
+    """
 
     limit: str
     side: str
@@ -72,6 +75,15 @@ class Relaxation:
     needed: float
     alone: bool
     text: str
+    in_proportion: bool = True
+
+
+def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
+    """Return what helps, each by itself: limits that give way together, or one alone; out of proportion last."""
+    together = tuple(each for each in relaxations if not each.alone)
+    found = [together] if together else []
+    found += [(each,) for each in relaxations if each.alone]
+    return sorted(found, key=lambda remedy: not all(each.in_proportion for each in remedy))
 
 
 @dataclass(frozen=True)

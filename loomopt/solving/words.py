@@ -8,9 +8,12 @@ from loomopt.quantities import SI_UNIT, factor, quantity_of, show
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding
+from loomopt.tolerances import SHOWN_AS_ZERO
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
 SIDES = {-1: "min", 1: "max"}
+MOST_WIDTHS = 3.0
+"""Widths of its bounds by which a limit may give way; beyond them a designer has another machine in mind."""
 UNKNOWN = "number"
 """The kind of what no table names, such as a variable that only the target's task has."""
 
@@ -88,7 +91,15 @@ class Words:
         """Return how far a limit must give way, SI and as a phrase."""
         side = limit.sign or (1 if need > 0 else -1)
         needed = limit.value + side * abs(need)
-        change = self.shown(limit.name, abs(need), 3)
-        unit = self.unit(limit.name)
+        if abs(needed) <= SHOWN_AS_ZERO * max(abs(limit.value), abs(need)):
+            needed = 0.0
+        unit, fair = self.unit(limit.name), abs(need) <= MOST_WIDTHS * self._width(limit)
+        change = self.shown(limit.name, abs(need), 3) + ("" if fair else ", out of proportion")
         text = f"{self.limit(limit)} -> {show(outward(needed / factor(unit), side) * factor(unit), unit)} (by {change})"
-        return Relaxation(limit.name, SIDES[side], limit.value, needed, alone, text)
+        return Relaxation(limit.name, SIDES[side], limit.value, needed, alone, text, fair)
+
+    def _width(self, limit: Limit) -> float:
+        """Return what a relaxation is measured by, SI: the width of its bounds, else itself, else its natural size."""
+        bound = self.scene.bounds.get(limit.name) if limit.family != "cycle" else None
+        width = bound.max - bound.min if bound else 0.0
+        return (width if 0.0 < width < math.inf else abs(limit.value)) or limit.scale

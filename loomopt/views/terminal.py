@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.quantities import exact
 from loomopt.scenes import Scene
-from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.solution import Evaluation, Solution, remedies
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.tolerances import SLACK
@@ -107,11 +107,11 @@ def _limit(low: float | None, high: float | None) -> str:
 
 def _relaxation(answer: Solution) -> Grid:
     """Return what would have to give way."""
-    together = [joined(r.text) for r in answer.relaxation if not r.alone]
-    alone = [joined(r.text) for r in answer.relaxation if r.alone]
-    first = "all of these" if len(together) > 1 else "this"
-    lines = [(first if place == 0 else "", text) for place, text in enumerate(together)]
-    lines += [("or this alone" if lines else "this alone", text) for text in alone]
+    lines: list[tuple[str, str]] = []
+    for remedy in remedies(answer.relaxation):
+        label = "this alone" if remedy[0].alone else "all of these" if len(remedy) > 1 else "this"
+        heads = [f"or {label}" if lines else label, *([""] * (len(remedy) - 1))]
+        lines += [(head, joined(each.text)) for head, each in zip(heads, remedy, strict=True)]
     return Grid("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from waves import objective, program
 
+import loomopt as lo
 from loomopt.nlp import exchange, polish
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Settings
@@ -52,7 +53,7 @@ def test_what_clashes_is_left_as_it_is():
     alone = polish.binding(np.zeros(1), np.array([1.0, 0.0]))
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
     assert polish.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
-    assert polish.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
+    assert polish.met(jacobian, free, np.array([1.0 + 5e-5]), alone) is None, "too far"
 
 
 def bare(lower=(-9.0, -9.0), upper=(9.0, 9.0)):
@@ -73,8 +74,8 @@ def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
 def test_what_binds_at_its_bound_is_put_on_it():
     arguments = bare((0.0, -9.0), (9.0, 1.0))
     assert list(holds(row(-1.0), arguments, (1e-7, 1.0 - 1e-7), (-1.0, 1.0))) == [0.0, 1.0]
-    assert list(holds(row(-1.0), arguments, (1e-6, 0.5), (-1.0, 0.0))) == [0.0, 0.5], "just not too far"
-    assert holds(row(-1.0), arguments, (2e-6, 0.5), (-1.0, 0.0)) is None
+    assert list(holds(row(-1.0), arguments, (2e-5, 0.5), (-1.0, 0.0))) == [0.0, 0.5], "just not too far"
+    assert holds(row(-1.0), arguments, (4e-5, 0.5), (-1.0, 0.0)) is None
     assert list(holds(row(-1.0), arguments, (1e-7, 0.5), (-1e-6, 0.0))) == [1e-7, 0.5], "no multiplier to speak of"
 
 
@@ -124,3 +125,19 @@ def test_newton_s_steps_meet_a_curved_row():
     assert met @ met == pytest.approx(1.0, abs=1e-15)
     assert np.abs(met - start).max() < 1e-6
     assert abs((met - start) @ np.array([0.8, -0.6])) < 1e-12, "the least change"
+
+
+def test_what_just_binds_is_met_though_ipopt_leaves_it_far_off():
+    """The counterweight is worth next to nothing here: 2.6e-6, for which IPOPT stays 2e-6 of its bound inside."""
+    bounds = {"l1": (30.26, 31.82), "l2": (62.12, 67.34), "l3": (153.4, 162), "l4": (167, 172.8)}
+    scene = lo.load("beatup-light").update(
+        {
+            **{f"bounds.{name}": {"min": f"{low} mm", "max": f"{high} mm"} for name, (low, high) in bounds.items()},
+            "bounds.m4e.max": "2.64 kg",
+            "limits.theta": {"min": "1.18 deg", "max": "6.07 deg"},
+            "limits.mu_min.min": "53.1 deg",
+        }
+    )
+    answer = lo.solve(scene.with_effect("gravity").with_effect("counterweight_inertia"), target="pulse")
+    assert answer.status == "optimal", answer.message
+    assert answer.design["m4e"] == 2.64

@@ -64,7 +64,7 @@ def test_residuals_may_be_as_large_as_is_allowed():
 
 
 def test_the_last_level_that_falls_is_named():
-    falls, fails = Curvature(falls=True), Curvature(minimum=False)
+    falls, fails = Curvature(higher="falls"), Curvature(minimum=False)
     assert not_least(judged(falls)) == ["second order does not decide"]
     said = list(certificate._not_least([judged(falls), judged(falls, objective="g"), judged(Curvature())]))
     assert said == ["second order does not decide: g falls along a direction without curvature"]

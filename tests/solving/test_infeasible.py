@@ -8,6 +8,7 @@ import pytest
 from plain_beatup import DESIGN
 
 import loomopt as lo
+from loomopt.solving.solution import remedies
 
 TIGHT: dict[str, tuple[str, dict[str, object], str]] = {
     "light, torque": ("beatup-light", {}, "torque"),
@@ -179,3 +180,25 @@ def test_infeasible_is_said_where_balance_stays_beyond_the_tolerance():
         least = abs(lo.solve(scene, "balance").figures["M3_fdc"])
         assert (least <= 0.01 * M0) == feasible
         assert lo.solve(scene, "torque").status == ("optimal" if feasible else "infeasible")
+
+
+def test_advice_out_of_all_proportion_is_told_last_and_so_called():
+    """A reed of 9000 N m is balanced by more mass or none: a counterweight of a bit more, or machines no one builds."""
+    answer = lo.solve(lo.load("beatup").set("operation.M0", "9000 N*m"), target="torque")
+    fair = [each.in_proportion for remedy in remedies(answer.relaxation) for each in remedy]
+    by_itself = [each.in_proportion for each in answer.relaxation if each.alone]
+    assert by_itself == sorted(by_itself, reverse=True)
+    assert by_itself[0]
+    assert not all(fair)
+    assert [each.text for remedy in remedies(answer.relaxation) for each in remedy] == [
+        r.text for r in answer.relaxation
+    ]
+    assert f"The least relaxation that helps: {answer.relaxation[0].text}." in answer.message
+    assert answer.message.count("out of proportion") == fair.count(False)
+
+
+def test_a_least_force_that_must_go_ends_at_zero_newtons():
+    answer = lo.solve(lo.load("shedding").update({"operation.N_min": "9000 N", "bounds.K1.max": "20 kN/m"}))
+    (force,) = [each for each in answer.relaxation if each.limit == "N_min"]
+    assert force.needed == 0.0
+    assert "N_min >= 9000 N -> 0 N" in answer.message

@@ -33,13 +33,14 @@ def granted(scene, relaxations, more):
         name, side = relaxation.limit, relaxation.side
         outward = 1 if side == "max" else -1
         value = relaxation.needed + outward * more * max(abs(relaxation.needed), abs(relaxation.value))
-        text = f"{value!r} {'m' if name in (*LENGTHS, *OPERATION[:2]) else 'rad'}"
+        unit = "m" if name in (*LENGTHS, *OPERATION[:2]) else "rad"
+        text = f"{value!r} {unit}"
         if name in scene.operation:
             changes[f"operation.{name}"] = text
         elif name in scene.bounds:
             old = scene.bounds[name]
-            ends = {"min": f"{old.min!r} m", "max": f"{old.max!r} m"}
-            changes[f"bounds.{name}"] = ends | {side: text} if name in LENGTHS else {side: text}
+            ends = {"min": f"{old.min!r} {unit}", "max": f"{old.max!r} {unit}"}
+            changes[f"bounds.{name}"] = ends | {side: text}
         else:
             changes[f"limits.{name}.{side}"] = text
     return scene.update(changes)

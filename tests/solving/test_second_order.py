@@ -114,11 +114,11 @@ def cubic(v):
 
 def test_a_fall_of_third_order_is_found_by_probing():
     found = curvature(of(cubic), x=0.0, y=0.0)
-    assert (found.minimum, found.falls) == (True, True)
-    assert not curvature(of(lambda v: v["x"] ** 2 + v["y"] ** 4), x=0.0, y=0.0).falls
-    assert not curvature(of(cubic, y=(-1, 0.0)), x=0.0, y=0.0).falls, "the way that falls is shut"
-    assert curvature(of(lambda v: cubic(v) + 4e-5 * v["y"] ** 2), x=0.0, y=0.0).falls
-    assert not curvature(of(lambda v: cubic(v) + 1e-2 * v["y"] ** 2), x=0.0, y=0.0).falls
+    assert (found.minimum, found.higher) == (True, "falls")
+    assert curvature(of(lambda v: v["x"] ** 2 + v["y"] ** 4), x=0.0, y=0.0).higher == "holds"
+    assert curvature(of(cubic, y=(-1, 0.0)), x=0.0, y=0.0).higher == "holds", "the way that falls is shut"
+    assert curvature(of(lambda v: cubic(v) + 4e-5 * v["y"] ** 2), x=0.0, y=0.0).higher == "falls"
+    assert curvature(of(lambda v: cubic(v) + 1e-2 * v["y"] ** 2), x=0.0, y=0.0).higher == "holds"
 
 
 # Settled but for moves that change nothing ------------------------------------------------------------------------

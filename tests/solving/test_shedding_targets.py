@@ -209,3 +209,41 @@ def test_freed_angles_soften_the_spring_and_still_make_a_turn():
     equal = plain.least_stiffness(replace(PAPER, angles=(130, 50, 130, 50)))[0]
     assert answer.figures["K1"] <= float(equal) * (1 + 1e-9)
     assert [angles[0], angles[2]] == pytest.approx([130, 130], abs=1e-4)
+
+
+TIED = {
+    "operation.N_min": "200 N",
+    "mechanism.rise": "110 deg",
+    "mechanism.far_dwell": "80 deg",
+    "mechanism.return": "130 deg",
+    "mechanism.near_dwell": "40 deg",
+    "effects.weight.G": "190 N",
+    "effects.warp_tension.T1": "150 N",
+    "effects.warp_tension.T2": "110 N",
+    "effects.inertia.M": "19.4 kg",
+    "bounds.X0.max": "120 mm",
+}
+"""The near dwell asks for (200 + 190 + 150)/0.12 = 4500 N/m; inertia for less at low speeds."""
+
+
+@pytest.mark.parametrize(("law", "rpm"), [("modified_sine", 160), ("modified_sine", 60), ("cycloidal", 145)])
+def test_a_spring_chosen_by_statics_holds_at_the_speed_it_is_certified_for(law, rpm):
+    answer = solved(lo.load("shedding").update({**TIED, "mechanism.law": law, "operation.speed": f"{rpm} rpm"}))
+    assert answer.figures["K1"] == pytest.approx(4500.0, rel=1e-9)
+    assert answer.figures["contact_speed"] >= answer.figures["speed"]
+
+
+def test_the_speed_a_spring_chosen_by_statics_survives_is_that_at_which_inertia_asks_for_it():
+    scene = lo.load("shedding").update({**TIED, "mechanism.law": "modified_sine", "operation.speed": "160 rpm"})
+    survived = solved(scene).figures["contact_speed"] / RPM
+    softer, stiffer = (solved(scene.set("operation.speed", f"{f * survived!r} rpm")) for f in (1 - 1e-6, 1 + 1e-6))
+    assert softer.figures["K1"] == pytest.approx(4500.0, rel=1e-9)
+    assert stiffer.figures["K1"] > 4500.0 * (1 + 1e-7)
+
+
+@pytest.mark.parametrize("excess", [-1e-3, 0.0, 1e-3])
+def test_a_bound_that_is_really_broken_at_rest_is_held_at_no_speed(excess):
+    """K1 X0 = 540 N holds exactly what N_min, weight and warp ask; a thousandth less does not."""
+    scene = lo.load("shedding").update({**TIED, "operation.speed": "145 rpm", "mechanism.X0": "0.12 m"})
+    found = lo.evaluate(scene.set("mechanism.K1", f"{4500.0 * (1 + excess)!r} N/m"))
+    assert (found.figures["contact_speed"] == 0.0) == (excess < 0.0)

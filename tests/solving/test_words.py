@@ -6,6 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.program.program import Limit, Objective
+from loomopt.solving.solution import Relaxation, remedies
 from loomopt.solving.verdict import Binding
 from loomopt.solving.words import Words, outward
 
@@ -114,3 +115,50 @@ def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side
     assert (found.limit, found.value, found.alone, found.text) == ("l1", 0.03, True, text)
     assert found.needed == pytest.approx(needed, rel=1e-12)
     assert found.side == side
+
+
+@pytest.mark.parametrize(
+    ("name", "sign", "value", "need", "fair"),
+    [
+        ("l1", 1, 0.035, 0.01499, True),
+        ("l1", 1, 0.035, 0.01501, False),
+        ("l1", -1, 0.03, 0.01501, False),
+        ("mu_min", -1, 1.0, 2.9, True),
+        ("mu_min", -1, 1.0, 3.1, False),
+        ("M3_fdc", 0, 0.0, 149.0, True),
+        ("M3_fdc", 0, 0.0, 151.0, False),
+    ],
+)
+def test_more_than_three_widths_are_out_of_proportion(words, name, sign, value, need, fair):
+    """Bounds of 5 mm by their width, a figure by its limit, and what should vanish by its natural size (50 N m)."""
+    found = words.relaxation(limit(name, sign, value, scale=50.0), need, alone=True)
+    assert found.in_proportion == fair
+    assert found.text.endswith(")" if fair else ", out of proportion)")
+    assert ("out of proportion" in found.text) != fair
+
+
+@pytest.mark.parametrize(("noise", "text"), [(1e-9, "-> 0 N"), (-1e-9, "-> 0 N"), (0.5, "-> -0.5 N")])
+def test_a_relaxation_that_ends_at_rounding_ends_at_zero(noise, text):
+    found = Words(lo.load("shedding")).relaxation(limit("N_min", -1, 9000.0), 9000.0 + noise, alone=True)
+    assert text in found.text
+    assert (found.needed == 0.0) == (abs(noise) < 0.1)
+
+
+def told(limit, fair, alone):
+    return Relaxation(limit, "max", 1.0, 2.0, alone, limit, fair)
+
+
+@pytest.mark.parametrize(
+    ("relaxations", "order"),
+    [
+        ("a b", [("a",), ("b",)]),
+        ("A b", [("b",), ("A",)]),
+        ("x,y a", [("x", "y"), ("a",)]),
+        ("x,Y A b", [("b",), ("x", "Y"), ("A",)]),
+        ("X", [("X",)]),
+    ],
+)
+def test_what_is_out_of_proportion_is_told_last(relaxations, order):
+    """Capitals are out of proportion; joined by a comma, limits give way together."""
+    found = [told(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
+    assert [tuple(each.limit for each in remedy) for remedy in remedies(found)] == order

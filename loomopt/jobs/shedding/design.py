@@ -24,6 +24,7 @@ from loomopt.program.sampling import Extreme, Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
+from loomopt.tolerances import ACCURACY
 from loomopt.units import show
 
 CYCLE = {
@@ -41,6 +42,7 @@ GAVE_WAY = 1e-7
 """A number that a target keeps has given way when it is off by this, in its natural size."""
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
+MOVES = " The moves, where not every force is known, are not judged."
 LIMIT = "law_acceleration"
 PROBES = ((RISE, 0.25, 0.125, 0.0, 0.0), (RISE, 0.75, 0.5, 1.5, -2.0), (RETURN, 0.125, 0.375, 2.0, 3.0))
 """Segment, s, u, s' and s'' at which the sum of the loads is asked whether it is that of the closed form."""
@@ -72,8 +74,7 @@ def _chosen(variable: Variable, value: float) -> bool:
 def peaks(model: JobModel) -> dict[str, str]:
     """Return the figures that are extremes over the cycle, with their quantities."""
     found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
-    found |= {name: name for check in model.checks for name in check.quantities}
-    return {name: quantity for name, quantity in found.items() if not (model.known_in and name == "contact_min")}
+    return found | {name: name for check in model.checks for name in check.quantities}
 
 
 def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
@@ -88,13 +89,18 @@ def contact(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     """Return the figures of the cam force, SI, and the speed up to which the roller stays on the cam."""
     physics = sampled.model
     found: dict[str, float | None] = {"contact_max": sampled.peak("cam_force")}
-    lifts = [extreme for where in physics.known_in or (None,) for extreme in sampled.extremes("lift", where)]
-    found["contact_min"], found["contact_angle"] = _least(lifts, sampled)
+    found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
     found["contact_speed"] = None
     if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
-        speed = speed_reached(physics, sampled.values, "lift", -scene.operation["N_min"])
+        speed = survived(sampled, scene.operation["N_min"])
         found["contact_speed"] = speed if math.isfinite(speed) else None
     return found
+
+
+def survived(sampled: Sampler, least: float) -> float:
+    """Return the speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
+    slack = ACCURACY * abs(sampled.static["spring_force_max"])
+    return speed_reached(sampled.model, sampled.values, "lift", -least, slack)
 
 
 def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
@@ -105,21 +111,27 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
 
 
-def say(scene: Scene, now: Figures, dwells_only: bool, target: str, figures: Figures) -> str:
+def judged(model: JobModel) -> str:
+    """Return the dwells, in words, that the cam force is judged in; "" where it is known all round."""
+    names = [SEGMENTS[int(value)] for _, value in model.known_in if int(value) in frame(model).segments]
+    known = [name.replace("_", " ") for name in names]
+    return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
+
+
+def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) -> str:
     """Say what an optimum of the target reached, and what today's spring would do; figures, now (today's): SI.
 
-    dwells_only: whether contact is judged in the dwells only.
+    dwells: what alone the cam force is judged in; "" for all round.
     """
     size = {name: value or 0.0 for name, value in figures.items()}
     stiffness = show(size["K1"], scene.unit("K1", "stiffness"), 9)
     speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
-    kept = "keeps the roller on the cam all round"
-    if dwells_only:
-        kept = "keeps the roller on the cam in both dwells"
+    kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
+    peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {size['contact_max']:.6g} N"
     said = {
         "stiffness": f"The least return spring that {kept} has {stiffness}.",
         "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
-        "force": f"The least peak cam force is {size['contact_max']:.6g} N, with a return spring of {stiffness}.",
+        "force": f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}",
         "speed": f"Today's spring {kept} up to {speed}.",
     }[target]
     return said if target == "speed" else f"{said} {_today(scene, now)}".strip()

@@ -70,7 +70,7 @@ class Shedding(Job):
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum is worth, and one on today's spring."""
         now = designs.contact(scene, self.sampler(scene, self.today(scene)))
-        return designs.say(scene, now, bool(self.model(scene).known_in), target, figures)
+        return designs.say(scene, now, designs.judged(self.model(scene)), target, figures)
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
@@ -98,7 +98,8 @@ class Shedding(Job):
 
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: least springs, the cam force, and what a free law tends to."""
-        peaks = {"contact_max": ("cam_force", False)}
+        # Points over the whole turn would read a force that is known in the dwells only.
+        peaks = {} if self.model(scene).known_in else {"contact_max": ("cam_force", False)}
         return Studied(("stiffness", "law"), peaks, motion="X_2", family=designs.FAMILY)
 
 

@@ -231,8 +231,8 @@ def moving(at: Instant, value: Number) -> Number:
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "cam_force": Quantity(lambda at: at.switched(worst=MOST).force, signed=True, bounded=True),
-    "lift": Quantity(lambda at: -at.force, figure=False, signed=True, bounded=True),
+    "cam_force": Quantity(lambda at: at.switched(worst=MOST).force, signed=True, bounded=True, loaded=True),
+    "lift": Quantity(lambda at: -at.force, figure=False, signed=True, bounded=True, loaded=True),
     "law_acceleration": Quantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
     "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }

@@ -9,12 +9,11 @@ import numpy as np
 from loomopt import maths
 from loomopt.cycle import Floats
 from loomopt.effects.kinds import Check
-from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CYCLE
+from loomopt.jobs.shedding.design import CYCLE, survived
 from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
-from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen
+from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
 from loomopt.owned import owned
@@ -23,7 +22,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.program.speeds import speed_reached
+from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
@@ -46,7 +45,7 @@ def numbers(scene: Scene) -> dict[str, float]:
 def model(scene: Scene, law: CamLaw | None = None) -> JobModel:
     """Return the frame with the effects the scene calls for; law: another than the scene's."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
-    dwells = (free or scene.mechanism["far_dwell"] > 0.0, free or scene.mechanism["near_dwell"] > 0.0)
+    dwells = (True, True) if free else dwelt(scene.mechanism)
     words = scene_numbers.words(scene)
     return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)))
 
@@ -55,29 +54,21 @@ def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
     base.demand(scene, target)
     if target == "speed" and (model(scene).known_in or math.isinf(_survived(scene))):
-        raise BadInput(
-            "nothing limits the speed: as the scene stands, the roller stays on the cam at any",
-            file=scene.origin,
-            key="effects.inertia.M, mechanism.travel, effects.warp_tension.shape",
-            allowed="a moving mass, a travel, and a warp tension that is known in the moves (linear, step)",
-            remedy="Correct them, or choose another target.",
-        )
+        problem = "nothing limits the speed: as the scene stands, the roller stays on the cam at any"
+        keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
+        allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
+        raise refusal(problem, scene.origin, keys, allowed=allowed, remedy="Correct them, or choose another target.")
     own = scene.table(LawTarget)
     fewest, most = cam_spline.FEWEST, cam_spline.MOST
     if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
-        raise BadInput(
-            "a law cannot have so many intervals",
-            file=scene.origin,
-            key="targets.law.intervals",
-            value=str(own.intervals),
-            allowed=f"{fewest} to {most}, an even number for a symmetric law",
-            remedy="Write intervals = 16.",
-        )
+        problem, key = "a law cannot have so many intervals", "targets.law.intervals"
+        allowed = f"{fewest} to {most}, an even number for a symmetric law"
+        raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
 
 
 def _survived(scene: Scene) -> float:
     """Return the speed, rad/s, up to which today's spring keeps contact."""
-    return speed_reached(model(scene), numbers(scene), "lift", -scene.operation["N_min"])
+    return survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
 
 
 def program(scene: Scene, target: str) -> Program:
@@ -108,8 +99,8 @@ class _Task:
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
         if target == "speed":
-            survived = _survived(scene)
-            self.fastest = survived if 0.0 < survived < math.inf else self.known["speed"]
+            fastest = _survived(scene)
+            self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
     def program(self) -> Program:
         variables = self._variables()
@@ -218,12 +209,11 @@ class _Task:
     def _contact(self) -> list[Limit]:
         """Return the limit that is the job: contact all round, or where the warp's pull is known."""
         least, size = self.known["N_min"], self.sizes.force
-        arcs = self.physics.known_in or (None,)
-        found = [Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0, where=w) for w in arcs]
+        found = Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0)
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            found += [replace(each, name="contact", value=0.0, relaxable=False, hidden=True) for each in found]
-        return found
+            return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True)]
+        return [found]
 
     def _angles(self) -> list[Limit]:
         """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""

@@ -9,9 +9,10 @@ from pydantic import create_model
 from loomopt import scene_csv
 from loomopt.effects import found
 from loomopt.errors import BadInput
-from loomopt.jobs.shedding.model import FOLLOWER
+from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
 from loomopt.mechanisms import cam_follower, cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.program.numbers import check_known
 from loomopt.quantities import (
     Angle,
     Force,
@@ -27,7 +28,7 @@ from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
-from loomopt.tolerances import NARROWEST
+from loomopt.tolerances import NARROWEST, SAME_ANGLE
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -140,21 +141,25 @@ def check(scene: Scene) -> None:
             raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", f"{NARROWEST:g} rad and more")
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-        raise BadInput(
-            f"the cam's segments add to {math.degrees(total):.9g} deg: {given}",
-            file=scene.origin,
-            key=f"mechanism.{', '.join(SEGMENTS)}",
-            allowed="360 deg together",
-            remedy="Correct one of them.",
-        )
+        problem, keys = f"the cam's segments add to {math.degrees(total):.9g} deg: {given}", ", ".join(SEGMENTS)
+        raise _refused(scene, f"mechanism.{keys}", problem, "360 deg together", "Correct one of them.")
+    if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
+        dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
+        check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
     check_law(scene)
     reason = _follower(scene.mechanism)
     if reason:
         raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
 
-def _refused(scene: Scene, key: str, problem: str, allowed: str) -> BadInput:
-    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy="Correct it.")
+def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
+    """Say whether there is a far dwell, and a near one in what the others leave of the turn: rounding is none."""
+    rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
+    return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
+
+
+def _refused(scene: Scene, key: str, problem: str, allowed: str, remedy: str = "Correct it.") -> BadInput:
+    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy=remedy)
 
 
 def chosen(scene: Scene) -> CamLaw:

@@ -68,10 +68,14 @@ def test_where_the_least_force_is_met_twice_the_first_angle_counts():
     assert found["contact_speed"] is None
 
 
-def test_with_the_pull_known_in_the_dwells_only_no_extreme_of_the_force_is_a_peak():
+def test_with_the_pull_known_in_the_dwells_only_the_force_has_extremes_in_the_dwells_only():
     levels = SCENE.set("effects.warp_tension.shape", "levels")
-    all_round, partly = (JOB.peaks(JOB.model(scene)) for scene in (SCENE, levels))
-    assert set(all_round) - set(partly) == {"contact_min"}
+    for quantity in ("lift", "cam_force"):
+        assert len(JOB.sampler(SCENE, TODAY).extremes(quantity)) > 2
+        sampler = JOB.sampler(levels, TODAY)
+        segments = [sampler.cycle.switch(e.piece)["segment"] for e in sampler.extremes(quantity)]
+        assert sorted(segments) == [1.0, 3.0]
+    assert "contact_max" not in JOB.studied(levels).peaks
     assert JOB.figures(levels, TODAY)["contact_speed"] is None
     assert JOB.figures(levels, TODAY)["contact_min"] > JOB.figures(SCENE, TODAY)["contact_min"]
 
