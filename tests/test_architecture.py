@@ -16,7 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
-    "jets tracing",
+    "jets boxes tracing",
     "maths errors frozen tolerances lazy",
     "units",
     "quantities",

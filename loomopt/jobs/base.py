@@ -31,6 +31,8 @@ class Job(abc.ABC):
     name: str
     own_schema: SceneSchema
     """What a scene may hold, where that does not depend on the scene."""
+    open_boxes: str = ""
+    """Why branch and bound does not close on its designs, "" where it does."""
 
     # What every job says.
 
@@ -122,6 +124,10 @@ class Job(abc.ABC):
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the NLP's variables without what is only rounding."""
         return dict(x)
+
+    def loosening(self, program: Program) -> tuple[str, ...]:
+        """Return the variables that only limits read, and that only loosen them as they grow."""
+        return ()
 
     def peaks(self, model: JobModel) -> Mapping[str, str]:
         """Return the figures that are extremes over the cycle, with their quantities."""

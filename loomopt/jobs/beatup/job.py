@@ -51,6 +51,10 @@ class Beatup(Job):
         """Return the NLP variables of a design."""
         return designs.values(program, design)
 
+    def loosening(self, program: Program) -> tuple[str, ...]:
+        """Return the counterweight's radius where s = m4e r4e² stands for mass and radius."""
+        return ("r4e",) if any(v.name == "s" for v in program.variables) else ()
+
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return NLP variables with a negligible counterweight taken for none."""
         return designs.tidy(program, x)
