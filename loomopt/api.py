@@ -10,7 +10,7 @@ from loomopt.designs import Design
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, check_numbers
+from loomopt.solving.asked import ACCURACY, GAP, SECONDS, Everywhere, check_numbers
 from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
@@ -52,15 +52,21 @@ def solve(
     seed: int = 0,
     near: Solution | None = None,
     prove: bool = False,
+    everywhere: bool = False,
+    gap: float = GAP,
+    seconds: float = SECONDS,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
+    on_step: Callable[[str], None] | None = None,
 ) -> Answer:
     """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
 
     accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts: the job's own first, then random ones drawn
     with `seed`. near: an answer to the same structure, from which the solve starts warm. prove: whether every
-    limit is proven at every crank angle too. on_iteration(number), on_start(number, of): progress. Raises BadInput,
-    and KeyboardInterrupt on Ctrl-C.
+    limit is proven at every crank angle too. everywhere: whether it is proven that no admissible design is better by
+    more than `gap`, relative to each objective, in at most so many seconds (`answer.global_bound`).
+    on_iteration(number), on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on
+    Ctrl-C.
     """
     found = engine.solve(
         scene,
@@ -70,6 +76,7 @@ def solve(
         seed=seed,
         near=near,
         prove=prove,
+        everywhere=Everywhere(gap, seconds, on_step or (lambda text: None)) if everywhere else None,
         on_iteration=on_iteration,
         on_start=on_start,
     )

@@ -25,7 +25,7 @@ from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark  # noqa: E402
 
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": 130}
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT, INTERRUPTED, UNPROVEN = 2, 130, 4
 SUMMARY = "Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs."
 CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 """Click's base exception, which Typer carries inside itself or imports, by version."""
@@ -52,6 +52,9 @@ def solve(
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
     starts: Annotated[str, typer.Option(metavar="N", help="How many starts to try.")] = "1",
     proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
+    everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
+    gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
+    seconds: Annotated[str, typer.Option("--time", metavar="S", help="How long --global may take, s.")] = "60",
     as_json: Json = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
@@ -62,13 +65,19 @@ def solve(
     if free:
         scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
     settings = {"accuracy": read_number("--accuracy", accuracy, float), "starts": read_number("--starts", starts, int)}
+    settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
+    settings |= {"prove": proven, "everywhere": everywhere}
     if out:
         from loomopt.views import outputs
 
         outputs.check_folder(out)
     with Progress() as progress:
         answer = api.solve(
-            scene, target, **settings, prove=proven, on_start=lambda number, of: progress.say(f"start {number} of {of}")
+            scene,
+            target,
+            **settings,
+            on_start=lambda number, of: progress.say(f"start {number} of {of}"),
+            on_step=progress.say,
         )
     if out:
         remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
@@ -79,7 +88,8 @@ def solve(
         from loomopt.views import layout, terminal
 
         layout.show(*terminal.solution(answer, scene))
-    raise typer.Exit(EXIT[answer.status])
+    unproven = answer.global_bound is not None and not answer.global_bound.proven
+    raise typer.Exit(UNPROVEN if unproven and answer.status == "optimal" else EXIT[answer.status])
 
 
 def accuracy(

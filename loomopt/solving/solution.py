@@ -7,7 +7,7 @@ from typing import Any
 
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
-from loomopt.solving.verdict import Certificate
+from loomopt.solving.verdict import Certificate, GlobalBound
 
 ADVICE = {
     "Solve_Succeeded": "IPOPT converged.",
@@ -120,6 +120,8 @@ class Solution(Evaluation):
     time: Mapping[str, float] = field(default_factory=dict)
     optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    global_bound: GlobalBound | None = None
+    """What is proven of all admissible designs, where that was asked for."""
     today: Callable[[], Evaluation] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -150,6 +152,7 @@ class Solution(Evaluation):
             ],
             "certificate": certificate_dict(self.certificate) if self.certificate else None,
             "solver": dict(self.solver),
+            "global": self.global_bound.as_dict() if self.global_bound else None,
             "time": dict(self.time),
         }
         if self.relaxation:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.tolerances import SHOWN_AS_ZERO
@@ -33,6 +34,8 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     if answer.certificate:
         parts.append(_binding(answer))
         parts += certificate(answer)
+    if answer.global_bound:
+        parts.append(everywhere(answer.global_bound, scene))
     if answer.solver.get("starts", 1) > 1:
         parts.append(_starts(answer, scene))
     time = answer.time
@@ -128,6 +131,22 @@ def certificate(answer: Solution) -> list[str]:
     unique = "unique" if found.unique else "not unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
     return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
+
+
+def everywhere(found: GlobalBound, scene: Scene) -> str:
+    """Return what is proven of all admissible designs, in one line."""
+    words, said, kept = Words(scene), [], []
+    for level in found.levels:
+        name = f"|{level.objective}|" if level.magnitude else level.objective
+        among = f"of those with {' and '.join(kept)}, none" if kept else "no admissible design in these bounds"
+        if level.bound == 0.0 and not level.gap:
+            said.append(f"{name} is 0, less than which there is none")
+        elif math.isfinite(level.bound):
+            said.append(f"{among} has {name} below {words.bounded(level.objective, level.bound)}")
+        kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} above the best")
+    head = f"Proven best, gap {100 * found.gap:.2g} %" if found.proven else f"NOT proven best: {found.why}"
+    cost = f" ({found.boxes} boxes, {found.seconds:.1f} s)" if found.boxes else ""
+    return f"{head}{': ' if said else ''}{'; '.join(said)}{cost}"
 
 
 def _starts(answer: Solution, scene: Scene) -> str:

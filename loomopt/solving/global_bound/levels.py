@@ -5,21 +5,20 @@ Each level is asked of all designs that are as good as the answer at the levels 
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-
-import numpy as np
 
 from loomopt.boxes import Floats
 from loomopt.jobs.base import Job
 from loomopt.program.program import Limit, Objective, Program
-from loomopt.program.sampling import Extreme, Sampler
+from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.cuts import multipliers
-from loomopt.solving.global_bound.reading import Level, Reader
+from loomopt.solving.global_bound.reading import Reader
 from loomopt.solving.global_bound.task import Open, Task, reduced
-from loomopt.solving.global_bound.tree import Question, Tree, grown, root
-from loomopt.tolerances import ACTIVE, FEASIBLE, SAME_OBJECTIVE
+from loomopt.solving.global_bound.tree import Question, Tree, grown
+from loomopt.solving.verdict import GlobalLevel
+from loomopt.tolerances import FEASIBLE, SAME_OBJECTIVE
 
 HELD = SAME_OBJECTIVE
 """What an earlier level's objective may exceed the answer's by, natural size: that much counts as the same optimum."""
@@ -31,52 +30,56 @@ LOOKED_AT = 16
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is to be proven: gap, relative to the answer's objective, in at most so many seconds."""
+class Outcome:
+    """What is shown of all levels so far; why: why not more; better: a better design, if one turned up.
 
-    gap: float
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Shown:
-    """What was shown of one level.
-
-    objective: its figure; best: the answer's, bound: what no admissible design is below, figures, SI; gap: between
-    them, relative; held: what earlier levels' figures were allowed, SI, beside the answer's; proven: whether the gap is
-    the one that was asked for.
+    lowest: the middle of an open box that could be the best; both the program's variables, SI.
     """
 
-    objective: str
-    best: float
-    bound: float
-    gap: float
-    band: float
-    proven: bool
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What was shown of all levels; why: why not more; better: a better design's variables, SI, if one turned up."""
-
-    levels: tuple[Shown, ...]
-    boxes: int
+    levels: tuple[GlobalLevel, ...] = ()
+    boxes: int = 0
     why: str = ""
     better: Mapping[str, float] | None = None
+    lowest: Mapping[str, float] | None = None
+
+    @property
+    def proven(self) -> bool:
+        """Whether every level is."""
+        return not self.why and self.better is None
 
 
-def shown(program: Program, job: Job, x: Mapping[str, float], asked: Asked, until: float) -> Outcome:
-    """Return what boxes show of a program's answer x (variables, SI); until: when time is up, by the clock."""
-    sampler = Sampler(program.model, {**program.parameters, **x})
-    merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
-    reason = job.open_boxes or _unserved(program, sampler)
-    if reason:
-        return Outcome((), 0, reason)
-    try:
-        task = reduced(program, job.loosening(program), scale.silent(program), _most(program, merits))
-        return _levels(task, x, merits, asked, until)
-    except Open as error:
-        return Outcome((), 0, str(error))
+class Levels:
+    """The questions of all levels of an answer, and how far each has come."""
+
+    def __init__(self, program: Program, job: Job, x: Mapping[str, float], gap: float) -> None:
+        self.program, self.gap = program, gap
+        sampler = Sampler(program.model, {**program.parameters, **x})
+        self.merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+        self.why = job.open_boxes or _unserved(program, sampler)
+        self._levels: list[_Level] = []
+        if self.why:
+            return
+        try:
+            task = reduced(program, job.loosening(program), scale.silent(program), _most(program, self.merits))
+            self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
+        except Open as error:
+            self.why = str(error)
+
+    def run(self, until: float, say: Callable[[str], None]) -> Outcome:
+        """Go on until all is shown, a better design turns up, or the clock says `until`."""
+        for place, level in enumerate(self._levels):
+            now = time.perf_counter()
+            better = level.search(now + (until - now) / (len(self._levels) - place), say)
+            if better is not None:
+                return self._outcome(better)
+        return self._outcome()
+
+    def _outcome(self, better: Mapping[str, float] | None = None) -> Outcome:
+        shown = tuple(level.shown() for level in self._levels)
+        still = [level for level, found in zip(self._levels, shown, strict=True) if not found.proven]
+        why = "; ".join(level.why() for level in still) or self.why
+        lowest = still[0].lowest() if still else None
+        return Outcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
 
 
 def _unserved(program: Program, sampler: Sampler) -> str:
@@ -96,61 +99,40 @@ def _most(program: Program, merits: list[float]) -> dict[str, float]:
     return {first.row: (merits[0] + HELD) * first.scale}
 
 
-def _levels(task: Task, x: Mapping[str, float], merits: list[float], asked: Asked, until: float) -> Outcome:
-    """Show one level after the other, the time that is left shared among those to come."""
-    found: list[Shown] = []
-    boxes, why = 0, ""
-    for place, objective in enumerate(task.program.objectives):
-        left = len(merits) - place
-        now = time.perf_counter()
-        level = _Level(task, x, merits, place, asked, now + (until - now) / left)
-        tree, better = level.search()
-        boxes += tree.boxes
-        found.append(level.shown(tree))
-        if better is not None:
-            return Outcome(tuple(found), boxes, "a better design was found", task.design(better))
-        if not found[-1].proven:
-            why = why or level.why(found[-1], tree, objective)
-    return Outcome(tuple(found), boxes, why)
-
-
 class _Level:
-    """One level's question."""
+    """One level's question, and the tree of its boxes."""
 
-    def __init__(
-        self, task: Task, x: Mapping[str, float], merits: list[float], place: int, asked: Asked, until: float
-    ) -> None:
-        self.task, self.merits, self.place, self.asked, self.until = task, merits, place, asked, until
-        self.objective = task.program.objectives[place]
-        self.at = task.place(x)
-        self.best = merits[place]
-        self.lowest = _lessened(self.objective, self.best, asked.gap)
-        self.held = tuple(merit + HELD for merit in merits[:place])
+    def __init__(self, task: Task, x: Mapping[str, float], merits: list[float], place: int, gap: float) -> None:
+        self.task, self.place, self.gap = task, place, gap
+        self.objective, self.best = task.program.objectives[place], merits[place]
+        lowest = _lessened(self.objective, self.best, gap)
+        held = tuple(merit + HELD for merit in merits[:place])
+        at = task.place(x)
+        reader = Reader(task, place + 1, at)
+        weights = multipliers(reader, at, place)
+        self.question = Question(reader, place, lowest, weights, held, self._better)
+        # Less than nothing there is none of.
+        nothing_less = self.objective.form != "value" and self.best <= FEASIBLE
+        self.tree = Tree.empty(len(task.names)) if nothing_less else Tree.whole(task.low, task.high)
 
     @property
-    def _nothing_less(self) -> bool:
-        """Whether the objective is a magnitude that vanishes."""
-        return self.objective.form in ("magnitude", "peak") and self.best <= FEASIBLE
+    def proven(self) -> bool:
+        """Whether no box is open, and none was given up."""
+        return self.tree.closed and math.isinf(self.tree.stuck)
 
-    def search(self) -> tuple[Tree, Floats | None]:
-        """Return the tree, and a better design (names,) if one turned up."""
-        nothing = np.empty((len(self.task.names), 0))
-        if self._nothing_less:
-            return Tree(nothing, nothing, np.empty(0)), None
-        levels = [Level(each) for each in self.task.program.objectives[: self.place]]
-        reader = Reader(self.task, [*levels, Level(self.objective, self._touching())], self.at)
-        weights = multipliers(reader, self.at, self.place)
-        question = Question(reader, self.place, self.lowest, weights, self.held, self._better)
-        tree = root(reader)
-        return tree, grown(tree, question, self.until)
+    def search(self, until: float, say: Callable[[str], None]) -> dict[str, float] | None:
+        """Grow the tree; returns a better design, the program's variables, SI, if one turns up."""
+        while not self.tree.closed and time.perf_counter() < until:
+            found = grown(self.tree, self.question)
+            say(f"proving {self.objective.figure}: {self._gap_said()}, {self.tree.boxes} boxes")
+            if found is not None:
+                return self.task.design(found)
+        return None
 
-    def _touching(self) -> tuple[Extreme, ...]:
-        """Return the extremes of the answer that make up its peak."""
-        if self.objective.form != "peak":
-            return ()
-        sampler = Sampler(self.task.program.model, self.task.values(self.at))
-        found = sampler.extremes(self.objective.row)
-        return tuple(e for e in found if e.height >= (self.best - ACTIVE) * self.objective.scale)
+    def lowest(self) -> dict[str, float] | None:
+        """Return the middle of the open box with the least bound, the program's variables, SI."""
+        middle = self.tree.lowest()
+        return None if middle is None else self.task.design(middle)
 
     def _better(self, middles: Floats) -> Floats | None:
         """Return a middle that is an admissible design with a better objective, judged as any design is."""
@@ -159,44 +141,39 @@ class _Level:
             x = self.task.design(middles[:, k])
             try:
                 sampler = Sampler(program.model, {**program.parameters, **x})
-                kept = all(self._kept(sampler, limit) for limit in program.limits)
+                kept = all(_kept(sampler, limit) for limit in program.limits)
                 merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
             except (ArithmeticError, TypeError, ValueError):
                 continue
-            same = all(merit <= held for merit, held in zip(merits, self.held, strict=False))
-            if kept and same and merits[self.place] < self.lowest:
+            same = all(merit <= held for merit, held in zip(merits, self.question.held, strict=False))
+            if kept and same and merits[self.place] < self.question.cut:
                 return middles[:, k]
         return None
 
-    @staticmethod
-    def _kept(sampler: Sampler, limit: Limit) -> bool:
-        excess = sampler.excess(limit)
-        return (abs(excess) if limit.sign == 0 else excess) <= FEASIBLE
-
-    def shown(self, tree: Tree) -> Shown:
+    def shown(self) -> GlobalLevel:
         """Return what the tree shows."""
         objective = self.objective
-        best = _figure(objective, self.best)
-        if self._nothing_less:
-            return Shown(objective.figure, best, 0.0, 0.0, self.band, True)
-        least = min(self.lowest, tree.bound)
-        proven = tree.closed and math.isinf(tree.stuck)
-        if objective.form != "value":
-            least = max(least, 0.0)
-        bound = _figure(objective, least)
-        gap = (best - bound) / max(abs(best), abs(_figure(objective, LEAST_SIZE)))
-        return Shown(objective.figure, best, bound, self.asked.gap if proven else gap, self.band, proven)
+        least = min(self.question.cut, self.tree.bound)
+        # A magnitude and a peak are never negative.
+        bound = _figure(objective, least if objective.form == "value" else max(least, 0.0))
+        best, smallest = _figure(objective, self.best), abs(_figure(objective, LEAST_SIZE))
+        gap = self.gap if self.proven else (best - bound) / max(abs(best), smallest)
+        band = abs(_figure(objective, self.best + HELD) - best)
+        return GlobalLevel(objective.figure, objective.form == "magnitude", best, bound, gap, band, self.proven)
 
-    @property
-    def band(self) -> float:
-        """What later levels allow this one's figure beside the answer's, SI."""
-        return abs(_figure(self.objective, self.best + HELD) - _figure(self.objective, self.best))
-
-    def why(self, found: Shown, tree: Tree, objective: Objective) -> str:
+    def why(self) -> str:
         """Return why the level is not proven."""
-        small = " some boxes are too small to halve" if tree.closed else f" {self.asked.seconds:g} s were not enough"
-        gap = "no bound" if not math.isfinite(found.gap) else f"gap {found.gap:.2g}"
-        return f"{objective.figure}: {gap};{small}"
+        small = ", and what is left open is too small to halve" if self.tree.closed else ""
+        return f"{self.objective.figure} is open, {self._gap_said()}{small}"
+
+    def _gap_said(self) -> str:
+        gap = self.shown().gap
+        return f"gap {100 * gap:.2g} %" if math.isfinite(gap) else "no bound yet"
+
+
+def _kept(sampler: Sampler, limit: Limit) -> bool:
+    excess = sampler.excess(limit)
+    return (abs(excess) if limit.sign == 0 else excess) <= FEASIBLE
 
 
 def _figure(objective: Objective, merit: float) -> float:

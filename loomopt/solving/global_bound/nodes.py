@@ -36,6 +36,11 @@ class Spots:
     switches: Mapping[str, Floats]
     sign: Floats
 
+    @property
+    def count(self) -> int:
+        """How many nodes each box has."""
+        return len(self.sign)
+
     def angle(self, corners: Sequence[Number]) -> Number:
         """Return crank angles over boxes, rad."""
         angle: Number = PI * (2 * self.turns)

@@ -4,30 +4,49 @@ Each row is enclosed twice: all its values over the box, and its value at the mi
 are of natural size and speak of what a better design would keep: row ≤ its bound.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt import maths
 from loomopt.boxes import Enclosure, Floats, Interval, interval
 from loomopt.maths import Number
-from loomopt.program.program import Objective
-from loomopt.program.sampling import Extreme
+from loomopt.program.program import Limit, Objective
+from loomopt.program.sampling import Extreme, Sampler
+from loomopt.schema import Values
 from loomopt.solving.global_bound.nodes import Layout, Spots, layouts
 from loomopt.solving.global_bound.task import BoxRows, Open, Task
+from loomopt.tolerances import ACTIVE
+
+Mask = NDArray[np.bool_]
 
 LIMIT = -1
 """What a row belongs to that is no level's: a limit."""
 
 
-@dataclass(frozen=True)
-class Level:
-    """What a level's rows are read at: its objective, and extremes of the answer that each box looks at too."""
+class Line(NamedTuple):
+    """One row, or the nodes of one whole-cycle row.
 
-    objective: Objective
+    of: its level, or LIMIT; row: what it reads; sign, scale: row = sign · value / scale; limit: whose excess it is;
+    extremes: of the answer, beside the worst node of each box; cycle: whether it is a whole-cycle row; placed: whether
+    it depends on the order of corners.
+    """
+
+    of: int
+    row: str
+    sign: float
+    scale: float
+    limit: Limit | None = None
     extremes: tuple[Extreme, ...] = ()
+    cycle: bool = False
+    placed: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many rows it is."""
+        return 1 + len(self.extremes)
 
 
 class Read(NamedTuple):
@@ -43,30 +62,49 @@ class Read(NamedTuple):
 
 
 class Reader:
-    """Reads boxes of a task; answer: the point (names,) whose extremes the levels name."""
+    """Reads boxes of a task.
 
-    def __init__(self, task: Task, levels: Sequence[Level], answer: Floats) -> None:
-        self.task, self.levels = task, tuple(levels)
+    levels: how many of its objectives are rows; answer: the point (names,) whose extremes each box looks at too.
+    """
+
+    def __init__(self, task: Task, levels: int, answer: Floats) -> None:
+        self.task = task
         self._known: dict[bytes, Layout | None] = {}
-        ((own, _),) = layouts(task, answer[:, None], self._known)
-        self._own = own
-        self.of = self._order()
+        ((self._own, _),) = layouts(task, answer[:, None], self._known)
+        if self._own is None:
+            raise Open("the answer has no real cycle")
+        self._sampler = Sampler(task.program.model, task.values(answer))
+        pairs = len(task.scale.pairs) if task.scale else 0
+        self._lines = [*self._of_limits(), *self._of_levels(task.program.objectives[:levels])]
+        self.of = (LIMIT,) * pairs + tuple(line.of for line in self._lines for _ in range(line.count))
 
-    def _order(self) -> tuple[int, ...]:
-        """Return what each row is of, in order."""
-        pairs = len(self.task.scale.pairs) if self.task.scale else 0
-        limits = sum(2 if limit.sign == 0 else 1 for limit in self.task.limits)
-        found = [LIMIT] * (pairs + limits)
-        for place, level in enumerate(self.levels):
-            found += [place] * len(self._signs(level))
-        return tuple(found)
+    def _of_limits(self) -> Iterator[Line]:
+        for limit in self.task.limits:
+            cycle = limit.family == "cycle"
+            placed = cycle or any(self._stands(row) for row in (limit.row, limit.weight) if row)
+            found = self._sampler.extremes(limit.row, limit.where) if cycle else []
+            near = tuple(e for e in found if e.height >= limit.bound - ACTIVE * limit.scale)
+            for sign in (1.0, -1.0) if limit.sign == 0 else (1.0,):
+                yield Line(LIMIT, limit.row, sign, limit.scale, limit, near, cycle, placed)
 
-    def _signs(self, level: Level) -> tuple[float, ...]:
-        """Return the signs of a level's pieces, or one for each extreme and the worst of each row."""
-        objective = level.objective
-        if objective.form == "peak":
-            return (1.0,) * (len(level.extremes) + len(objective.rows))
-        return ((1.0, -1.0) if objective.form == "magnitude" else (1.0,)) * len(objective.rows)
+    def _of_levels(self, objectives: Sequence[Objective]) -> Iterator[Line]:
+        for place, objective in enumerate(objectives):
+            cycle = objective.form == "peak"
+            top = self._sampler.merit(objective) - ACTIVE * objective.scale
+            for row in objective.rows:
+                found = self._sampler.extremes(row) if cycle else []
+                near = tuple(e for e in found if e.height >= top)
+                placed = cycle or self._stands(row)
+                for sign in (1.0, -1.0) if objective.form == "magnitude" else (1.0,):
+                    yield Line(place, row, sign, objective.scale, None, near, cycle, placed)
+
+    def _stands(self, row: str) -> bool:
+        """Say whether a row stands at an event of the motion: then it depends on where that lies among corners."""
+        try:
+            self._sampler.model.static(maths.FLOAT, self._sampler.given, _Nowhere(), (row,))
+        except _AtAnEvent:
+            return True
+        return False
 
     def read(self, low: Floats, high: Floats) -> Read:
         """Return all rows over boxes (names, boxes)."""
@@ -86,87 +124,68 @@ class Reader:
         """Return value, middle and slopes of boxes whose middles have one order of corners."""
         names, boxes = low.shape
         with np.errstate(all="ignore"):
-            numbers, points = self.task.numbers(low, high), self.task.points(middles)
-            ratios = self._ratios(numbers), self._ratios(points)
-            shape = len(self.of) - len(ratios[0]), boxes
-            if layout is None:
-                blank = _unknown(shape), _unknown(shape), _unknown((names, *shape))
+            spots = self._spots(layout, middles) if layout else {}
+            whole, sure = self._rows(layout, self.task.numbers(low, high), spots, boxes)
+            value, slope = _stacked(whole, sure, names, boxes)
+            points, sure = self._rows(layout, self.task.points(middles), spots, boxes)
+            middle, _ = _stacked(points, sure, names, boxes)
+        return value, middle, slope
+
+    def _spots(self, layout: Layout, middles: Floats) -> dict[int, Spots]:
+        """Return the nodes of every whole-cycle row, by its place."""
+        found = {}
+        for place, line in enumerate(self._lines):
+            if line.cycle:
+                worst = layout.worst(self.task, line.row, middles, line.limit.where if line.limit else None)
+                if line.extremes and layout is self._own:
+                    worst = layout.spots(line.extremes).beside(worst, middles.shape[1])
+                found[place] = worst
+        return found
+
+    def _rows(
+        self, layout: Layout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int
+    ) -> tuple[list[Number], list[Mask]]:
+        """Return all rows, each (nodes, boxes), and of which boxes each is sure; None for what nothing is known of."""
+        model, system = self.task.program.model, maths.boxes()
+        given = model.given(system, numbers)
+        rows = BoxRows(model, system, given, layout.stills if layout else {})
+        corners = model.corners(system, given) if layout else ()
+        events = {name: model.event(system, given, name) for name in model.events_read} if layout else {}
+        ordered = layout.certain(corners, events, boxes) if layout else np.zeros(boxes, dtype=bool)
+        found = self._ratios(numbers)
+        sure = [np.ones(boxes, dtype=bool)] * len(found)
+        for place, line in enumerate(self._lines):
+            sure += [ordered if line.placed else np.ones(boxes, dtype=bool)] * line.count
+            if line.placed and layout is None:
+                found.append(_unknown((line.count, boxes)))
+            elif line.cycle:
+                value = rows.quantity(line.row, spots[place].angle(corners), spots[place].switches)
+                value = value * interval(spots[place].sign) - (line.limit.bound if line.limit else 0.0)
+                lacking = line.count - spots[place].count
+                found += [_unknown((lacking, boxes)), value / line.scale] if lacking else [value / line.scale]
             else:
-                spots = self._spots(layout, middles)
-                whole, sure = self._rows(layout, numbers, spots, boxes)
-                value, slope = _stacked(whole, names, boxes)
-                middle, _ = _stacked(self._rows(layout, points, spots, boxes)[0], names, boxes)
-                blank = tuple(_blanked(each, sure) for each in (value, middle, slope))  # type: ignore[assignment]
-            value, slope = _stacked(ratios[0], names, boxes)
-            middle, _ = _stacked(ratios[1], names, boxes)
-        return _joined(value, blank[0], 0), _joined(middle, blank[1], 0), _joined(slope, blank[2], 1)
+                value = rows.excess(line.limit) if line.limit else rows.single(line.row)
+                found.append(value * line.sign / line.scale)
+        return found, sure
 
     def _ratios(self, numbers: dict[str, Number]) -> list[Number]:
         """Return the rows that keep the ratios of lengths: they hold whatever the order of corners."""
         scale = self.task.scale
         return [(numbers[a] - numbers[b] * share) / scale.bounds[a][1] for a, b, share in scale.pairs] if scale else []
 
-    def _spots(self, layout: Layout, middles: Floats) -> dict[tuple[int, str], Spots]:
-        """Return the nodes of every whole-cycle row, by its place among limits, or after them among levels."""
-        found, boxes = {}, middles.shape[1]
-        limits = self.task.limits
-        for place, limit in enumerate(limits):
-            if limit.family == "cycle":
-                found[place, limit.row] = layout.worst(self.task, limit.row, middles, limit.where)
-        for place, level in enumerate(self.levels, len(limits)):
-            for name in level.objective.rows if level.objective.form == "peak" else ():
-                worst = layout.worst(self.task, name, middles)
-                if level.extremes and name == level.objective.row and layout is self._own:
-                    worst = layout.spots(level.extremes).beside(worst, boxes)
-                found[place, name] = worst
-        return found
 
-    def _rows(
-        self, layout: Layout, numbers: dict[str, Number], spots: dict[tuple[int, str], Spots], boxes: int
-    ) -> tuple[list[Number], Floats]:
-        """Return the rows but for the ratios, each (nodes, boxes), and of which boxes they are sure."""
-        model, system = self.task.program.model, maths.boxes()
-        given = model.given(system, numbers)
-        rows = BoxRows(model, system, given, layout.stills)
-        corners = model.corners(system, given)
-        events = {name: model.event(system, given, name) for name in model.events_read}
-        found: list[Number] = []
-        for place, limit in enumerate(self.task.limits):
-            if limit.family == "cycle":
-                node = spots[place, limit.row]
-                found.append((self._quantity(rows, limit.row, node, corners) - limit.bound) / limit.scale)
-                continue
-            excess = rows.excess(limit) / limit.scale
-            found += [excess, -excess] if limit.sign == 0 else [excess]
-        for place, level in enumerate(self.levels, len(self.task.limits)):
-            scale = level.objective.scale
-            for name in level.objective.rows:
-                if level.objective.form == "peak":
-                    found.append(self._peak(rows, level, name, spots[place, name], corners, boxes) / scale)
-                    continue
-                piece = rows.single(name) / scale
-                found += [piece, -piece] if level.objective.form == "magnitude" else [piece]
-        return found, layout.certain(corners, events, boxes)
+class _AtAnEvent(Exception):
+    """A row stands at an event."""
 
-    def _peak(
-        self, rows: BoxRows, level: Level, name: str, spots: Spots, corners: Sequence[Number], boxes: int
-    ) -> Number:
-        """Return an objective's pieces, (nodes, boxes): nothing is known of the answer's extremes in another order."""
-        found = self._quantity(rows, name, spots, corners)
-        wanted = 1 + (len(level.extremes) if name == level.objective.row else 0)
-        lacking = wanted - spots.sign.shape[0]
-        if not lacking:
-            return found
-        blank = _unknown((lacking, boxes))
-        if not isinstance(found, Enclosure):
-            return _joined(blank, interval(found), 0, boxes)
-        names = found.g.shape[0]
-        slopes = Interval(*(np.broadcast_to(end, (names, 1, boxes)) for end in (found.g.low, found.g.high)))
-        return Enclosure(_joined(blank, found.v, 0, boxes), _joined(_unknown((names, lacking, boxes)), slopes, 1))
 
-    def _quantity(self, rows: BoxRows, name: str, spots: Spots, corners: Sequence[Number]) -> Number:
-        """Return a whole-cycle quantity at nodes, with the sign with which it is largest."""
-        return rows.quantity(name, spots.angle(corners), spots.switches) * interval(spots.sign)
+class _Nowhere(dict[str, Values]):
+    """Switches of no event: a row that asks for those of one raises _AtAnEvent."""
+
+    def get(self, event: str, default: Values) -> Values:  # type: ignore[override]
+        """Return the default for rows of the design alone."""
+        if event:
+            raise _AtAnEvent
+        return default
 
 
 def _unknown(shape: tuple[int, ...]) -> Interval:
@@ -174,32 +193,22 @@ def _unknown(shape: tuple[int, ...]) -> Interval:
     return Interval(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-def _blanked(found: Interval, sure: Floats) -> Interval:
-    """Return what is known where it is sure, anything elsewhere."""
-    return Interval(np.where(sure, found.low, -np.inf), np.where(sure, found.high, np.inf))
-
-
-def _stacked(rows: Sequence[Number], names: int, boxes: int) -> tuple[Interval, Interval]:
-    """Return values (rows, boxes) and slopes (names, rows, boxes) of rows; a row without slopes has none."""
+def _stacked(
+    rows: Sequence[Number], sure: Sequence[Mask], names: int, boxes: int
+) -> tuple[Interval, Interval]:
+    """Return values (rows, boxes) and slopes (names, rows, boxes): anything where rows are not sure of a box."""
+    known = np.array(sure).reshape(-1, boxes)
     values = [row.v if isinstance(row, Enclosure) else interval(row) for row in rows]
-    nodes = [np.atleast_2d(np.zeros(value.shape)).shape[0] for value in values]
+    nodes = [value.shape[0] if len(value.shape) > 1 else 1 for value in values]
     flat = interval(np.zeros((names, 1, 1)))
     slopes = [row.g if isinstance(row, Enclosure) else flat for row in rows]
 
-    def whole(parts: Sequence[Floats], head: tuple[int, ...]) -> Floats:
+    def whole(parts: Sequence[Floats], anything: float) -> Floats:
+        head = parts[0].shape[:-2] if parts and parts[0].ndim > 2 else ()
         filled = [np.broadcast_to(part, (*head, n, boxes)) for part, n in zip(parts, nodes, strict=True)]
-        return np.concatenate([np.zeros((*head, 0, boxes)), *filled], axis=len(head))
+        return np.where(known, np.concatenate(filled, axis=len(head)), anything)
 
-    value = Interval(whole([v.low for v in values], ()), whole([v.high for v in values], ()))
-    return value, Interval(whole([g.low for g in slopes], (names,)), whole([g.high for g in slopes], (names,)))
+    def ends(parts: Sequence[Interval]) -> Interval:
+        return Interval(whole([p.low for p in parts], -np.inf), whole([p.high for p in parts], np.inf))
 
-
-def _joined(one: Interval, other: Interval, axis: int, boxes: int = 0) -> Interval:
-    """Return two intervals' entries along an axis; boxes: how many the other has, where it is to be widened."""
-    ends = [(one.low, other.low), (one.high, other.high)]
-    if boxes:
-        ends = [(a, np.broadcast_to(b, (b.shape[0] if b.ndim > 1 else 1, boxes))) for a, b in ends]
-    return Interval(*(np.concatenate(pair, axis=axis) for pair in ends))
-
-
-__all__ = ["LIMIT", "Level", "Open", "Read", "Reader"]
+    return ends(values), ends(slopes)

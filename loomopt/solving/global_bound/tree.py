@@ -5,7 +5,6 @@ A box in which some row exceeds its bound is discarded; one whose rows are linea
 """
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -42,6 +41,16 @@ class Tree:
     boxes: int = 0
     stuck: float = math.inf
 
+    @classmethod
+    def whole(cls, low: Floats, high: Floats) -> "Tree":
+        """Return the tree of one box (names,)."""
+        return cls(low[:, None].copy(), high[:, None].copy(), np.array([-math.inf]))
+
+    @classmethod
+    def empty(cls, names: int) -> "Tree":
+        """Return the tree of no box."""
+        return cls(np.empty((names, 0)), np.empty((names, 0)), np.empty(0))
+
     @property
     def bound(self) -> float:
         """What the objective is at least in all that is not discarded."""
@@ -51,6 +60,13 @@ class Tree:
     def closed(self) -> bool:
         """Whether no box is open."""
         return not self.low.shape[1]
+
+    def lowest(self) -> Floats | None:
+        """Return the middle (names,) of the open box with the least bound, None without one."""
+        if self.closed:
+            return None
+        k = int(self.least.argmin())
+        return np.asarray((self.low[:, k] + self.high[:, k]) / 2)
 
     def take(self) -> tuple[Floats, Floats, Floats]:
         """Take out the boxes with the least bounds."""
@@ -90,31 +106,22 @@ class Question:
         return np.array([ends.get(of, math.inf) for of in self.reader.of])
 
 
-def root(reader: Reader) -> Tree:
-    """Return the tree of the whole box."""
-    low, high = reader.task.low[:, None], reader.task.high[:, None]
-    return Tree(low.copy(), high.copy(), np.array([-math.inf]))
-
-
-def grown(tree: Tree, question: Question, until: float) -> Floats | None:
-    """Grow a tree until it is closed, or the clock says `until`; returns a better design (names,) where one turns up."""
-    while not tree.closed and time.perf_counter() < until:
-        low, high, least = tree.take()
-        read, bounds = with_cut(question.reader.read(low, high), question.weights, question.bounds)
-        half = _half(low, high)
-        below = _at_least(read, half)
-        alive = (below <= bounds[:, None]).all(axis=0)
-        own = np.array([of == question.level for of in read.of])
-        least = np.maximum(least, below[own].max(axis=0, initial=-math.inf))
-        found = question.better(_promising(read, question, low, high))
-        if found is not None:
-            return found
-        narrow_low, narrow_high = _narrowed(read, bounds, low, high, half)
-        alive &= (narrow_low <= narrow_high).all(axis=0)
-        smear = _smear(read, half)
-        boxes = tuple(each[:, alive] for each in (low, high, narrow_low, narrow_high, smear))
-        _branch(tree, boxes, least[alive], question.reader.task.sizes)
-    return None
+def grown(tree: Tree, question: Question) -> Floats | None:
+    """Read one batch of boxes; returns a better design (names,) where one turns up."""
+    low, high, least = tree.take()
+    read, bounds = with_cut(question.reader.read(low, high), question.weights, question.bounds)
+    half = _half(low, high)
+    below = _at_least(read, half)
+    alive = (below <= bounds[:, None]).all(axis=0)
+    own = np.array([of == question.level for of in read.of])
+    least = np.maximum(least, below[own].max(axis=0, initial=-math.inf))
+    found = question.better(_promising(read, question, low, high))
+    narrow_low, narrow_high = _narrowed(read, bounds, low, high, half)
+    alive &= (narrow_low <= narrow_high).all(axis=0)
+    smear = _smear(read, half)
+    boxes = tuple(each[:, alive] for each in (low, high, narrow_low, narrow_high, smear))
+    _branch(tree, boxes, least[alive], question.reader.task.sizes)
+    return found
 
 
 def _half(low: Floats, high: Floats) -> Floats:
