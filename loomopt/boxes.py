@@ -63,7 +63,7 @@ class Interval:
         if other is self:
             return self.square()
         other = interval(other)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             products = self.low * other.low, self.low * other.high, self.high * other.low, self.high * other.high
         low = np.fmin(np.fmin(products[0], products[1]), np.fmin(products[2], products[3]))
         high = np.fmax(np.fmax(products[0], products[1]), np.fmax(products[2], products[3]))
@@ -115,7 +115,7 @@ class Interval:
 
     def inverse(self) -> "Interval":
         """Return 1 over it: anything where it holds 0."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             ends = _down(1 / self.high), _up(1 / self.low)
         return Interval(np.where(self.holds_zero, -np.inf, ends[0]), np.where(self.holds_zero, np.inf, ends[1]))
 
@@ -146,7 +146,7 @@ PI = Interval(math.pi, float(np.nextafter(math.pi, 4.0)))
 """π: its nearest float is too small by 1.2e-16."""
 
 LARGEST_ANGLE = 1e6
-"""rad; what is farther from 0 is reduced no more: 2^20 quarter turns times the 33 bits of their first part are exact."""
+"""rad; what is farther from 0 is not reduced: 2^20 quarter turns times the 33 bits of their first part are exact."""
 QUARTERS = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624871116645580e-21
 """π/2 in parts of 33 bits, as FDLIBM has them; what they leave is 8.5e-32."""
 TRIG_ERROR = 2.0**-50
@@ -249,7 +249,7 @@ class Enclosure:
     def __mul__(self, other: Number) -> "Enclosure":
         """Return the product."""
         if other is self:
-            return self.mapped(self.v.square(), self.v * 2.0)
+            return Enclosure(self.v.square(), self.g * (self.v * 2.0))
         if isinstance(other, Enclosure):
             return Enclosure(self.v * other.v, self.g * other.v + other.g * self.v)
         return Enclosure(self.v * other, self.g * other)
@@ -267,7 +267,8 @@ class Enclosure:
     def __rtruediv__(self, other: Number) -> "Enclosure":
         """Return the quotient, the other number on top."""
         inverse = self.v.inverse()
-        return self.mapped(inverse, -inverse.square()) * other
+        found: Enclosure = self.mapped(inverse, -inverse.square()) * other
+        return found
 
     def __pow__(self, power: int) -> "Enclosure":
         """Return an integer power."""

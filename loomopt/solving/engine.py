@@ -117,9 +117,7 @@ def _proven(scene: Scene, target: str, answer: Solution) -> Solution:
     return proven(scene, target, answer)
 
 
-def _claimed(
-    search: Search, everywhere: Everywhere, sold: Mapping[str, Sequence[float]]
-) -> tuple[Search, GlobalBound]:
+def _claimed(search: Search, everywhere: Everywhere, sold: Mapping[str, Sequence[float]]) -> tuple[Search, GlobalBound]:
     """Return the search, with a better best where boxes led to one, and what is proven of all designs."""
     from loomopt.solving.global_bound.claim import claimed
 

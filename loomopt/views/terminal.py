@@ -135,11 +135,13 @@ def certificate(answer: Solution) -> list[str]:
 
 def everywhere(found: GlobalBound, scene: Scene) -> str:
     """Return what is proven of all admissible designs, in one line."""
-    words, said, kept = Words(scene), [], []
+    words = Words(scene)
+    said: list[str] = []
+    kept: list[str] = []
     for level in found.levels:
         name = f"|{level.objective}|" if level.magnitude else level.objective
         among = f"of those with {' and '.join(kept)}, none" if kept else "no admissible design in these bounds"
-        if level.bound == 0.0 and not level.gap:
+        if level.bound == 0.0 and level.proven:
             said.append(f"{name} is 0, less than which there is none")
         elif math.isfinite(level.bound):
             said.append(f"{among} has {name} below {words.bounded(level.objective, level.bound)}")

@@ -60,7 +60,7 @@ def with_cut(read: Read, weights: Floats, bounds: Floats) -> tuple[Read, Floats]
 
 
 def _sum(parts: Sequence[Interval], weights: Floats) -> Interval:
-    found = parts[0] * float(weights[0])
+    found: Interval = parts[0] * float(weights[0])
     for part, weight in zip(parts[1:], weights[1:], strict=True):
         found = found + part * float(weight)
     return found

@@ -15,7 +15,7 @@ from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.cuts import multipliers
 from loomopt.solving.global_bound.reading import Reader
-from loomopt.solving.global_bound.task import Open, Task, reduced
+from loomopt.solving.global_bound.task import OpenError, Task, reduced
 from loomopt.solving.global_bound.tree import Question, Tree, grown
 from loomopt.solving.verdict import GlobalLevel
 from loomopt.tolerances import FEASIBLE, SAME_OBJECTIVE
@@ -62,7 +62,7 @@ class Levels:
         try:
             task = reduced(program, job.loosening(program), scale.silent(program), _most(program, self.merits))
             self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
-        except Open as error:
+        except OpenError as error:
             self.why = str(error)
 
     def run(self, until: float, say: Callable[[str], None]) -> Outcome:
@@ -157,7 +157,7 @@ class _Level:
         # A magnitude and a peak are never negative.
         bound = _figure(objective, least if objective.form == "value" else max(least, 0.0))
         best, smallest = _figure(objective, self.best), abs(_figure(objective, LEAST_SIZE))
-        gap = self.gap if self.proven else (best - bound) / max(abs(best), smallest)
+        gap = self.gap if self.proven and self.tree.boxes else (best - bound) / max(abs(best), smallest)
         band = abs(_figure(objective, self.best + HELD) - best)
         return GlobalLevel(objective.figure, objective.form == "magnitude", best, bound, gap, band, self.proven)
 

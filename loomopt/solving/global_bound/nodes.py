@@ -4,6 +4,7 @@ A node is (piece, u): its angle is made of turns and corners, which move with th
 of a box only if the corners of all of them come in the same order, and events lie in the same pieces.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from loomopt.maths import Number
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.task import Task
 from loomopt.tolerances import SAME_ANGLE
+
+Places = NDArray[np.intp]
 
 GRID = 96
 """Nodes of one turn among which a middle's worst is chosen: any node gives a valid bound, the worst the best one."""
@@ -113,7 +116,7 @@ class Layout:
         sure = np.ones(boxes, dtype=bool)
         starts = self.cycle.begins(corners, PI)
         if self.cycle.order:
-            for first, second in zip(starts, starts[1:], strict=False):
+            for first, second in itertools.pairwise(starts):
                 sure &= _before(first, second)
             for name, angle in events.items():
                 sure &= self._stands(name, angle, corners, starts)
@@ -143,7 +146,7 @@ def _value(number: Number) -> Interval:
     return number.v if isinstance(number, Enclosure) else interval(number)
 
 
-def layouts(task: Task, middles: Floats, known: dict[bytes, Layout | None]) -> Iterator[tuple[Layout | None, Floats]]:
+def layouts(task: Task, middles: Floats, known: dict[bytes, Layout | None]) -> Iterator[tuple[Layout | None, Places]]:
     """Yield each order of corners that middles (names, boxes) have, with the places of those boxes.
 
     None where a middle has no real cycle. known: those that were met, by key.

@@ -17,7 +17,7 @@ from loomopt.program.program import Limit, Objective
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.schema import Values
 from loomopt.solving.global_bound.nodes import Layout, Spots, layouts
-from loomopt.solving.global_bound.task import BoxRows, Open, Task
+from loomopt.solving.global_bound.task import BoxRows, OpenError, Task
 from loomopt.tolerances import ACTIVE
 
 Mask = NDArray[np.bool_]
@@ -44,7 +44,7 @@ class Line(NamedTuple):
     placed: bool = False
 
     @property
-    def count(self) -> int:
+    def rows(self) -> int:
         """How many rows it is."""
         return 1 + len(self.extremes)
 
@@ -72,11 +72,11 @@ class Reader:
         self._known: dict[bytes, Layout | None] = {}
         ((self._own, _),) = layouts(task, answer[:, None], self._known)
         if self._own is None:
-            raise Open("the answer has no real cycle")
+            raise OpenError("the answer has no real cycle")
         self._sampler = Sampler(task.program.model, task.values(answer))
         pairs = len(task.scale.pairs) if task.scale else 0
         self._lines = [*self._of_limits(), *self._of_levels(task.program.objectives[:levels])]
-        self.of = (LIMIT,) * pairs + tuple(line.of for line in self._lines for _ in range(line.count))
+        self.of = (LIMIT,) * pairs + tuple(line.of for line in self._lines for _ in range(line.rows))
 
     def _of_limits(self) -> Iterator[Line]:
         for limit in self.task.limits:
@@ -102,7 +102,7 @@ class Reader:
         """Say whether a row stands at an event of the motion: then it depends on where that lies among corners."""
         try:
             self._sampler.model.static(maths.FLOAT, self._sampler.given, _Nowhere(), (row,))
-        except _AtAnEvent:
+        except _EventError:
             return True
         return False
 
@@ -155,13 +155,13 @@ class Reader:
         found = self._ratios(numbers)
         sure = [np.ones(boxes, dtype=bool)] * len(found)
         for place, line in enumerate(self._lines):
-            sure += [ordered if line.placed else np.ones(boxes, dtype=bool)] * line.count
+            sure += [ordered if line.placed else np.ones(boxes, dtype=bool)] * line.rows
             if line.placed and layout is None:
-                found.append(_unknown((line.count, boxes)))
+                found.append(_unknown((line.rows, boxes)))
             elif line.cycle:
                 value = rows.quantity(line.row, spots[place].angle(corners), spots[place].switches)
                 value = value * interval(spots[place].sign) - (line.limit.bound if line.limit else 0.0)
-                lacking = line.count - spots[place].count
+                lacking = line.rows - spots[place].count
                 found += [_unknown((lacking, boxes)), value / line.scale] if lacking else [value / line.scale]
             else:
                 value = rows.excess(line.limit) if line.limit else rows.single(line.row)
@@ -174,17 +174,17 @@ class Reader:
         return [(numbers[a] - numbers[b] * share) / scale.bounds[a][1] for a, b, share in scale.pairs] if scale else []
 
 
-class _AtAnEvent(Exception):
+class _EventError(Exception):
     """A row stands at an event."""
 
 
 class _Nowhere(dict[str, Values]):
-    """Switches of no event: a row that asks for those of one raises _AtAnEvent."""
+    """Switches of no event: a row that asks for those of one raises _EventError."""
 
     def get(self, event: str, default: Values) -> Values:  # type: ignore[override]
         """Return the default for rows of the design alone."""
         if event:
-            raise _AtAnEvent
+            raise _EventError
         return default
 
 
@@ -193,9 +193,7 @@ def _unknown(shape: tuple[int, ...]) -> Interval:
     return Interval(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-def _stacked(
-    rows: Sequence[Number], sure: Sequence[Mask], names: int, boxes: int
-) -> tuple[Interval, Interval]:
+def _stacked(rows: Sequence[Number], sure: Sequence[Mask], names: int, boxes: int) -> tuple[Interval, Interval]:
     """Return values (rows, boxes) and slopes (names, rows, boxes): anything where rows are not sure of a box."""
     known = np.array(sure).reshape(-1, boxes)
     values = [row.v if isinstance(row, Enclosure) else interval(row) for row in rows]

@@ -118,7 +118,12 @@ def _designs(program: Program) -> Iterator[dict[str, float]]:
 
 
 def _rows(program: Program, sampler: Sampler) -> Iterator[tuple[Number, bool]]:
-    """Yield rows in 40 digits, and whether each is a limit at 0: those that are no variable's, and objectives."""
+    """Yield rows in 40 digits, and whether each is a limit at 0: those that are no variable's, and objectives.
+
+    Raises ValueError for a design that is no machine.
+    """
+    if not all(map(math.isfinite, sampler.static.values())):
+        raise ValueError("a row has no real value")
     reading = sampler.read(maths.mpmath())
     for limit in program.limits:
         if limit.family == "static":

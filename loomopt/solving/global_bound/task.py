@@ -16,7 +16,7 @@ from loomopt.program.reading import DATUM, Rows
 from loomopt.solving.global_bound.scale import Scale
 
 
-class Open(Exception):
+class OpenError(Exception):
     """Nothing can be proven of this program; the text says why."""
 
 
@@ -40,7 +40,7 @@ class Task:
     @property
     def sizes(self) -> Floats:
         """The widths of the whole box, SI."""
-        return self.high - self.low
+        return np.asarray(self.high - self.low)
 
     @property
     def limits(self) -> list[Limit]:
@@ -78,16 +78,16 @@ class Task:
         """Return the point (names,) of the program's variables, SI, moved inside the box."""
         values = self.scale.taken_out(x) if self.scale else x
         at = np.array([values[name] for name in self.names])
-        return np.minimum(np.maximum(at, self.low), self.high)
+        return np.asarray(np.clip(at, self.low, self.high))
 
 
 class BoxRows(Rows):
     """Rows over boxes, in intervals with their slopes or without."""
 
     def mean(self, integral: Integral) -> Number:
-        """Return a mean at its own angles, SI. Raises Open for one over pieces of the cycle."""
+        """Return a mean at its own angles, SI. Raises OpenError for one over pieces of the cycle."""
         if not integral.angles:
-            raise Open(f"{integral.name} is a mean over the cycle, which boxes do not enclose")
+            raise OpenError(f"{integral.name} is a mean over the cycle, which boxes do not enclose")
         fixed = zip(integral.angles, integral.data, strict=True)
         number = self.maths.number
         values = [self.quantity(integral.quantity, number(a), {DATUM: number(d)}) for a, d in fixed]
@@ -98,7 +98,7 @@ def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, m
     """Return the task of a program.
 
     loosening: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
-    without a bound of their own need not exceed. Raises Open where a variable has no end.
+    without a bound of their own need not exceed. Raises OpenError where a variable has no end.
     """
     maths: Maths = box_system()
     held = dict(scale.held) if scale else {}
@@ -114,8 +114,8 @@ def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, m
         inside[name] = _implied(program, fixed | {n: Interval(*ends) for n, ends in inside.items()}, name)
     _finite(program.variables, inside)
     uppers = {v.name: v.upper for v in program.variables if v.name in loosening}
-    low, high = (np.array([ends[k] for ends in inside.values()]) for k in range(2))
-    return Task(program, tuple(inside), low, high, fixed, uppers, scale)
+    lows, highs = (np.array([ends[k] for ends in inside.values()]) for k in range(2))
+    return Task(program, tuple(inside), lows, highs, fixed, uppers, scale)
 
 
 def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tuple[float, float]:
@@ -133,8 +133,8 @@ def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tup
 
 
 def _finite(variables: tuple[Variable, ...], inside: Mapping[str, tuple[float, float]]) -> None:
-    """Raise Open for a variable without ends."""
+    """Raise OpenError for a variable without ends."""
     called = {v.name: v.called for v in variables}
     for name, ends in inside.items():
         if not np.all(np.isfinite(ends)):
-            raise Open(f"{called[name]} is not bounded")
+            raise OpenError(f"{called[name]} is not bounded")

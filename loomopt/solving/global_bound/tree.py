@@ -127,20 +127,21 @@ def grown(tree: Tree, question: Question) -> Floats | None:
 def _half(low: Floats, high: Floats) -> Floats:
     """Return how far boxes reach from their middles, rounded upward."""
     middle = low + (high - low) / 2
-    return np.nextafter(np.maximum(high - middle, middle - low), math.inf)
+    return np.asarray(np.nextafter(np.maximum(high - middle, middle - low), math.inf))
 
 
 def _falls(read: Read, half: Floats) -> Floats:
     """Return the most that each variable may take off each row: (variables, rows, boxes), 0 or less."""
     steps = Interval(-half[:, None], half[:, None])
-    return np.minimum((read.slope * steps).low, 0.0)
+    return np.asarray(np.minimum((read.slope * steps).low, 0.0))
 
 
 def _at_least(read: Read, half: Floats) -> Floats:
     """Return what rows are at least over boxes: by their values, and by their middles and slopes."""
     falls = _falls(read, half)
     total = falls.sum(axis=0)
-    return np.maximum(read.value.low, read.middle.low + total * (1 + ROOM) - ROOM * np.abs(read.middle.low))
+    line = read.middle.low + total * (1 + ROOM) - ROOM * np.abs(read.middle.low)
+    return np.asarray(np.maximum(read.value.low, line))
 
 
 def _promising(read: Read, question: Question, low: Floats, high: Floats) -> Floats:
@@ -148,7 +149,7 @@ def _promising(read: Read, question: Question, low: Floats, high: Floats) -> Flo
     size = len(question.reader.of)
     room = np.where(np.array(question.reader.of) == LIMIT, FEASIBLE, 0.0)
     there = (read.middle.low[:size] <= (question.bounds + room)[:, None]).all(axis=0)
-    return (low + (high - low) / 2)[:, there]
+    return np.asarray((low + (high - low) / 2)[:, there])
 
 
 def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Floats) -> tuple[Floats, Floats]:
@@ -175,7 +176,7 @@ def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Float
 def _smear(read: Read, half: Floats) -> Floats:
     """Return how much each variable moves all rows together: (variables, boxes)."""
     most = np.maximum(np.abs(read.slope.low), np.abs(read.slope.high)) * half[:, None]
-    return np.where(np.isfinite(most), most, STEEP).sum(axis=1)
+    return np.asarray(np.where(np.isfinite(most), most, STEEP).sum(axis=1))
 
 
 def _branch(tree: Tree, boxes: tuple[Floats, ...], least: Floats, sizes: Floats) -> None:
