@@ -177,6 +177,15 @@ def boxes() -> Maths:
 
 
 @functools.cache
+def box_series() -> Maths:
+    """Truncated Taylor series along the cycle, over arrays of boxes: every result encloses the true one."""
+    from loomopt import box_series, boxes
+
+    own = box_series
+    return Maths("box series", own.sin, own.cos, own.sqrt, own.atan2, boxes.PI, boxes.interval, own.chosen)
+
+
+@functools.cache
 def sympy() -> Maths:
     """SymPy expressions: equations to print and to derive from."""
     sp = importlib.import_module("sympy")

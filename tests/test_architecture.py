@@ -16,7 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
-    "jets boxes tracing",
+    "jets boxes box_series tracing",
     "maths errors frozen tolerances lazy",
     "units",
     "quantities",

@@ -15,7 +15,8 @@ from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.cuts import multipliers
 from loomopt.solving.global_bound.reading import Reader
-from loomopt.solving.global_bound.task import OpenError, Task, reduced
+from loomopt.solving.global_bound.rows import OpenError
+from loomopt.solving.global_bound.task import Task, reduced
 from loomopt.solving.global_bound.tree import Question, Tree, grown
 from loomopt.solving.verdict import GlobalLevel
 from loomopt.tolerances import FEASIBLE, SAME_OBJECTIVE

@@ -17,7 +17,8 @@ from loomopt.program.program import Limit, Objective
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.schema import Values
 from loomopt.solving.global_bound.nodes import Layout, Spots, layouts
-from loomopt.solving.global_bound.task import BoxRows, OpenError, Task
+from loomopt.solving.global_bound.rows import BoxRows, OpenError, strips
+from loomopt.solving.global_bound.task import Task
 from loomopt.tolerances import ACTIVE
 
 Mask = NDArray[np.bool_]
@@ -99,7 +100,9 @@ class Reader:
                     yield Line(place, row, sign, objective.scale, None, near, cycle, placed)
 
     def _stands(self, row: str) -> bool:
-        """Say whether a row stands at an event of the motion: then it depends on where that lies among corners."""
+        """Say whether a row depends on the order of corners: one at an event of the motion, a mean over the cycle."""
+        if any(row in (mean.name, mean.root) for mean in self.task.program.model.integrals):
+            return True
         try:
             self._sampler.model.static(maths.FLOAT, self._sampler.given, _Nowhere(), (row,))
         except _EventError:
@@ -125,9 +128,10 @@ class Reader:
         names, boxes = low.shape
         with np.errstate(all="ignore"):
             spots = self._spots(layout, middles) if layout else {}
-            whole, sure = self._rows(layout, self.task.numbers(low, high), spots, boxes)
+            count = strips((high - low) / self.task.sizes[:, None])
+            whole, sure = self._rows(layout, self.task.numbers(low, high), spots, boxes, count)
             value, slope = _stacked(whole, sure, names, boxes)
-            points, sure = self._rows(layout, self.task.points(middles), spots, boxes)
+            points, sure = self._rows(layout, self.task.points(middles), spots, boxes, count)
             middle, _ = _stacked(points, sure, names, boxes)
         return value, middle, slope
 
@@ -143,13 +147,14 @@ class Reader:
         return found
 
     def _rows(
-        self, layout: Layout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int
+        self, layout: Layout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int, count: int
     ) -> tuple[list[Number], list[Mask]]:
         """Return all rows, each (nodes, boxes), and of which boxes each is sure; None for what nothing is known of."""
         model, system = self.task.program.model, maths.boxes()
         given = model.given(system, numbers)
-        rows = BoxRows(model, system, given, layout.stills if layout else {})
         corners = model.corners(system, given) if layout else ()
+        known = (layout.stills, layout.cycle, corners) if layout else ({}, None, ())
+        rows = BoxRows(model, system, given, *known, count)
         events = {name: model.event(system, given, name) for name in model.events_read} if layout else {}
         ordered = layout.certain(corners, events, boxes) if layout else np.zeros(boxes, dtype=bool)
         found = self._ratios(numbers)

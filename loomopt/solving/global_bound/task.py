@@ -6,18 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from loomopt import boxes
-from loomopt.balance import total
 from loomopt.boxes import Floats, Interval
 from loomopt.maths import Maths, Number
 from loomopt.maths import boxes as box_system
-from loomopt.program.model import Integral
 from loomopt.program.program import Limit, Program, Variable
-from loomopt.program.reading import DATUM, Rows
+from loomopt.solving.global_bound.rows import BoxRows, OpenError
 from loomopt.solving.global_bound.scale import Scale
-
-
-class OpenError(Exception):
-    """Nothing can be proven of this program; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -79,19 +73,6 @@ class Task:
         values = self.scale.taken_out(x) if self.scale else x
         at = np.array([values[name] for name in self.names])
         return np.asarray(np.clip(at, self.low, self.high))
-
-
-class BoxRows(Rows):
-    """Rows over boxes, in intervals with their slopes or without."""
-
-    def mean(self, integral: Integral) -> Number:
-        """Return a mean at its own angles, SI. Raises OpenError for one over pieces of the cycle."""
-        if not integral.angles:
-            raise OpenError(f"{integral.name} is a mean over the cycle, which boxes do not enclose")
-        fixed = zip(integral.angles, integral.data, strict=True)
-        number = self.maths.number
-        values = [self.quantity(integral.quantity, number(a), {DATUM: number(d)}) for a, d in fixed]
-        return total(values) / float(len(values))
 
 
 def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> Task:

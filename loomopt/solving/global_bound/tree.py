@@ -112,12 +112,13 @@ def grown(tree: Tree, question: Question) -> Floats | None:
     read, bounds = with_cut(question.reader.read(low, high), question.weights, question.bounds)
     half = _half(low, high)
     below = _at_least(read, half)
-    alive = (below <= bounds[:, None]).all(axis=0)
+    # Written so that what is no number discards nothing.
+    alive = ~(below > bounds[:, None]).any(axis=0)
     own = np.array([of == question.level for of in read.of])
-    least = np.maximum(least, below[own].max(axis=0, initial=-math.inf))
+    least = np.fmax(least, np.fmax.reduce(below[own], axis=0, initial=-math.inf))
     found = question.better(_promising(read, question, low, high))
     narrow_low, narrow_high = _narrowed(read, bounds, low, high, half)
-    alive &= (narrow_low <= narrow_high).all(axis=0)
+    alive &= ~(narrow_low > narrow_high).any(axis=0)
     smear = _smear(read, half)
     boxes = tuple(each[:, alive] for each in (low, high, narrow_low, narrow_high, smear))
     _branch(tree, boxes, least[alive], question.reader.task.sizes)
@@ -170,7 +171,7 @@ def _narrowed(read: Read, bounds: Floats, low: Floats, high: Floats, half: Float
         most, least = np.where(np.isnan(most), math.inf, most), np.where(np.isnan(least), -math.inf, least)
         up = (interval(middle) + np.nextafter(most, math.inf).min(axis=1)).high
         down = (interval(middle) + np.nextafter(least, -math.inf).max(axis=1)).low
-    return np.maximum(low, down), np.minimum(high, up)
+    return np.fmax(low, down), np.fmin(high, up)
 
 
 def _smear(read: Read, half: Floats) -> Floats:

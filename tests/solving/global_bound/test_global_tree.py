@@ -104,6 +104,19 @@ def test_boxes_of_which_nothing_is_known_are_halved_and_never_discarded():
     assert tree.bound == -math.inf
 
 
+def test_what_is_no_number_discards_nothing():
+    class Broken(Written):
+        def read(self, low, high):
+            read = super().read(low, high)
+            nothing = np.full_like(read.value.low, np.nan)
+            return read._replace(value=Interval(nothing, nothing), middle=Interval(nothing, nothing))
+
+    tree = whole()
+    with np.errstate(all="ignore"):
+        grown(tree, question(-5.0, Broken()))
+    assert tree.low.shape[1] == 2
+
+
 def test_what_cannot_be_halved_is_kept_as_open():
     low = np.array([1.0, 0.0])
     tree = Tree.whole(low, np.nextafter(low, 3.0))

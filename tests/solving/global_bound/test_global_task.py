@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solving.global_bound.task import OpenError, reduced
+from loomopt.solving.global_bound.rows import OpenError
+from loomopt.solving.global_bound.task import reduced
 
 
 @pytest.mark.parametrize(
