@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from loomopt.program.program import Limit, Objective
 from loomopt.tolerances import ROUNDED
@@ -74,17 +74,21 @@ class Certificate:
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
+Sense = Literal["least", "least magnitude", "most"]
+"""What of a figure is sought."""
+
+
 @dataclass(frozen=True)
 class GlobalLevel:
     """What is shown of one objective at all admissible designs that are as good at the levels before it.
 
-    objective: its figure; magnitude: whether its |value| is meant; best: the answer's, bound: what no design is below,
-    SI; gap: between them, relative; band: by how much designs may exceed `best` and still be asked at later levels, SI;
-    proven: whether the gap is the one that was asked for.
+    objective: its figure; sense: what of it is sought; best: the answer's, bound: what no design is below, or above
+    where the most is sought, SI; gap: between them, relative; band: by how much designs may be worse than `best` and
+    still be asked at later levels, SI; proven: whether the gap is the one that was asked for.
     """
 
     objective: str
-    magnitude: bool
+    sense: Sense
     best: float
     bound: float
     gap: float

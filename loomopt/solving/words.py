@@ -59,10 +59,10 @@ class Words:
         """Return an SI value with its unit, as the designer writes it."""
         return show(value, self.unit(name), digits)
 
-    def bounded(self, name: str, value: float) -> str:
-        """Return an SI value as what something is never below: rounded downward, with its unit."""
+    def bounded(self, name: str, value: float, side: int) -> str:
+        """Return an SI value that something never passes on a side, rounded outward, with its unit."""
         unit = self.unit(name)
-        return show(outward(value / factor(unit), -1) * factor(unit), unit)
+        return show(outward(value / factor(unit), side) * factor(unit), unit)
 
     def limit(self, limit: Limit) -> str:
         """Return a limit as a phrase: "l1 >= 30 mm"."""

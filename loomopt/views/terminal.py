@@ -133,19 +133,23 @@ def certificate(answer: Solution) -> list[str]:
     return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
 
 
+BEYOND = {-1: "below", 1: "above"}
+
+
 def everywhere(found: GlobalBound, scene: Scene) -> str:
     """Return what is proven of all admissible designs, in one line."""
     words = Words(scene)
     said: list[str] = []
     kept: list[str] = []
     for level in found.levels:
-        name = f"|{level.objective}|" if level.magnitude else level.objective
+        name = f"|{level.objective}|" if level.sense == "least magnitude" else level.objective
+        side = 1 if level.sense == "most" else -1
         among = f"of those with {' and '.join(kept)}, none" if kept else "no admissible design in these bounds"
         if level.bound == 0.0 and level.proven:
             said.append(f"{name} is 0, less than which there is none")
         elif math.isfinite(level.bound):
-            said.append(f"{among} has {name} below {words.bounded(level.objective, level.bound)}")
-        kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} above the best")
+            said.append(f"{among} has {name} {BEYOND[side]} {words.bounded(level.objective, level.bound, side)}")
+        kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
     head = f"Proven best, gap {100 * found.gap:.2g} %" if found.proven else f"NOT proven best: {found.why}"
     cost = f" ({found.boxes} boxes, {found.seconds:.1f} s)" if found.boxes else ""
     return f"{head}{': ' if said else ''}{'; '.join(said)}{cost}"

@@ -114,3 +114,8 @@ def test_a_relaxation_says_how_far_a_limit_must_give_way(words, sign, need, side
     assert (found.limit, found.value, found.alone, found.text) == ("l1", 0.03, True, text)
     assert found.needed == pytest.approx(needed, rel=1e-12)
     assert found.side == side
+
+
+@pytest.mark.parametrize(("side", "text"), [(-1, "76.9041 N*m"), (1, "76.9042 N*m")])
+def test_what_is_never_passed_is_rounded_outward(side, text):
+    assert Words(lo.load("beatup")).bounded("M3_fdc", 76.90412098, side) == text

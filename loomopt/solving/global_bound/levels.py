@@ -18,7 +18,7 @@ from loomopt.solving.global_bound.reading import Reader
 from loomopt.solving.global_bound.rows import OpenError
 from loomopt.solving.global_bound.task import Task, reduced
 from loomopt.solving.global_bound.tree import Question, Tree, grown
-from loomopt.solving.verdict import GlobalLevel
+from loomopt.solving.verdict import GlobalLevel, Sense
 from loomopt.tolerances import FEASIBLE, SAME_OBJECTIVE
 
 HELD = SAME_OBJECTIVE
@@ -157,10 +157,16 @@ class _Level:
         least = min(self.question.cut, self.tree.bound)
         # A magnitude and a peak are never negative.
         bound = _figure(objective, least if objective.form == "value" else max(least, 0.0))
-        best, smallest = _figure(objective, self.best), abs(_figure(objective, LEAST_SIZE))
-        gap = self.gap if self.proven and self.tree.boxes else (best - bound) / max(abs(best), smallest)
+        best = _figure(objective, self.best)
+        gap = self.gap if self.proven and self.tree.boxes else abs(best - bound) / _size(objective, best)
         band = abs(_figure(objective, self.best + HELD) - best)
-        return GlobalLevel(objective.figure, objective.form == "magnitude", best, bound, gap, band, self.proven)
+        return GlobalLevel(objective.figure, self._sense, best, bound, gap, band, self.proven)
+
+    @property
+    def _sense(self) -> Sense:
+        if self.objective.form == "magnitude":
+            return "least magnitude"
+        return "least" if self.objective.power > 0 else "most"
 
     def why(self) -> str:
         """Return why the level is not proven."""
@@ -178,15 +184,22 @@ def _kept(sampler: Sampler, limit: Limit) -> bool:
 
 
 def _figure(objective: Objective, merit: float) -> float:
-    """Return the figure, SI, of an objective of natural size."""
-    value = merit * objective.scale
-    if objective.power == 1 or not math.isfinite(value):
+    """Return the figure, SI, of an objective of natural size; of an inverse one it is the larger the less that is."""
+    value, power = merit * objective.scale, objective.power
+    if power == 1 or math.isinf(value):
         return value
-    return math.copysign(abs(value) ** (1 / objective.power), value) if value else 0.0
+    if power < 0 and value <= 0:
+        return math.inf
+    return math.copysign(abs(value) ** (1 / power), value)
+
+
+def _size(objective: Objective, figure: float) -> float:
+    """Return what a gap is relative to, SI: the figure, or a share of its natural size where that is more."""
+    return max(abs(figure), abs(_figure(objective, LEAST_SIZE))) if objective.power > 0 else abs(figure)
 
 
 def _lessened(objective: Objective, best: float, gap: float) -> float:
-    """Return the objective, natural size, of a figure that is less by the gap."""
-    figure, size = _figure(objective, best), _figure(objective, LEAST_SIZE)
-    less = figure - gap * max(abs(figure), abs(size))
-    return math.copysign(abs(less) ** objective.power, less) / objective.scale
+    """Return the objective, natural size, of a figure that is better by the gap."""
+    figure = _figure(objective, best)
+    better = figure - math.copysign(gap * _size(objective, figure), objective.power)
+    return math.copysign(abs(better) ** objective.power, better) / objective.scale

@@ -54,12 +54,23 @@ def test_the_best_known_balances_are_proven_in_few_boxes(name, target):
         ("shedding", "stiffness", (), 1e-4),
         ("shedding-printed-travel", "stiffness", (), 1e-4),
         ("shedding", "force", (), 1e-4),
+        ("shedding", "speed", ("bounds.speed.min=10 rpm", "bounds.speed.max=900 rpm"), 1e-4),
+        ("beatup", "retrofit", (), 0.1),
+        ("beatup", "pulse", (), 0.05),
     ],
 )
 def test_other_targets_effects_bounds_and_jobs_are_proven_by_the_same_formulas(name, target, changes, gap):
     outcome, _ = run(name, target, *changes, gap=gap)
     assert outcome.proven, outcome.why
     assert outcome.boxes <= 20_000
+
+
+def test_the_most_is_bounded_from_above():
+    found = solved("shedding", "speed", "bounds.speed.min=10 rpm", "bounds.speed.max=900 rpm")
+    (level,) = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly).levels
+    assert level.sense == "most"
+    assert level.best == pytest.approx(found.x["speed"], rel=1e-12)
+    assert level.bound == pytest.approx(level.best * (1 + 1e-3), rel=1e-12)
 
 
 def claimed(name, target, place, share):
