@@ -153,8 +153,8 @@ class Reader:
         model, system = self.task.program.model, maths.boxes()
         given = model.given(system, numbers)
         corners = model.corners(system, given) if layout else ()
-        known = (layout.stills, layout.cycle, corners) if layout else ({}, None, ())
-        rows = BoxRows(model, system, given, *known, count)
+        stills, cycle = (layout.stills, layout.cycle) if layout else ({}, None)
+        rows = BoxRows(model, system, given, stills, cycle, corners, count)
         events = {name: model.event(system, given, name) for name in model.events_read} if layout else {}
         ordered = layout.certain(corners, events, boxes) if layout else np.zeros(boxes, dtype=bool)
         found = self._ratios(numbers)

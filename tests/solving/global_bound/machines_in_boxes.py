@@ -36,9 +36,10 @@ class Solved(NamedTuple):
 def solved(name: str, target: str, *changes: str) -> Solved:
     """Return a packaged problem solved; changes: KEY=VALUE, or an effect to put on."""
     scene = lo.load(name)
-    for change in changes:
-        key, equals, value = change.partition("=")
-        scene = scene.set(key, value) if equals else scene.with_effect(key)
+    for effect in (change for change in changes if "=" not in change):
+        scene = scene.with_effect(effect)
+    numbers = dict(change.split("=") for change in changes if "=" in change)
+    scene = scene.update(numbers) if numbers else scene
     job = registry.of(scene)
     program = job.program(scene, target)
     return Solved(job, program, solve_program(program, job, Settings()))

@@ -56,7 +56,7 @@ def test_the_best_known_balances_are_proven_in_few_boxes(name, target):
         ("shedding", "force", (), 1e-4),
         ("shedding", "speed", ("bounds.speed.min=10 rpm", "bounds.speed.max=900 rpm"), 1e-4),
         ("beatup", "retrofit", (), 0.1),
-        ("beatup", "pulse", (), 0.05),
+        ("beatup", "pulse", (), 0.2),
     ],
 )
 def test_other_targets_effects_bounds_and_jobs_are_proven_by_the_same_formulas(name, target, changes, gap):
