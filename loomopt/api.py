@@ -48,7 +48,7 @@ def solve(
     target: str | None = None,
     *,
     accuracy: float = ACCURACY,
-    starts: int = 1,
+    starts: int | None = None,
     seed: int = 0,
     near: Solution | None = None,
     prove: bool = False,

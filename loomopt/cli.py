@@ -50,7 +50,7 @@ def solve(
     on: With = None,
     off: Without = None,
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
-    starts: Annotated[str, typer.Option(metavar="N", help="How many starts to try.")] = "1",
+    starts: Annotated[str | None, typer.Option(metavar="N", help="So many starts; a wide search without it.")] = None,
     proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
     everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
     gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
@@ -64,7 +64,8 @@ def solve(
     scene = read_scene(problem, sets, on, off)
     if free:
         scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
-    settings = {"accuracy": read_number("--accuracy", accuracy, float), "starts": read_number("--starts", starts, int)}
+    settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
+    settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
     settings |= {"prove": proven, "everywhere": everywhere}
     if out:

@@ -282,9 +282,9 @@ STRONGER, STRONGEST_PENALTY = 100.0, 1e7
 HELD_MARGIN = 2.0
 """A level's weight must exceed its multiplier [exact penalty: Nocedal and Wright, section 17.2], by this factor."""
 
-PRICED, AGREEING, NEEDED = 1e-6, 3, 1e-9
-"""Least relaxation: multiplier above which a limit belongs to the clash, starts that must agree on the least sum, and
-excess that is none."""
+PRICED, NEEDED, CHEAP, SCREENED = 1e-6, 1e-9, 1e-9, 1e-5
+"""Least relaxation: multiplier above which a limit belongs to the clash; excess that is none; cost of the excess of a
+limit that is tried alone, beside 1 of all others; their sum from which it does not suffice."""
 
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""

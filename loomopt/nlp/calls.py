@@ -8,7 +8,7 @@ import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.nlp.families import Family, epigraphs, families
-from loomopt.nlp.point import Settings, sampler_at
+from loomopt.nlp.point import Elastic, Known, Settings, sampler_at
 from loomopt.nlp.stations import Stood, held
 from loomopt.nlp.transcribe import Transcription, transcribe
 from loomopt.program.chains import recurrent, stations
@@ -23,8 +23,11 @@ class Calls:
     slots: nodes of each family that a first NLP has room for; leading: those of a start.
     """
 
-    def __init__(self, program: Program, settings: Settings, elastic: bool) -> None:
-        self.program, self.settings, self.elastic = program, settings, elastic
+    def __init__(
+        self, program: Program, settings: Settings, ways: Elastic | None = None, known: Known | None = None
+    ) -> None:
+        self.program, self.settings, self.ways, self.known = program, settings, ways, known or Known()
+        self.elastic = elastic = ways is not None
         self.families, self.epigraphs = families(program, elastic), epigraphs(program, elastic)
         names = [variable.name for variable in program.variables]
         self.slots, self.leading = BESIDE_STATIONS if recurrent(program.model, names) else (FIRST_SLOTS, LEADING)
@@ -74,9 +77,9 @@ class Calls:
         scaled = np.array([x[v.name] / v.scale for v in self.program.variables])
         return {
             "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
-            "p": nlp.structure.vector(self.program, sampler, self.weights, nodes),
+            "p": nlp.structure.vector(self.program, sampler, self.weights, nodes, self._costs(nlp)),
             "lbx": np.concatenate([lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)]),
-            "ubx": np.concatenate([upper, np.full(len(extra), np.inf)]),
+            "ubx": np.concatenate([upper, self._most(nlp)]),
             "lbg": np.where(equal, 0.0, -np.inf),
             "ubg": np.where(self.idle_rows(nlp, nodes), 1.0, 0.0),
         }
@@ -96,6 +99,22 @@ class Calls:
             np.where([v.name in up for v in variables], np.inf, upper),
         )
 
+    def _ways(self, nlp: Transcription) -> Floats:
+        """Return the cost of each excess, infinite where a limit is firm; nothing for a program that is not elastic."""
+        if self.ways is None:
+            return np.zeros(0)
+        return np.array(self.ways.costs or np.ones(nlp.structure.extras))
+
+    def _costs(self, nlp: Transcription) -> Floats:
+        costs = self._ways(nlp)
+        return np.where(np.isinf(costs), 0.0, costs)
+
+    def _most(self, nlp: Transcription) -> Floats:
+        """Return upper bounds of the epigraph variables, or of the excesses: none where a limit is firm."""
+        if self.ways is None:
+            return np.full(nlp.structure.extras, np.inf)
+        return np.where(np.isinf(self._ways(nlp)), 0.0, np.inf)
+
     def overdetermined(self, arguments: Mapping[str, Any]) -> bool:
         """Say whether more equalities than free variables leave nothing to solve for."""
         return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
@@ -109,8 +128,9 @@ class Calls:
 
     def first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> Floats:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
-        if self.elastic:
-            return np.ones(nlp.structure.extras)
+        if self.ways:
+            beside = self.ways.beside
+            return np.array(beside.excesses) if beside else np.ones(nlp.structure.extras)
         first = np.array([self._worst(k, sampler, peaks) for k in range(len(self.epigraphs))])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
@@ -139,10 +159,26 @@ class Calls:
         if family.epigraph >= 0:
             scale = self.program.objectives[self.epigraphs[family.epigraph].objective].scale
             return float(extreme.height / scale - extra[family.epigraph])
-        limit, soft = self.program.limits[family.limit], self.program.soft
+        limit, ways = self.program.limits[family.limit], self.program.ways
         bound = limit.bound / limit.scale
-        bound += extra[2 * soft[family.limit]] if self.elastic and family.limit in soft else 0.0
+        bound += extra[ways[family.limit][0]] if self.elastic and family.limit in ways else 0.0
         return float(extreme.height / limit.scale - bound)
+
+    def is_beaten(self, value: float, extra: Floats) -> bool:
+        """Say whether a solve at some nodes, objective and excesses as told, is already no better than is known."""
+        if self.ways is not None:
+            costs = np.array(self.ways.costs or np.ones(len(extra)))
+            value = float(np.sum(extra[costs == 1.0]))
+        return value > self.known.most
+
+    def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
+        """Return a start's nodes: those known to bind, then its own largest extremes, as many as there is room for."""
+        if not self.known.nodes:
+            return tuple(tuple(of[: self.leading]) for of in loose)
+        room = [max(self.slots, len(of)) for of in self.known.nodes]
+        return tuple(
+            (*known, *of[: self.leading])[:most] for known, of, most in zip(self.known.nodes, loose, room, strict=True)
+        )
 
     def violation(self, peaks: Sequence[Sequence[Extreme]], extra: Floats) -> float:
         """Return the largest excess of an extreme, relative to its row's size; 0 where there is none."""

@@ -181,7 +181,7 @@ class Solver:
         return found
 
     def __call__(self, **arguments: Any) -> dict[str, Floats]:
-        """Return IPOPT's answer: x, lam_x, lam_g of the NLP's own variables and rows."""
+        """Return IPOPT's answer: f, and x, lam_x, lam_g of the NLP's own variables and rows."""
         of, x, p = self.eliminated, arguments["x0"], arguments["p"]
         free, none = np.full(of.count, np.inf), np.zeros(of.count)
         more = {"x0": of.start(x, p), "lbx": -free, "ubx": free, "lbg": none, "ubg": none}
@@ -189,4 +189,5 @@ class Solver:
             more |= {"lam_x0": none, "lam_g0": of.prices(x, p, 1.0, arguments["lam_g0"])}
         said = self.made(**arguments | {name: np.concatenate([arguments[name], part]) for name, part in more.items()})
         found = {name: np.asarray(said[name], dtype=np.float64).ravel() for name in ("x", "lam_x", "lam_g")}
-        return {name: values[: of.rows if name == "lam_g" else of.own] for name, values in found.items()}
+        own = {name: values[: of.rows if name == "lam_g" else of.own] for name, values in found.items()}
+        return {**own, "f": np.asarray(said["f"], dtype=np.float64)}

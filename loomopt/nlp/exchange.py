@@ -16,7 +16,7 @@ from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family
 from loomopt.nlp.follow import follow
 from loomopt.nlp.ipopt import Answer, run
-from loomopt.nlp.point import SUCCESS, Point, Settings, sampler_at
+from loomopt.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.nlp.polish import polish
 from loomopt.nlp.transcribe import Transcription
 from loomopt.program.program import Program
@@ -61,10 +61,11 @@ def solve(
     start: Mapping[str, float],
     settings: Settings,
     warm: Point | None = None,
-    elastic: bool = False,
+    elastic: Elastic | None = None,
+    known: Known | None = None,
 ) -> Point:
     """Solve a program from a start (SI) or warm from a solved neighbour of the same structure."""
-    calls = Calls(program, settings, elastic)
+    calls = Calls(program, settings, elastic, known)
     if warm:
         within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
         warm = replace(warm, x=within)
@@ -77,7 +78,9 @@ def solve(
         return Point(x, "Not_Assembled", False)
     result = _round(calls, _begin(calls, x, sampler, warm), 0)
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
-        if isinstance(result, Point) or not result.reached or result.violation <= settings.excess:
+        if isinstance(result, Point) or not result.reached:
+            break
+        if result.violation <= settings.excess:
             break
         followed = _followed(calls, result)
         if followed:
@@ -90,7 +93,10 @@ def solve(
 def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:
     """Return where the exchange begins: at the largest extremes of the start, or at a neighbour's nodes."""
     peaks = _frozen(calls.peaks(sampler))
-    nodes = warm.nodes if warm else tuple(tuple(of[: calls.leading]) for of in calls.loose(sampler, peaks))
+    beside = calls.ways.beside if calls.ways else None
+    if beside:
+        return _Place(x, sampler, peaks, beside.nodes, {}, None)
+    nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
     raw = warm.raw if warm else {}
@@ -100,7 +106,8 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
 def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     """Return what one round gives: solve at the nodes, add the extremes that exceed their bounds.
 
-    A point of failure where what the solver reached has no real cycle; iterations: of the rounds before.
+    A point of failure where what the solver reached has no real cycle, or is no better than what is known; iterations:
+    of the rounds before.
     """
     nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
     extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
@@ -110,6 +117,8 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         extra = calls.first_extra(nlp, here.sampler, here.peaks)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, {})
         iterations += answer.iterations
+    if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):
+        return Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
     sampler = calls.sampler(answer.x)
     if sampler is None:
         return Point(answer.x, "Invalid_Number_Detected", False, iterations)
@@ -134,10 +143,16 @@ def _ended(calls: Calls, result: _Round) -> Point:
     point = Point(
         here.x, answer.status, result.reached, result.iterations, here.nodes, result.violation, answer.raw, calls.built
     )
+    point = replace(point, value=answer.value)
     if not result.reached or not calls.settings.polished:
         return point
     if calls.elastic:
-        return replace(point, reached=result.violation <= STANDS, relaxed=_relaxed(program, answer.extra))
+        return replace(
+            point,
+            reached=result.violation <= STANDS,
+            relaxed=_relaxed(program, answer.extra),
+            excesses=tuple(answer.extra.tolist()),
+        )
     x, touching = polish(calls, here.x, answer.extra, point, here.peaks)
     return replace(point, x=x, binding=_frozen(touching), built=calls.built, structure=program.structure)
 
@@ -157,7 +172,7 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
     loose = _frozen(calls.loose(here.sampler, here.peaks))
     point = Point(here.x, status, True, nodes=loose, raw=here.raw, binding=binding)
     followed = follow(calls, replace(point, structure=calls.program.structure))
-    return replace(followed, iterations=result.iterations) if followed else None
+    return replace(followed, iterations=result.iterations, value=result.answer.value) if followed else None
 
 
 def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
@@ -173,7 +188,7 @@ def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bo
 def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
     """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
     limits = program.limits
-    needs = {k: extra[2 * g] - extra[2 * g + 1] * (limits[k].sign == 0) for k, g in program.soft.items()}
+    needs = {k: extra[way[0]] - (extra[way[1]] if len(way) == 2 else 0.0) for k, way in program.ways.items()}
     return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
 
 
@@ -199,7 +214,7 @@ def _frozen(nodes: Sequence[Sequence[Extreme]]) -> Nodes:
 
 def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
     """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
-    own = [start for start in (_started(program, x) for x in program.starts) if start]
+    own = [start for start in (started(program, x) for x in program.starts) if start]
     if len(own) >= count:
         return own
     generator = np.random.default_rng(seed)
@@ -207,13 +222,13 @@ def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]
     for _ in range(DRAWS * count):
         if len(own) + len(drawn) >= count:
             break
-        trial = _started(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
+        trial = started(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
         if trial:
             drawn.append(trial)
     return own + drawn
 
 
-def _started(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
+def started(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
     """Return a start with the variables that follow from the others; None where the linkage has no real cycle."""
     try:
         full = program.completed(x)

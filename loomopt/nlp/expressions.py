@@ -111,7 +111,8 @@ class _Built:
     def objective(self) -> Any:
         """Return the weighted sum of the objectives, or of what the limits give way."""
         if self.structure.elastic:
-            return total(self.extra)
+            weights = self.structure.layout.read(self.vector, "way weight")
+            return total([weight * way for weight, way in zip(weights, self.extra, strict=True)])
         levels: list[list[Any]] = [[] for _ in self.program.objectives]
         for t, epigraph in zip(self.extra, self.structure.epigraphs, strict=True):
             levels[epigraph.objective].append(t)
@@ -122,11 +123,8 @@ class _Built:
 
     def given_way(self, place: int) -> Any:
         """Return by how much a limit gives way, in its natural size; of an equality with its sign."""
-        if place not in self.structure.soft:
-            return 0
-        group = 2 * self.structure.soft[place]
-        more, less = self.extra[group : group + 2]
-        return more - less if self.program.limits[place].sign == 0 else more
+        ways = [self.extra[way] for way in self.structure.ways.get(place, ())]
+        return ways[0] - ways[1] if len(ways) == 2 else total(ways)
 
     def limits(self) -> Any:
         """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""

@@ -1,5 +1,6 @@
 """How IPOPT is asked to work, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -17,7 +18,8 @@ STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 class Answer(NamedTuple):
     """What IPOPT said.
 
-    extra: the epigraph or elastic variables; raw: its multipliers and `extra` again, nothing where it did not run.
+    extra: the epigraph or elastic variables; raw: its multipliers and `extra` again, nothing where it did not run;
+    value: of the objective.
     """
 
     status: str
@@ -25,6 +27,7 @@ class Answer(NamedTuple):
     extra: Floats
     raw: Mapping[str, Floats]
     iterations: int
+    value: float = math.inf
 
 
 def run(
@@ -56,7 +59,8 @@ def run(
     flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
     reached = flat[len(calls.program.variables) :]
     said_raw = {"lam_x": lam_x, "lam_g": lam_g, "extra": reached}
-    return Answer(status, calls.design(flat), reached, said_raw, int(stats.get("iter_count", 0)))
+    iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
+    return Answer(status, calls.design(flat), reached, said_raw, iterations, value)
 
 
 def _padded(multipliers: Floats, size: int) -> Floats:

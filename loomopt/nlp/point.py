@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
@@ -75,6 +75,34 @@ class Point:
     """The structure of the program it answers."""
     relaxed: dict[int, float] = field(default_factory=dict)
     """Elastic solves only: limit's place → excess it needs, SI."""
+    excesses: tuple[float, ...] = ()
+    """Elastic solves only: in natural sizes."""
+    value: float = math.inf
+    """The NLP's objective."""
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """How limits give way in an elastic solve: the least weighted sum of their excesses is sought.
+
+    costs: of each excess, in its natural size, in order of `Program.ways`; infinite where the limit is firm, nothing
+    for 1 throughout. beside: where an elastic solve ended that this one starts from, if any.
+    """
+
+    costs: tuple[float, ...] = ()
+    beside: "Point | None" = None
+
+
+class Known(NamedTuple):
+    """What other solves of a program have shown.
+
+    nodes: of each family, where its rows bind, to begin with beside a start's own: what a solve then gives is less
+    than its basin has, so that it is left as soon as it cannot come below `most`, in the NLP's objective (elastic: in
+    the sum of the excesses of cost 1).
+    """
+
+    nodes: tuple[tuple[Extreme, ...], ...] = ()
+    most: float = math.inf
 
 
 def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES) -> Sampler | None:

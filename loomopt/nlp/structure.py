@@ -5,6 +5,7 @@ through a few slots, each a node that the exchange fills; an unused slot weighs 
 """
 
 import functools
+import itertools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -113,14 +114,14 @@ class Structure:
         return [k for k, limit in enumerate(self.program.limits) if limit.family in own]
 
     @functools.cached_property
-    def soft(self) -> dict[int, int]:
-        """Limits that may give way by place → the group that does together."""
-        return self.program.soft if self.elastic else {}
+    def ways(self) -> dict[int, tuple[int, ...]]:
+        """Limits that may give way by place → the places of their excess variables."""
+        return self.program.ways if self.elastic else {}
 
     @functools.cached_property
     def extras(self) -> int:
-        """How many variables there are beside the design's: epigraphs, or two excesses of each group."""
-        return 2 * len(set(self.soft.values())) if self.elastic else len(self.epigraphs)
+        """How many variables there are beside the design's: epigraphs, or excesses."""
+        return len(set(itertools.chain(*self.ways.values()))) if self.elastic else len(self.epigraphs)
 
     @functools.cached_property
     def means(self) -> list[Integral]:
@@ -166,6 +167,7 @@ class Structure:
         layout.add("limit scale", len(program.limits))
         layout.add("objective weight", len(program.objectives))
         layout.add("objective scale", len(program.objectives))
+        layout.add("way weight", self.extras if self.elastic else 0)
         for event in program.model.events_read:
             layout.add(f"still {event}", len(program.model.switches))
         layout.add("station", len(self.stations), len(self.open_switches))
@@ -179,7 +181,12 @@ class Structure:
         return layout
 
     def vector(
-        self, program: Program, sampler: Sampler, weights: Sequence[float], nodes: Sequence[Sequence[Extreme]]
+        self,
+        program: Program,
+        sampler: Sampler,
+        weights: Sequence[float],
+        nodes: Sequence[Sequence[Extreme]],
+        costs: Sequence[float] | Floats = (),
     ) -> Floats:
         """Return the parameter vector for a program's numbers and the nodes of each family."""
         p, write, node, cycle = np.zeros(self.layout.size), self.layout.write, self.node, sampler.cycle
@@ -189,6 +196,7 @@ class Structure:
         write(p, "limit", [x.bound if x.family == "cycle" else x.value for x in program.limits])
         write(p, "limit scale", [limit.scale for limit in program.limits])
         write(p, "objective weight", weights)
+        write(p, "way weight", costs)
         write(p, "objective scale", [objective.scale for objective in program.objectives])
         for event, switch in sampler.stills.items():
             write(p, f"still {event}", [switch[name] for name in program.model.switches])

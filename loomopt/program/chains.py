@@ -23,6 +23,11 @@ def recurrent(model: JobModel, variables: Collection[str]) -> tuple[str, ...]:
     return tuple(name for chain in _chains(model, variables).values() for name in chain.names)
 
 
+def roots(model: JobModel, variables: Collection[str]) -> frozenset[str]:
+    """Return the variables that these values follow from."""
+    return frozenset(name for chain in _chains(model, variables).values() for name in chain.roots if name in variables)
+
+
 def followed(model: JobModel, variables: Collection[str], system: Maths, values: Values) -> dict[str, Number]:
     """Return what each of these values is worth by those before it; values: with all of them."""
     chains = _chains(model, variables).values()

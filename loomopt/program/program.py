@@ -156,6 +156,10 @@ class Program:
     """What the silent levels may move along, in order."""
     follow: Callable[[JobModel, Numbers], Numbers] = field(default=nothing_follows, compare=False)
     """follow(model, values): the variables that follow from the others; raises ValueError where it cannot move."""
+    tops: Mapping[str, str] = field(default_factory=dict)
+    """Of these, the crank angles where a whole-cycle quantity is largest: variable → quantity."""
+    single: str = ""
+    """Why every local optimum is the best there is, where that is so."""
 
     @lazy
     def structure(self) -> Hashable:
@@ -169,11 +173,21 @@ class Program:
         )
 
     @lazy
-    def soft(self) -> dict[int, int]:
-        """Relaxable limits by place → their group: the rows of one limit's side give way together."""
-        groups: dict[tuple[str, str, int], int] = {}
+    def ways(self) -> dict[int, tuple[int, ...]]:
+        """Relaxable limits by place → the places of their excesses: two of an equality, above and below.
+
+        The rows of one limit's side give way together.
+        """
+        sides: dict[tuple[str, str, int], tuple[int, ...]] = {}
+        count = 0
+        for limit in self.limits:
+            key = limit.name, limit.family, limit.sign
+            if limit.relaxable and key not in sides:
+                size = 2 if limit.sign == 0 else 1
+                sides[key] = tuple(range(count, count + size))
+                count += size
         keys = {k: (limit.name, limit.family, limit.sign) for k, limit in enumerate(self.limits) if limit.relaxable}
-        return {k: groups.setdefault(key, len(groups)) for k, key in keys.items()}
+        return {k: sides[key] for k, key in keys.items()}
 
     @lazy
     def held(self) -> frozenset[str]:

@@ -61,7 +61,7 @@ def target_name(scene: Scene, target: str | None) -> str:
     return name
 
 
-def check_numbers(accuracy: float, starts: int) -> None:
+def check_numbers(accuracy: float, starts: int | None) -> None:
     """Raise BadInput for settings outside what can be kept."""
     if not TIGHTEST <= accuracy <= COARSEST:
         raise BadInput(
@@ -71,7 +71,7 @@ def check_numbers(accuracy: float, starts: int) -> None:
             allowed=f"{TIGHTEST:g} to {COARSEST:g}",
             remedy="Write --accuracy 1e-8, or leave it out.",
         )
-    if not 1 <= starts <= MOST_STARTS:
+    if starts is not None and not 1 <= starts <= MOST_STARTS:
         raise BadInput(
             "the number of starts is out of range",
             key="--starts",

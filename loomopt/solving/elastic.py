@@ -1,39 +1,71 @@
-"""When nothing is admissible: which limits clash, and the least relaxations that help."""
+"""When nothing is admissible: which limits clash, and the least relaxations that help.
+
+The sum of all limits' excesses, in natural sizes, is least where a design is nearest to admissible; it is an exact
+penalty, so that one NLP serves every question with other costs [Nocedal and Wright, Numerical Optimization, 2nd ed.,
+section 17.2; Gill, Murray and Saunders, SIAM Review 47 (2005), elastic mode].
+"""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from loomopt.nlp import exchange
 from loomopt.nlp.families import families
-from loomopt.nlp.point import Point, Settings
+from loomopt.nlp.point import Elastic, Known, Point, Settings
 from loomopt.nlp.stations import owners
-from loomopt.program.program import Limit, Program
+from loomopt.program.program import Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
-from loomopt.tolerances import AGREEING, NEEDED, PRICED
+from loomopt.tolerances import CHEAP, NEEDED, PRICED, SCREENED
 
 
-def clash(program: Program, starts: Sequence[Mapping[str, float]], settings: Settings, words: Words) -> Clash:
+def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
+    """Return where the sum of all limits' excesses is least, from several starts, or None where none leads anywhere.
+
+    The first start that ends in no excess ends the search: there a design keeps every limit.
+    """
+    best = None
+    for start in starts:
+        most = sum(best.excesses) if best else math.inf
+        point = exchange.solve(program, start, settings, elastic=Elastic(), known=Known(most=most))
+        best = point if point.reached else best
+        if best and not best.relaxed:
+            break
+    return best
+
+
+def clash(program: Program, nearest: Point, settings: Settings, words: Words) -> Clash:
     """Return the limits that clash and the least relaxations that make a design possible.
 
-    First the least sum over all limits, in natural sizes; then each other limit by itself, where that suffices. Empty
-    when a design needs none (the limits do not clash after all) or when no relaxation was found.
+    nearest: where the sum of all excesses is least. First that sum's limits; then each other limit by itself, where
+    that suffices.
     """
-    together = _least(program, starts, settings)
-    if together is None:
-        return Clash()
-    point, needs = together
+    needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
-    groups = dict.fromkeys((limit.name, limit.sign) for limit in program.limits if limit.relaxable)
-    known = {(program.limits[k].name, program.limits[k].sign) for k in needs} if len(needs) == 1 else set()
-    for group in (group for group in groups if needs and group not in known):
-        single = _least(_only(program, *group), starts[:2], settings)
-        if single and len(single[1]) == 1:
-            found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single[1].items()]
-    return Clash(_priced(program, point, words) if found else (), tuple(found), point.x)
+    known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
+    for ways in dict.fromkeys(way for way in program.ways.values() if way not in known):
+        single = _alone(program, ways, nearest, settings)
+        if single:
+            found += [words.relaxation(program.limits[k], need, alone=True) for k, need in single.items()]
+    return Clash(_priced(program, nearest, words), tuple(found), nearest.x)
+
+
+def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Settings) -> dict[int, float] | None:
+    """Return what one limit needs, SI, where no other gives way; None where it does not suffice.
+
+    With this limit all but free, the others' excesses fall to nothing exactly where it suffices; only then is its own
+    least sought, with the others firm.
+    """
+    count = len(nearest.excesses)
+    free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
+    screened = exchange.solve(program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(most=SCREENED))
+    if not screened.reached:
+        return None
+    firm = tuple(1.0 if way in ways else math.inf for way in range(count))
+    point = exchange.solve(program, screened.x, settings, elastic=Elastic(firm, screened))
+    needs = _by_limit(program, point.relaxed) if point.reached else {}
+    return needs if len(needs) == 1 else None
 
 
 def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
@@ -47,28 +79,6 @@ def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     return tuple(dict.fromkeys(words.limit(each) for each, price in priced if price > PRICED and not each.hidden))
 
 
-def _least(
-    program: Program, starts: Sequence[Mapping[str, float]], settings: Settings
-) -> tuple[Point, dict[int, float]] | None:
-    """Return the point that needs least, and each limit's need in SI, both rows of one limit counted once."""
-    best, agreeing = None, 0
-    for start in starts:
-        point = exchange.solve(program, start, settings, elastic=True)
-        if not point.reached:
-            continue
-        gain = _total(program, best) - _total(program, point) if best else math.inf
-        agreeing = 1 if gain > NEEDED else agreeing + (gain >= -NEEDED)
-        best = point if gain > 0.0 else best
-        if agreeing == AGREEING:
-            break
-    return (best, _by_limit(program, best.relaxed)) if best else None
-
-
-def _total(program: Program, point: Point) -> float:
-    """Return the sum of excesses in natural sizes."""
-    return sum(abs(need) / program.limits[k].scale for k, need in point.relaxed.items())
-
-
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:
     """Return one entry per limit and side: a limit of several rows needs what its worst row needs."""
     worst: dict[tuple[str, int], int] = {}
@@ -77,12 +87,3 @@ def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float
         if abs(need) / program.limits[k].scale > NEEDED and (key not in worst or abs(need) > abs(relaxed[worst[key]])):
             worst[key] = k
     return {k: relaxed[k] for k in worst.values()}
-
-
-def _only(program: Program, name: str, sign: int) -> Program:
-    """Return the program with one side of a limit relaxable and all else firm."""
-
-    def firm(limit: Limit) -> Limit:
-        return replace(limit, relaxable=limit.relaxable and (limit.name, limit.sign) == (name, sign))
-
-    return replace(program, limits=tuple(map(firm, program.limits)))

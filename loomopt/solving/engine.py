@@ -8,20 +8,18 @@ from typing import Any
 
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
-from loomopt.nlp import exchange
-from loomopt.nlp.point import Point, Settings, sampler_at
+from loomopt.nlp.point import Point, Settings
 from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
-from loomopt.solving import report
+from loomopt.solving import elastic, report, told
 from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
-from loomopt.solving.prices import figure_of
-from loomopt.solving.search import Candidate, Judged, Search, compared, judged, searched, tried
+from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
+from loomopt.solving.strategy import searched
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
-from loomopt.tolerances import MORE_STARTS
 
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 """What is said of the solver where no start assembles."""
@@ -45,7 +43,7 @@ def solve(
     target: str | None = None,
     *,
     accuracy: float = ACCURACY,
-    starts: int = 1,
+    starts: int | None = None,
     seed: int = 0,
     near: Solution | None = None,
     prove: bool = False,
@@ -56,6 +54,7 @@ def solve(
     """Return the certified optimum of a scene's target, or what stands in its way.
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
+    without it a search for the best basin, its designs drawn with `seed`;
     near: an answer to start warm from (one of another structure is no help and is left alone);
     prove: whether to prove every limit of the answer at every crank angle;
     everywhere: to prove that no admissible design is better, and how closely;
@@ -75,10 +74,11 @@ def solve(
     program = job.program(scene, target)
     made = time.perf_counter() - begun
     settings = Settings(accuracy, callback=_callback(on_iteration))
-    search = solve_program(program, job, settings, starts, seed, near.point if near else None, on_start)
+    today, warm = job.values(program, job.today(scene)), near.point if near else None
+    search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
     sold = job.sizes(scene)
     search, bound = _claimed(search, everywhere, sold) if everywhere else (search, None)
-    search, answer, reported = _answer(scene, target, search, seed)
+    search, answer, reported = _answer(scene, target, search)
     for name, sizes in sold.items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts, "seed": seed, "on_start": on_start}
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
@@ -96,18 +96,20 @@ def solve_program(
     program: Program,
     job: Job,
     settings: Settings,
-    starts: int = 1,
+    starts: int | None = None,
     seed: int = 0,
     near: Point | None = None,
     on_start: Callable[[int, int], None] | None = None,
+    today: Mapping[str, float] | None = None,
 ) -> Search:
     """Return how far a search for a program's certified optimum comes; no scene is read, nothing is said in words.
 
-    near: where a neighbour's solve ended, to start warm from; one of another structure is left alone. The rest is as
-    in `solve`. Raises KeyboardInterrupt on Ctrl-C.
+    near: where a neighbour's solve ended, to start warm from; one of another structure is left alone; today: today's
+    machine by variable, SI, one more place to look for an admissible design from. The rest is as in `solve`. Raises
+    KeyboardInterrupt on Ctrl-C.
     """
     same = near is not None and near.structure == program.structure
-    return searched(Search(job, program, settings), starts, seed, near if same else None, on_start)
+    return searched(Search(job, program, settings, today or {}), starts, seed, near if same else None, on_start)
 
 
 def _proven(scene: Scene, target: str, answer: Solution) -> Solution:
@@ -141,11 +143,12 @@ def _callback(on_iteration: Callable[[int], None] | None) -> Any:
     return IterationCallback(on_iteration)
 
 
-def _answer(scene: Scene, target: str, search: Search, seed: int) -> tuple[Search, Solution, float]:
-    """Return the solution, or the reason there is none; the search with what was tried for that; seconds of saying."""
-    clash = Clash()
-    if search.best is None:
-        search, clash = _least_relaxation(scene, search, seed)
+def _answer(scene: Scene, target: str, search: Search) -> tuple[Search, Solution, float]:
+    """Return the solution, or the reason there is none; the search with the time of that; seconds of saying."""
+    clash, began = Clash(), time.perf_counter()
+    if search.best is None and search.nearest and search.nearest.relaxed:
+        clash = elastic.clash(search.program, search.nearest, search.settings, Words(scene))
+        search = replace(search, solved=search.solved + time.perf_counter() - began)
     began = time.perf_counter()
     if search.best is None:
         answer = _without(scene, target, search, clash)
@@ -154,25 +157,10 @@ def _answer(scene: Scene, target: str, search: Search, seed: int) -> tuple[Searc
     return search, answer, time.perf_counter() - began
 
 
-def _least_relaxation(scene: Scene, search: Search, seed: int) -> tuple[Search, Clash]:
-    """Return which limits clash; where none do after all, the search with the design that keeps them."""
-    from loomopt.solving.elastic import clash
-
-    job, program = search.job, search.program
-    starts = [*exchange.starts(program, MORE_STARTS, seed), job.values(program, job.today(scene))]
-    began = time.perf_counter()
-    found = clash(program, starts, search.settings, Words(scene))
-    search = replace(search, solved=search.solved + time.perf_counter() - began)
-    if found.x and not found.relaxations:
-        # The elastic solve came upon an admissible design that no start led to.
-        search = judged(tried(search, found.x))
-    return search, found
-
-
 def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
     """Return the answer where no design was reached."""
     job, program, points = search.job, search.program, [each.point for each in search.candidates]
-    solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
+    solver: dict[str, Any] = {**NOT_SOLVED, **told.counts(search)}
     if points:
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
     today = functools.partial(_evaluated, scene, job, target, {})
@@ -184,36 +172,10 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
 def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
     """Return the answer of the best design that was reached."""
     job, program, point = search.job, search.program, best.candidate.point
-    solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
+    solver: dict[str, Any] = {**NOT_SOLVED, **told.counts(search)}
     solver |= {"status": point.status, "iterations": point.iterations}
     today = functools.partial(_evaluated, scene, job, target, {})
     here = report.evaluation(scene, job, program, job.design(program, best.x))
-    answer = report.with_optimum(job, scene, target, here, best.certificate, solver, today)
-    return replace(answer, point=point, optima=_optima(search))
-
-
-def _counts(search: Search) -> dict[str, Any]:
-    """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
-    best = search.best
-    same = [c for c in search.reached if compared(c, best.candidate) == 0] if best else []
-    accuracy = search.settings.accuracy
-    return {"starts": len(search.candidates), "starts_at_best": len(same), "accuracy": accuracy}
-
-
-def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
-    """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
-    groups: list[list[Candidate]] = []
-    for candidate in search.ranked:
-        if groups and compared(groups[-1][0], candidate) == 0:
-            groups[-1].append(candidate)
-        else:
-            groups.append([candidate])
-    return tuple((_figures(search, group[0]), len(group)) for group in groups)
-
-
-def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
-    """Return the figures of the objectives at a candidate, SI."""
-    sampler = sampler_at(search.program, candidate.point.x)
-    if sampler is None:
-        return {}
-    return {objective.figure: figure_of(sampler, objective) for objective in search.program.objectives}
+    searched = told.searched(search)
+    answer = report.with_optimum(job, scene, target, here, best.certificate, solver, today, searched)
+    return replace(answer, point=point, optima=told.optima(search))

@@ -72,13 +72,17 @@ def with_optimum(
     certificate: Certificate,
     solver: Mapping[str, Any],
     today: Today,
+    searched: str,
 ) -> Solution:
-    """Return the answer of a design that was reached: optimal if certified, else uncertified."""
+    """Return the answer of a design that was reached: optimal if certified, else uncertified.
+
+    searched: how far the best was sought, as a sentence.
+    """
     prices = _prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
     headline = job.say(scene, target, here.figures)
     if passed:
-        message = " ".join([headline, _stops(prices)]).strip()
+        message = " ".join([headline, _stops(prices), searched]).strip()
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
         message = f"A design was reached but not certified: {reasons}. Try more starts (--starts 20)."

@@ -4,11 +4,11 @@ import functools
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
-from loomopt.nlp.point import Point, Settings, sampler_at
+from loomopt.nlp.point import Known, Point, Settings, sampler_at
 from loomopt.program.program import Program
 from loomopt.solving.certificate import certify
 from loomopt.solving.settle import settle
@@ -17,7 +17,6 @@ from loomopt.tolerances import (
     CORRECTIONS,
     FEASIBLE,
     HELD_MARGIN,
-    MORE_STARTS,
     MOST_ALIKE,
     PRECISE,
     ROUNDING,
@@ -32,10 +31,15 @@ OnStart = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Candidate:
-    """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle."""
+    """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle.
+
+    value: of the NLP's objective there, in which each level weighs far more than the next; that of the NLP itself
+    where the solve was left.
+    """
 
     point: Point
     objectives: tuple[float, ...]
+    value: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -51,15 +55,23 @@ class Judged:
 class Search:
     """How far a search has come.
 
-    settings: those of the next solve; candidates: of every solve, in order; best: the best that was reached, judged;
-    built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of certificates.
+    settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
+    best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
+    no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
+    basin; built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of
+    certificates.
     """
 
     job: Job
     program: Program
     settings: Settings
+    today: Mapping[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
     best: Judged | None = None
+    nearest: Point | None = None
+    sought: int = 0
+    designs: int = 0
+    stayed: bool = False
     built: float = 0.0
     solved: float = 0.0
     settled: float = 0.0
@@ -69,6 +81,11 @@ class Search:
     def passed(self) -> bool:
         """Whether the best has its certificate."""
         return self.best is not None and self.best.certificate.passed
+
+    @property
+    def clashes(self) -> bool:
+        """Whether limits clash as far as can be seen."""
+        return not self.reached and self.nearest is not None and bool(self.nearest.relaxed)
 
     @property
     def reached(self) -> list[Candidate]:
@@ -81,33 +98,15 @@ class Search:
         return sorted(self.reached, key=functools.cmp_to_key(compared))
 
 
-def searched(search: Search, count: int, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
-    """Return the search after `count` starts; after more where none is certified; after none where `near` leads on."""
-    if near is not None:
-        search = tried(search, near.x, near)
-        search = judged(search) if search.candidates[-1].point.reached else search
-        if search.passed:
-            return search
-    done = 0
-    for wanted in dict.fromkeys((count, max(count, MORE_STARTS))):
-        chosen = exchange.starts(search.program, wanted, seed)
-        for place, start in enumerate(chosen[done:], done + 1):
-            if on_start:
-                on_start(place, len(chosen))
-            search = tried(search, start)
-        done = max(done, len(chosen))
-        search = judged(search)
-        if search.passed:
-            break
-    return search
-
-
-def tried(search: Search, start: Mapping[str, float], warm: Point | None = None) -> Search:
+def tried(search: Search, start: Mapping[str, float], warm: Point | None = None, known: Known | None = None) -> Search:
     """Return the search after one more solve."""
     began = time.perf_counter()
-    point = exchange.solve(search.program, start, search.settings, warm)
+    point = exchange.solve(search.program, start, search.settings, warm, known=known)
     spent = time.perf_counter() - began
-    candidate = Candidate(point, objectives(search.program, point.x) if point.reached else ())
+    levels = objectives(search.program, point.x) if point.reached else ()
+    count = len(search.program.objectives)
+    weighted = sum(search.settings.penalty ** (count - 1 - k) * level for k, level in enumerate(levels))
+    candidate = Candidate(point, levels, weighted if levels else point.value)
     return replace(
         search,
         candidates=(*search.candidates, candidate),

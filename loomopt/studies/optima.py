@@ -141,7 +141,7 @@ def _solves(
 
 def _excess(target: Target, point: Point, settings: Settings) -> float:
     """Return by how much true whole-cycle rows exceed what the solver holds for true at its points."""
-    calls = Calls(target.program, settings, elastic=False)
+    calls = Calls(target.program, settings)
     sampler = calls.sampler(point.x)
     if sampler is None:
         return math.nan

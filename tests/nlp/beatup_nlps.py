@@ -5,7 +5,7 @@ import numpy as np
 from loomopt.jobs import registry
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import epigraphs, families
-from loomopt.nlp.point import Settings, sampler_at
+from loomopt.nlp.point import Elastic, Settings, sampler_at
 from loomopt.nlp.transcribe import transcribe
 
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
@@ -24,7 +24,7 @@ def put(program, elastic=False):
     """Return a program's NLP with its arguments at DESIGN, and the sampler there; two nodes a family."""
     x = {variable.name: DESIGN[variable.name] for variable in program.variables}
     sampler = sampler_at(program, x)
-    calls = Calls(program, Settings(), elastic)
+    calls = Calls(program, Settings(), Elastic() if elastic else None)
     nodes = [found[:2] for found in calls.peaks(sampler)]
     nlp, _ = transcribe(program, sampler, 6, elastic)
     nlp.solver(False, Settings())

@@ -1,5 +1,6 @@
 """How a program is put to its NLP: bounds, starts, rooms for nodes, what is exceeded and by how much."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from waves import model, objective, program
 
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family
-from loomopt.nlp.point import Settings
+from loomopt.nlp.point import Elastic, Known, Settings
 from loomopt.program.program import Limit, Objective, Variable
 from loomopt.program.sampling import Extreme
 
@@ -16,7 +17,7 @@ X = {"x": 0.5, "y": -2.0}
 
 
 def calls_of(task, elastic=False, **settings):
-    return Calls(task, Settings(**settings), elastic)
+    return Calls(task, Settings(**settings), Elastic() if elastic else None)
 
 
 def put(task, elastic=False, nodes=2):
@@ -103,10 +104,43 @@ def test_the_highest_extreme_is_what_an_epigraph_variable_stands_above():
 
 def test_what_gives_way_begins_at_one_and_never_below_none():
     calls, nlp, arguments, _ = put(program([("sum", 1, -5.0), ("wave", 1, 1.0)]), elastic=True)
-    assert nlp.structure.extras == 4
-    assert list(arguments["x0"][2:]) == [1.0] * 4
-    assert list(arguments["lbx"][2:]) == [0.0] * 4
+    assert nlp.structure.extras == 2
+    assert list(arguments["x0"][2:]) == [1.0] * 2
+    assert list(arguments["lbx"][2:]) == [0.0] * 2
+    assert list(arguments["ubx"][2:]) == [np.inf] * 2
     assert calls.epigraphs == ()
+
+
+def test_an_excess_of_infinite_cost_is_firm():
+    task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
+    calls = Calls(task, Settings(), Elastic((math.inf, 0.25)))
+    sampler = calls.sampler(X)
+    nodes = [of[:2] for of in calls.peaks(sampler)]
+    nlp = calls.transcribed(sampler, nodes, warm=False)
+    arguments = calls.arguments(nlp, sampler, X, np.array([0.5, 2.0]), nodes)
+    assert list(arguments["ubx"][2:]) == [0.0, np.inf]
+    value, _ = nlp.gradient(arguments["x0"], arguments["p"])
+    assert float(value) == pytest.approx(0.25 * 2.0, rel=1e-14)
+
+
+def test_a_solve_is_beaten_once_it_is_no_better_than_what_is_known():
+    task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
+    plain = Calls(task, Settings(), known=Known(most=3.0))
+    assert [plain.is_beaten(value, np.zeros(0)) for value in (2.999, 3.0, 3.001)] == [False, False, True]
+    elastic = Calls(task, Settings(), Elastic((1e-9, 1.0)), Known(most=3.0))
+    assert not elastic.is_beaten(9.0, np.array([99.0, 3.0])), "what is all but free does not count"
+    assert elastic.is_beaten(0.0, np.array([0.0, 3.001]))
+    assert not Calls(task, Settings()).is_beaten(1e300, np.zeros(0))
+
+
+def test_nodes_known_to_bind_come_before_a_starts_own():
+    task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
+    known, own = Extreme(0, 0.9, 2.0), [Extreme(0, k / 10, 9.0 - k) for k in range(8)]
+    with_known = Calls(task, Settings(), known=Known(((known,),)))
+    assert with_known.first_nodes([own]) == ((known, *own[: with_known.leading]),)
+    many = tuple(own)
+    assert Calls(task, Settings(), known=Known((many,))).first_nodes([own]) == (many,), "no more than there is room for"
+    assert Calls(task, Settings()).first_nodes([own]) == (tuple(own[: with_known.leading]),)
 
 
 def test_bounds_that_may_give_way_are_none_but_a_positive_one_stays_positive():
@@ -150,10 +184,12 @@ def test_an_extreme_exceeds_its_epigraph_or_its_limit_in_natural_size():
 def test_what_a_limit_gives_way_is_not_exceeded():
     task = program([("sum", 1, 1.0), ("wave", 1, 3.0)])
     calls = calls_of(task, elastic=True)
-    extra = np.array([0.0, 0.0, 0.75, 0.0])
+    extra = np.array([0.0, 0.75])
     assert calls.excess(calls.families[0], Extreme(0, 0.1, -4.0), extra) == pytest.approx(0.25)
     firm = replace(task, limits=(task.limits[0], replace(task.limits[1], relaxable=False)))
-    assert Calls(firm, Settings(), True).excess(calls.families[0], Extreme(0, 0.1, -4.0), extra) == pytest.approx(1.0)
+    assert Calls(firm, Settings(), Elastic()).excess(calls.families[0], Extreme(0, 0.1, -4.0), extra) == pytest.approx(
+        1.0
+    )
 
 
 def test_a_design_without_a_finite_cycle_has_no_sampler():

@@ -11,7 +11,7 @@ from loomopt.nlp import exchange
 from loomopt.nlp.callback import IterationCallback
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.elimination import Elimination, Entries
-from loomopt.nlp.point import Settings
+from loomopt.nlp.point import Elastic, Settings
 
 LIMITS = (("wave", 1, 1.5), ("swing", 1, 2.0), ("h3", 1, 1.2), ("h7", 0, 1.0))
 BENDS = (0.0, 0.05)
@@ -20,7 +20,7 @@ BENDS = (0.0, 0.05)
 def put(lifted, bend, elastic=False):
     """Return calls, NLP and arguments at a design away from the start, its two highest nodes in each family."""
     task = program(bend, lifted, LIMITS)
-    calls = Calls(task, Settings(), elastic)
+    calls = Calls(task, Settings(), Elastic() if elastic else None)
     x = {name: 0.09 * k - 0.4 for k, name in enumerate(task.starts[0])}
     sampler = calls.sampler(x)
     nodes = [[e for e in of if 0.0 < e.u < 1.0][:2] for of in calls.peaks(sampler)]
@@ -132,7 +132,7 @@ def test_iterations_are_reported():
 def test_the_least_relaxation_is_that_without_lifted_variables():
     """1.25 h3 must come below 1, h3 above 1.5: cheapest is to let h3 give way."""
     limits = (("wave", 1, 1.0), ("h3", -1, 1.5))
-    ours, theirs = (solved(program(0.0, lifted, limits), elastic=True) for lifted in (True, False))
+    ours, theirs = (solved(program(0.0, lifted, limits), elastic=Elastic()) for lifted in (True, False))
     assert ours.reached
     assert ours.relaxed == pytest.approx({1: 0.7}, abs=1e-9)
     assert theirs.relaxed == pytest.approx({1: 0.7}, abs=1e-9)

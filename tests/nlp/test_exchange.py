@@ -12,7 +12,7 @@ from waves import model, objective, program
 from loomopt.cycle import TURN, split
 from loomopt.jobs import registry
 from loomopt.nlp import exchange, ipopt
-from loomopt.nlp.point import Settings, sampler_at
+from loomopt.nlp.point import Elastic, Settings, sampler_at
 from loomopt.program.kinematics import Arcs
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.certificate import certify
@@ -108,7 +108,7 @@ def test_a_program_without_admissible_design_is_not_reached():
 )
 def test_elastic_solves_give_the_least_sum_of_excesses(limits, needed):
     task = program(limits=limits)
-    point = exchange.solve(task, task.starts[0], Settings(), elastic=True)
+    point = exchange.solve(task, task.starts[0], Settings(), elastic=Elastic())
     assert point.reached
     assert sum(abs(need) for need in point.relaxed.values()) == pytest.approx(needed, abs=1e-6)
 
@@ -214,12 +214,12 @@ def test_rounds_that_run_out_leave_a_point_with_its_violation(monkeypatch):
 def test_an_elastic_solve_whose_rounds_run_out_is_not_reached(monkeypatch):
     task = program(limits=(("sum", -1, 4.0), ("circle", 1, 2.0)))
     monkeypatch.setattr(exchange, "ELASTIC_ROUNDS", 2)
-    assert not exchange.solve(task, task.starts[0], Settings(), elastic=True).reached
+    assert not exchange.solve(task, task.starts[0], Settings(), elastic=Elastic()).reached
 
 
 def test_what_needs_no_relaxation_is_told_as_none():
     task = program(limits=(("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
-    point = exchange.solve(task, task.starts[0], Settings(), elastic=True)
+    point = exchange.solve(task, task.starts[0], Settings(), elastic=Elastic())
     assert set(point.relaxed) <= {0, 1}
     assert all(need > 1e-9 for need in point.relaxed.values())
 

@@ -25,7 +25,7 @@ def solved(task):
 
 
 def followed(task, near):
-    return follow.follow(Calls(task, Settings(), False), near)
+    return follow.follow(Calls(task, Settings()), near)
 
 
 def at(piece, u, value=1.0, signed=False):
@@ -165,7 +165,7 @@ def test_the_largest_move_counts_whatever_its_direction():
 
 def test_points_that_were_never_reached_are_no_neighbours():
     task = program([("y", -1, 2.0)], PEAK)
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     nodes = tuple(map(tuple, calls.peaks(calls.sampler({"x": 9.0, "y": 9.0}))))
     lost = Point({"x": 9.0, "y": 9.0}, "Maximum_Iterations_Exceeded", False, nodes=nodes)
     point = exchange.solve(task, task.starts[0], Settings(), warm=lost)

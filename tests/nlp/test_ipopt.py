@@ -16,7 +16,7 @@ X = {"x": 0.5, "y": 0.4}
 
 def begun(task, nodes=1):
     """Return what a run starts from."""
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     sampler = calls.sampler(X)
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
@@ -37,6 +37,7 @@ def test_the_least_of_a_bowl_below_a_line():
     assert answer.raw["lam_x"] == pytest.approx([0.0, 0.0], abs=1e-7)
     assert len(answer.extra) == len(answer.raw["extra"]) == 0
     assert answer.iterations > 0
+    assert answer.value == pytest.approx(0.5, abs=1e-8)
 
 
 def test_epigraph_variables_are_told_apart_from_the_design():
@@ -86,7 +87,7 @@ def test_evaluations_are_counted_with_the_nodes_they_look_at(monkeypatch):
     task = program([("wave", 1, 3.0), ("circle", 1, 2.0)])
     calls, nlp, sampler, extra, nodes = begun(task)
     calls_made = {"n_call_nlp_f": 5, "n_call_nlp_g": 7, "n_call_total": 99, "iter_count": 4}
-    answer = {"x": np.zeros(2), "lam_x": np.zeros(2), "lam_g": np.zeros(nlp.rows)}
+    answer = {"x": np.zeros(2), "lam_x": np.zeros(2), "lam_g": np.zeros(nlp.rows), "f": np.array([[0.25]])}
 
     class Counted(SimpleNamespace):
         def __call__(self, **arguments):

@@ -72,7 +72,7 @@ def test_numbers_are_the_same_by_value_and_expressions_by_what_they_are():
 
 def built(lifted, **changes):
     task = program(lifted=lifted, **changes)
-    sampler = Calls(task, Settings(), False).sampler(task.starts[0])
+    sampler = Calls(task, Settings()).sampler(task.starts[0])
     return expressions(structure(task, sampler, 2))
 
 
@@ -106,9 +106,9 @@ def test_what_hangs_on_no_variable_is_no_chain():
     """With the steps given, only the wave's rise is a variable: nothing is lifted, no row stands at a corner."""
     rise = Variable("raise", 1.0, 2.0, 1.0, (1, 2))
     task = replace(program(), variables=(rise,), parameters=dict.fromkeys(NAMES, 0.5))
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     own = structure(task, calls.sampler({"raise": 1.5}), 2)
     assert (own.recurrent, own.stations, own.held) == ((), (), [[]])
     assert expressions(own).lifts.defined == []
     assert (calls.slots, calls.leading) == (FIRST_SLOTS, LEADING)
-    assert (Calls(program(), Settings(), False).slots, BESIDE_STATIONS) == (2, (2, 1))
+    assert (Calls(program(), Settings()).slots, BESIDE_STATIONS) == (2, (2, 1))

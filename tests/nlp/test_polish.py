@@ -17,7 +17,7 @@ def solved(task):
 
 
 def polished(task, x, extra, point):
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     return polish.polish(calls, x, extra, point, calls.peaks(calls.sampler(x)))
 
 

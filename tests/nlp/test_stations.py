@@ -104,7 +104,7 @@ def test_every_whole_cycle_row_has_its_family(where):
 
 def test_nodes_are_for_what_no_station_holds():
     task = program()
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     sampler = calls.sampler(task.starts[0])
     (peaks,), (loose,) = (found(sampler) for found in (calls.peaks, lambda s: calls.loose(s, calls.peaks(s))))
     corners = [e for e in peaks if e.u in (0.0, 1.0)]

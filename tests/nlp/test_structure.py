@@ -83,7 +83,7 @@ def averaged():
 @pytest.mark.parametrize("name", ["miss", "rms", "mean", "root"])
 def test_means_are_rows_that_objectives_read(name):
     task = program((), (objective(name),), physics=averaged())
-    calls = Calls(task, Settings(), False)
+    calls = Calls(task, Settings())
     x = {"x": 0.3, "y": 0.0}
     sampler = calls.sampler(x)
     nlp = calls.transcribed(sampler, [], warm=False)
@@ -116,7 +116,7 @@ def test_every_number_has_its_place():
     assert layout.read(p, "variable scale") == [v.scale for v in task.variables]
     assert layout.read(p, "limit scale") == [limit.scale for limit in task.limits]
     assert layout.read(p, "limit") == [k.bound if k.family == "cycle" else k.value for k in task.limits]
-    assert layout.read(p, "objective weight") == Calls(task, Settings(), False).weights
+    assert layout.read(p, "objective weight") == Calls(task, Settings()).weights
     assert layout.read(p, "objective scale") == [level.scale for level in task.objectives]
     (event,) = task.model.events_read
     assert layout.read(p, f"still {event}") == list(sampler.stills[event].values())
@@ -132,10 +132,10 @@ def test_structures_tell_what_differs():
     assert len({one.key, structure(task, sampler, 12).key, structure(task, sampler, 6, elastic=True).key}) == 3
 
 
-def test_what_may_give_way_has_two_extras_and_a_row_of_its_own():
+def test_what_may_give_way_has_an_excess_and_a_row_of_its_own():
     task = program([("sum", 1, 1.0), ("sum", -1, 0.0), ("wave", 1, 3.0)], (objective("circle", "peak"),))
     sampler = Sampler(task.model, {"x": 1.0, "y": 0.5})
     plain, elastic = structure(task, sampler, 6), structure(task, sampler, 6, elastic=True)
-    assert (plain.extras, elastic.extras) == (1, 6)
-    assert (plain.soft, elastic.soft) == ({}, {0: 0, 1: 1, 2: 2})
+    assert (plain.extras, elastic.extras) == (1, 3)
+    assert (plain.ways, elastic.ways) == ({}, {0: (0,), 1: (1,), 2: (2,)})
     assert plain.static == elastic.static == [0, 1]

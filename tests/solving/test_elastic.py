@@ -1,21 +1,23 @@
 """The least relaxation, on limits whose clash is plain to see."""
 
+import math
+
 import pytest
 import toy
 
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
 from loomopt.solving import elastic
-from loomopt.solving.elastic import clash
+from loomopt.solving.elastic import clash, least
 from loomopt.solving.words import Words
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 
 
-def found(limits, sizes=None, waves=None, starts=1):
+def found(limits, sizes=None, waves=None):
     program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
     words = Words(toy.scene_of(toy.ToyJob(program)))
-    return clash(program, [program.starts[0]] * starts, Settings(), words)
+    return clash(program, least(program, [program.starts[0]], Settings()), Settings(), words)
 
 
 def told(answer):
@@ -62,59 +64,76 @@ def test_what_a_whole_cycle_limit_needs():
     assert told(answer) == {("w", "max", True): pytest.approx(1.0, rel=1e-7)}
 
 
-def test_nothing_clashes_where_a_design_needs_nothing():
-    answer = found((("x", -1, 1.0),))
-    assert (answer.limits, answer.relaxations) == ((), ())
-    assert answer.x["x"] >= 1.0 - 1e-9
+def test_where_a_design_needs_nothing_the_search_for_the_least_relaxation_ends(monkeypatch):
+    program = toy.program("xy", ROWS, limits=(("x", -1, 1.0),))
+    nearest = least(program, [program.starts[0]] * 3, Settings())
+    assert nearest.relaxed == {}
+    assert nearest.x["x"] >= 1.0 - 1e-9
+    calls = []
+    original = exchange.solve
+
+    def solve(*arguments, **more):
+        calls.append(arguments)
+        return original(*arguments, **more)
+
+    monkeypatch.setattr(exchange, "solve", solve)
+    least(program, [program.starts[0]] * 3, Settings())
+    assert len(calls) == 1
 
 
 # Starts -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("sums", "tried", "least"),
+    ("sums", "most", "best"),
     [
-        ((2.0, 2.0, 2.0, 1.0), 3, 2.0),
-        ((2.0, 1.0, 1.0, 1.0, 0.5), 4, 1.0),
-        ((2.0, 3.0, 2.0, 3.0, 2.0, 1.0), 5, 2.0),
-        ((2.0, None, 2.0, None), 4, 2.0),
-        ((1.0, 1 + 5e-10, 1 - 5e-10), 3, 1 - 5e-10),
-        ((1.0, 1 - 2e-9, 1 - 2e-9, 1.0), 4, 1 - 2e-9),
-        ((None, None), 2, None),
+        ((2.0, 1.5, 1.0), (math.inf, 2.0, 1.5), 1.0),
+        ((2.0, None, 1.0), (math.inf, 2.0, 2.0), 1.0),
+        ((None, 2.0, None), (math.inf, math.inf, 2.0), 2.0),
+        ((None, None), (math.inf, math.inf), None),
     ],
 )
-def test_starts_are_tried_until_three_agree_on_the_least(monkeypatch, sums, tried, least):
-    calls: list[dict[str, float]] = []
+def test_each_start_need_only_be_followed_below_the_best_so_far(monkeypatch, sums, most, best):
+    calls: list[float] = []
 
-    def solve(program, start, settings, elastic):
+    def solve(program, start, settings, elastic, known):
         total = sums[len(calls)]
-        calls.append(start)
-        return Point({}, "", total is not None, relaxed={} if total is None else {0: total})
+        calls.append(known.most)
+        reached = total is not None
+        return Point({}, "", reached, relaxed={0: 1.0} if reached else {}, excesses=(total,) if reached else ())
 
     monkeypatch.setattr(exchange, "solve", solve)
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0),))
-    answer = elastic._least(program, [{}] * len(sums), Settings())
-    assert len(calls) == tried
-    assert (answer[1] if answer else None) == (None if least is None else {0: least})
+    answer = least(program, [{}] * len(sums), Settings())
+    assert tuple(calls) == most
+    assert (answer.excesses[0] if answer else None) == best
+
+
+def test_another_basin_of_the_least_relaxation_is_found_from_another_start():
+    """x² ≥ 4 needs less where x may go below −1 than where it may go above 0.5."""
+    rows = {**ROWS, "s": lambda v: v["x"] ** 2}
+    program = toy.program("xy", rows, limits=(("s", -1, 4.0), ("x", 1, 0.5), ("x", -1, -1.0)))
+    right, left = ({"x": x, "y": 0.0} for x in (3.0, -3.0))
+    assert sum(least(program, [right], Settings()).excesses) == pytest.approx(1.5, abs=1e-7)
+    assert sum(least(program, [right, left], Settings()).excesses) == pytest.approx(1.0, abs=1e-7)
+
+
+def test_a_limit_alone_is_found_though_all_at_once_another_gives_way():
+    """Least together: p gives way by 1. Alone: x to 3, or y to 3."""
+    limits = (("p", -1, 4.0), ("x", 1, 1.5), ("y", 1, 1.5))
+    answer = found(limits)
+    assert told(answer)["p", "min", True] == pytest.approx(3.0, rel=1e-7)
+    assert told(answer)["x", "max", True] == pytest.approx(2.5, rel=1e-7)
+    assert told(answer)["y", "max", True] == pytest.approx(2.5, rel=1e-7)
+
+
+def test_a_limit_that_does_not_suffice_is_not_told():
+    """The circle keeps x at 1 or below, whatever y may be."""
+    answer = found((("f", 1, 1.0), ("x", -1, 2.0), ("y", 1, 5.0)))
+    assert {key[0] for key in told(answer)} == {"f", "x"}
 
 
 def test_both_rows_of_a_limit_need_what_the_worse_one_does():
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("x", -1, 3.0), ("x", 1, 0.0), ("y", 1, 1.0)))
     needed = {0: 0.5, 1: -1.5, 2: 2.0, 3: 0.9e-9}
     assert elastic._by_limit(program, needed) == {1: -1.5, 2: 2.0}
-
-
-def test_a_limit_by_itself_is_sought_from_two_starts(monkeypatch):
-    """The first call finds the least sum of two needs; each of the other limits is then tried from two starts."""
-    calls = []
-
-    def least(program, starts, settings):
-        calls.append((len(starts), sum(limit.relaxable for limit in program.limits)))
-        return (Point({}, "", True), {0: 1.0, 1: 1.0} if len(calls) == 1 else {2: 1.0, 3: 1.0})
-
-    monkeypatch.setattr(elastic, "_least", least)
-    monkeypatch.setattr(elastic, "_priced", lambda *_: ("both",))
-    program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("y", -1, 1.0), ("p", 1, 0.0)))
-    answer = clash(program, [{}] * 5, Settings(), Words(toy.scene_of(toy.ToyJob(program))))
-    assert calls == [(5, 4), (2, 1), (2, 1), (2, 1), (2, 1)]
-    assert [one.limit for one in answer.relaxations] == ["x", "y"], "one that needs two of a kind is none alone"

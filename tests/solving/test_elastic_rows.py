@@ -3,13 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import toy
 
 from loomopt.jobs import registry
-from loomopt.nlp import exchange
 from loomopt.nlp.families import families
-from loomopt.nlp.point import Point, Settings
+from loomopt.nlp.point import Point
 from loomopt.solving import elastic
 from loomopt.solving.words import Words
 from loomopt.tolerances import NEEDED, PRICED
@@ -66,43 +64,9 @@ def test_without_multipliers_nothing_has_a_price():
     assert priced(replace(made, limits=cycles), ()) == ()
 
 
-def test_needs_are_summed_in_natural_sizes():
-    made = toy.program("xy", limits=(("x", -1, 2.0), ("y", 1, 1.0)), sizes={"x": 4.0})
-    assert elastic._total(made, Point({}, "", True, relaxed={0: -2.0, 1: 3.0})) == 3.5
-    assert elastic._total(made, Point({}, "", True)) == 0.0
-
-
 def test_a_need_of_a_billionth_is_none_and_of_two_that_are_equal_the_first_counts():
     made = toy.program("xy", limits=(("x", -1, 2.0), ("x", -1, 3.0), ("y", 1, 1.0), ("y", -1, 1.0)))
     assert elastic._by_limit(made, {0: 0.5, 1: 0.5, 2: NEEDED, 3: 1.001 * NEEDED}) == {0: 0.5, 3: 1.001 * NEEDED}
     sized = toy.program("xy", limits=(("x", -1, 2.0),), sizes={"x": 100.0})
     assert elastic._by_limit(sized, {0: 99 * NEEDED}) == {}
     assert elastic._by_limit(sized, {0: 101 * NEEDED}) == {0: 101 * NEEDED}
-
-
-@pytest.mark.parametrize(("name", "sign"), [("x", -1), ("w", 1)])
-def test_only_one_side_of_one_limit_gives_way(name, sign):
-    made = program((*LIMITS, ("x", 1, 9.0)))
-    kept = [(limit.name, limit.sign) for limit in elastic._only(made, name, sign).limits if limit.relaxable]
-    assert kept == [(name, sign)]
-
-
-@pytest.mark.parametrize(
-    ("sums", "count"),
-    [
-        ((0.0, NEEDED, NEEDED, 0.0), 3),
-        ((NEEDED, 0.0, 0.0, 0.0), 3),
-        ((0.0, 1.001 * NEEDED, 0.0, 0.0), 4),
-        ((1.001 * NEEDED, 0.0, 0.0, 0.0), 4),
-    ],
-)
-def test_sums_agree_to_a_billionth(monkeypatch, sums, count):
-    made, calls = toy.program("xy", limits=(("x", -1, 2.0),)), list[float]()
-
-    def solve(*_, **__):
-        calls.append(sums[len(calls)])
-        return Point({}, "", True, relaxed={0: calls[-1]})
-
-    monkeypatch.setattr(exchange, "solve", solve)
-    elastic._least(made, [{}] * 4, Settings())
-    assert len(calls) == count

@@ -17,13 +17,16 @@ VALLEYS = {"f": lambda v: (v["x"] ** 2 - 1) ** 2 + v["x"] / 4 + v["y"] ** 2}
 
 def test_a_solved_toy_says_how():
     answer = toy.solve(toy.program("xy", BOWL))
-    assert (answer.status, answer.target, answer.message) == ("optimal", "least", "Least. No limit binds.")
+    assert (answer.status, answer.target) == ("optimal", "least")
+    assert answer.message == "Least. No limit binds. The only optimum reached by 11 solves, 512 designs sampled."
     assert answer.design == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
     assert list(answer.solver) == [
-        "status", "iterations", "starts", "starts_at_best", "accuracy", "evaluations", "error_estimate",
+        "status", "iterations", "starts", "starts_at_best", "basins", "designs", "accuracy", "evaluations",
+        "error_estimate",
     ]  # fmt: skip
     assert answer.solver["status"] == "Solve_Succeeded"
-    assert (answer.solver["starts"], answer.solver["starts_at_best"], answer.solver["accuracy"]) == (1, 1, 1e-8)
+    assert (answer.solver["starts"], answer.solver["starts_at_best"], answer.solver["accuracy"]) == (11, 11, 1e-8)
+    assert (answer.solver["basins"], answer.solver["designs"]) == (1, 512)
     assert answer.solver["iterations"] >= 1
     assert answer.solver["error_estimate"] == answer.certificate.error
     assert list(answer.time) == [
@@ -59,7 +62,8 @@ def test_an_answer_may_start_its_neighbour():
     assert again.design == pytest.approx(first.design, abs=1e-12)
     assert again.solver["starts"] == 1
     other = toy.program("xy", VALLEYS)
-    assert toy.solve(other, near=first).design["x"] == pytest.approx(0.97, abs=0.02), "of another structure: no help"
+    away = toy.solve(other, near=first, starts=1)
+    assert away.design["x"] == pytest.approx(0.97, abs=0.02), "of another structure: no help"
 
 
 CLASH = (("x", -1, 2.0), ("x", 1, 1.0))
@@ -71,7 +75,7 @@ def test_limits_that_clash_are_told_with_what_helps():
     assert answer.clash == ("x >= 2", "x <= 1")
     assert answer.certificate is None
     assert answer.point is None
-    assert answer.solver["starts"] >= 8
+    assert answer.solver["starts"] == 1 + 6, "its own start, then that, four of those looked at, and today's machine"
     assert answer.solver["starts_at_best"] == 0
     assert {relaxation.limit for relaxation in answer.relaxation} == {"x"}
 
@@ -80,17 +84,18 @@ def test_a_design_that_only_the_elastic_solve_finds_is_taken(monkeypatch):
     """Every start fails, the relaxation needs nothing: its design is solved from, and judged."""
     genuine, tried = exchange.solve, []
 
-    def solve(program, start, settings, warm=None):
+    def solve(program, start, settings, warm=None, elastic=None, known=None):
+        if elastic:
+            return Point({"x": 0.25, "y": 0.0}, "Solve_Succeeded", True)
         tried.append(dict(start))
         if start.get("x") == 0.25:
             return genuine(program, start, settings, warm)
         return Point(dict(start), "Restoration_Failed", False, iterations=7)
 
     monkeypatch.setattr(exchange, "solve", solve)
-    monkeypatch.setattr("loomopt.solving.elastic.clash", lambda *_: Clash(x={"x": 0.25, "y": 0.0}))
-    answer = toy.solve(toy.program("xy", BOWL))
-    assert (answer.status, answer.solver["starts"], answer.solver["starts_at_best"]) == ("optimal", 9, 1)
-    assert tried[-1] == {"x": 0.25, "y": 0.0}
+    answer = toy.solve(toy.program("xy", BOWL), starts=1)
+    assert (answer.status, answer.solver["starts_at_best"]) == ("optimal", 1)
+    assert tried == [{"x": 0.5, "y": 0.5}, {"x": 0.25, "y": 0.0}]
 
 
 def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
@@ -99,7 +104,8 @@ def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
     monkeypatch.setattr("loomopt.solving.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert (answer.status, answer.solver["status"]) == ("failed", "Restoration_Failed")
-    assert answer.solver["iterations"] == 8 * 7
+    assert answer.solver["iterations"] % 7 == 0
+    assert answer.solver["iterations"] >= 8 * 7
     assert answer.message.startswith("The solver failed (Restoration_Failed): IPOPT could not get back")
     assert answer.design == {"x": 0.5, "y": 0.5}
 

@@ -162,3 +162,14 @@ def test_a_variable_of_the_task_may_come_first(monkeypatch):
     assert answer.figures["M3_fdc"] == pytest.approx(8.0, rel=1e-9)
     assert answer.design["m4e"] * answer.design["r4e"] ** 2 < 0.02
     assert "Limits that stop s: " in answer.message
+
+
+@pytest.mark.parametrize("effect", ["", "gravity"])
+@pytest.mark.parametrize(("bound", "most"), [("r4e", "100 m"), ("r4e", "7 km"), ("m4e", "1e8 kg"), ("m4e", "3e4 kg")])
+def test_a_generous_bound_of_the_counterweight_spoils_no_answer(bound, most, effect):
+    scene = lo.load("beatup").set(f"bounds.{bound}.max", most)
+    scene = scene.with_effect(effect) if effect else scene
+    answer, plain = lo.solve(scene), lo.solve(lo.load("beatup").with_effect(effect) if effect else lo.load("beatup"))
+    assert answer.status == "optimal", answer.message
+    assert abs(answer.figures["M3_fdc"]) <= abs(plain.figures["M3_fdc"]) + 1e-9
+    assert answer.figures["peak_torque"] <= plain.figures["peak_torque"] * (1 + 1e-9), "more room is no loss"

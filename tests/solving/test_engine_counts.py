@@ -16,10 +16,12 @@ BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 
 def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
     monkeypatch.setattr(exchange, "starts", lambda *_: [])
+    monkeypatch.setattr(exchange, "started", lambda *_: None)
+    monkeypatch.setattr("loomopt.solving.strategy.least", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert answer.status == "failed"
-    expected = {"status": "Not_Assembled", "iterations": 0, "starts": 0, "starts_at_best": 0, "accuracy": 1e-8}
+    expected = {"status": "Not_Assembled", "iterations": 0, "starts": 1, "starts_at_best": 0, "accuracy": 1e-8}
     assert {name: answer.solver[name] for name in expected} == expected
 
 

@@ -90,7 +90,9 @@ def told(certificate, here=None, limits=(("p", 1, 5.0),)):
     program = toy.program("xy", ROWS, WAVES, limits=limits)
     job = toy.ToyJob(program)
     here = here or evaluated(limits, {"x": 1.0, "y": 1.0})
-    return report.with_optimum(job, toy.scene_of(job), "least", here, certificate, {"status": "Solve_Succeeded"}, here)
+    return report.with_optimum(
+        job, toy.scene_of(job), "least", here, certificate, {"status": "Solve_Succeeded"}, here, ""
+    )
 
 
 def binding(limit, worth, objective="f"):

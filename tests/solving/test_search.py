@@ -3,59 +3,18 @@
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 import pytest
 import toy
+from searches import BAD, GOOD, PROGRAM, candidate, certified, empty, solved
 
-from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
 from loomopt.solving import search as searching
-from loomopt.solving.search import Candidate, Search, compared, judged, objectives, searched
+from loomopt.solving.search import Search, compared, judged, objectives
 from loomopt.solving.verdict import Certificate, Level
-from loomopt.tolerances import FEASIBLE, MORE_STARTS, MOST_ALIKE, SAME_OBJECTIVE
+from loomopt.tolerances import FEASIBLE, MOST_ALIKE, SAME_OBJECTIVE
 
-PROGRAM = toy.program("xy", {"f": lambda v: v["x"] ** 2, "g": lambda v: v["y"]}, objectives=("f", "g"))
-LEVELS = (Level("f", 0.0, 0.0, 0.0), Level("g", 0.0, 0.0, 0.0))
-GOOD = Certificate(True, (), LEVELS, 0.0, 0.0, True, True)
-BAD = replace(GOOD, passed=False, reasons=("no",))
-
-
-def candidate(*values, x=0.0, reached=True):
-    point = Point({"x": x, "y": 0.0}, "Solve_Succeeded", reached)
-    return Candidate(point, tuple(map(float, values)))
-
-
-def empty(**more):
-    return Search(toy.ToyJob(PROGRAM), PROGRAM, Settings(), **more)
-
-
-@pytest.fixture
-def certified(monkeypatch):
-    """Return what is put before the certificate, and a way to say what it answers: by x, or for all."""
-    seen, answers = [], dict[float | str, Any]()
-
-    def certify(program, x, accuracy):
-        seen.append(x["x"])
-        answer = answers.get(x["x"], answers.get("all", GOOD))
-        return answer(len(seen)) if callable(answer) else answer
-
-    monkeypatch.setattr(searching, "certify", certify)
-    return seen, answers
-
-
-@pytest.fixture
-def solved(monkeypatch):
-    """Return the calls of the exchange, and the points it answers in order."""
-    calls, points = [], list[Point]()
-
-    def solve(program, start, settings, warm=None):
-        calls.append((dict(start), settings.penalty, warm))
-        return points.pop(0)
-
-    monkeypatch.setattr(exchange, "solve", solve)
-    return calls, points
-
+__all__ = ["certified", "solved"]
 
 # Order ------------------------------------------------------------------------------------------------------------
 
@@ -242,45 +201,8 @@ def test_steps_end_after_four_and_stay_within_bounds(certified):
     assert seen == [1.0, 1.5, 2.0, 2.5, 3.0]
     bound = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (0.0, 1.25)}, objectives=("f", "f"))
     certified[0].clear()
-    judged(Search(toy.ToyJob(bound), bound, Settings(), (candidate(1, 1, x=1.0),)))
+    judged(Search(toy.ToyJob(bound), bound, Settings(), candidates=(candidate(1, 1, x=1.0),)))
     assert certified[0][:2] == [1.0, 1.25]
-
-
-# Starts -----------------------------------------------------------------------------------------------------------
-
-
-def test_more_starts_are_tried_where_none_is_certified(certified, solved):
-    answers = certified[1]
-    calls, points = solved
-    answers["all"] = BAD
-    points += [Point({"x": float(k), "y": 0.0}, "Solve_Succeeded", True) for k in range(MORE_STARTS)]
-    told = []
-    found = searched(empty(), 2, 0, None, lambda number, count: told.append((number, count)))
-    assert told == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
-    assert (len(calls), len(found.candidates)) == (8, 8)
-    assert len({tuple(start.items()) for start, _, _ in calls}) == 8
-
-
-def test_one_certified_start_is_enough(certified, solved):
-    calls, points = solved
-    points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.25))
-    found = searched(empty(), 1, 0, None, None)
-    assert (len(calls), found.passed, found.built) == (1, True, 0.25)
-    assert found.solved >= 0.0
-    assert found.certified > 0.0
-
-
-def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
-    answers = certified[1]
-    calls, points = solved
-    near = Point({"x": 7.0, "y": 1.0}, "Solve_Succeeded", True)
-    points.append(near)
-    assert searched(empty(), 3, 0, near, None).passed
-    assert calls == [({"x": 7.0, "y": 1.0}, 1000.0, near)]
-    answers[7.0] = BAD
-    points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
-    found = searched(empty(), 1, 0, near, None)
-    assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)
 
 
 # To the last number -----------------------------------------------------------------------------------------------

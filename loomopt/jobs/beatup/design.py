@@ -19,7 +19,8 @@ def design(program: Program, x: Numbers) -> dict[str, float]:
         masses = _masses(program)
         mass = x["s"] / x["r4e"] ** 2 if x["r4e"] else min(masses)
         nearest = min(masses, key=lambda limit: abs(limit - mass))
-        close = abs(nearest - mass) <= NO_MASS * max(masses)
+        most = next(v.range[1] for v in program.variables if v.name == "s")
+        close = abs(nearest - mass) * x["r4e"] ** 2 <= NO_MASS * most
         values["m4e"] = nearest if close else min(max(mass, min(masses)), max(masses))
     extra = [name for name in x if name not in (*VARIABLES, "s")]
     return {name: values[name] for name in (*VARIABLES, *extra)}
@@ -44,9 +45,9 @@ def values(program: Program, design: Numbers) -> dict[str, float]:
 
 def tidy(program: Program, x: Numbers) -> dict[str, float]:
     """Return NLP variables with a negligible counterweight taken for none, so that its mass or radius can settle."""
-    radius = next((v for v in program.variables if v.name == "r4e"), None)
-    masses = _masses(program)
-    if "s" not in x or radius is None or x["s"] > NO_MASS * max(masses) * radius.upper**2:
+    known = {v.name: v for v in program.variables}
+    radius, masses = known.get("r4e"), _masses(program)
+    if "s" not in known or radius is None or x["s"] > NO_MASS * known["s"].range[1]:
         return dict(x)
     if min(masses) == 0.0:
         return {**x, "s": 0.0}

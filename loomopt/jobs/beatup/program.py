@@ -9,6 +9,8 @@ from loomopt.jobs import base
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
+from loomopt.mechanisms import counterweight
+from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
@@ -18,7 +20,6 @@ from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
 from loomopt.tolerances import NO_MASS
 
-COUNTERWEIGHT = ("m4e", "r4e")
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
@@ -63,7 +64,7 @@ def program(scene: Scene, target: str) -> Program:
     if target == "retrofit":
         parameters |= _change_parameters(scene, known, limited)
     starts = _starts(variables, known, direct, target == "retrofit")
-    moves = (*_moves(variables, known, limited), *scene_numbers.axis_moves(scene, known, limited))
+    moves = (*_moves(variables, known, limited, sizes.most), *scene_numbers.axis_moves(scene, known, limited))
     objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
     return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves)
 
@@ -79,17 +80,19 @@ class _Sizes:
         self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
         self.length = known["l4"]
         reed = max((float(own) for own in _reed(sampler)), default=0.0)
-        self.inertia = max(reed, limited["m4e"][1] * limited["r4e"][1] ** 2) or 1.0
+        self.room = counterweight.room(known, limited, max(reed, counterweight.holding(reed, front, resistance)))
+        self.most = self.room["m4e"][1] * self.room["r4e"][1] ** 2
+        self.inertia = max(reed, self.most) or 1.0
         self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
         # What a design can change of the reed torque is its share beside the resistance.
         self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
         self.mean_square = self.torque * max(self.torque, resistance)
 
     def variable(self, name: str) -> float:
-        """Return the size of a variable: its kind's, or its own largest value."""
+        """Return the size of a variable: its kind's, or its own largest value that is of use."""
         if name in LENGTHS:
             return self.length
-        return max(abs(self.known[name]), *map(abs, self.limited[name])) or self.length
+        return max(abs(self.known[name]), *map(abs, self.room.get(name, self.limited[name]))) or self.length
 
     def figure(self, name: str) -> float:
         """Return the size of a figure."""
@@ -113,10 +116,10 @@ def _variables(scene: Scene, sizes: _Sizes, limited: Bounds, direct: bool) -> li
     """Return the variables; where mass and radius of the counterweight do not matter apart, s = m4e r4e² is one."""
     labels = scene_numbers.labels(scene)
     names = [name for name in limited if direct or name != "m4e"]
-    found = [Variable(n, *limited[n], sizes.variable(n), limited[n], labels.get(n, "")) for n in names]
+    rooms = {**limited, **sizes.room}
+    found = [Variable(n, *limited[n], sizes.variable(n), rooms[n], labels.get(n, "")) for n in names]
     if not direct:
-        most = limited["m4e"][1] * limited["r4e"][1] ** 2
-        found.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, most)))
+        found.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, sizes.most)))
     return found
 
 
@@ -178,10 +181,9 @@ def _starts(
     return scene_numbers.distinct([using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])])
 
 
-def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: Bounds) -> tuple[Move, ...]:
+def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: Bounds, most: float) -> tuple[Move, ...]:
     """Return the directions that may leave every figure unchanged: first the counterweight's, then a common scale."""
     names = {variable.name for variable in variables}
-    most = limited["m4e"][1] * limited["r4e"][1] ** 2
     used, above = ("s", NO_MASS * most) if "s" in names else ("m4e", 0.0)
     wishes = {
         "m4e": (Wish("least", "least added mass"),),

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
+from loomopt.frozen import Frozen
 from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
@@ -25,6 +26,7 @@ REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
 ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far")}
 """Figures that are the least of several smooth rows."""
+TOPS = Frozen(phi_stroke="S")
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
 
@@ -85,7 +87,7 @@ def program(scene: Scene, target: str) -> Program:
     moves += scene_numbers.axis_moves(scene, known, limited)
     objectives = (*_objectives(target, sampler, read(sampler).stroke), *scene_numbers.least(sampler))
     starts = _starts(variables, known)
-    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow)
+    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS)
 
 
 def _reads_effects(scene: Scene) -> bool:

@@ -118,7 +118,11 @@ class _Task:
         limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
         limits += self._checks() + (self._law(self.law) if self.law else [])
         starts, moves = self._starts(variables), self._moves(variables)
-        return Program(self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves)
+        # Every force is linear in K1 and K1 X0, and in the speed's square [Qiu21, eq 6].
+        free = {v.name for v in variables if v.lower < v.upper}
+        linear = not self.law and not self.checks and (free <= {"K1", "X0"} or free == {"speed"})
+        task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
+        return Program(*task, single="the problem is linear: it has one optimum" if linear else "")
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""

@@ -65,6 +65,9 @@ class Levels:
             self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
         except OpenError as error:
             self.why = str(error)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            # A formula that decides by a value, or raises to a power that is no whole number, is none for boxes.
+            self._levels, self.why = [], "a formula of this scene does not run in intervals"
 
     def run(self, until: float, say: Callable[[str], None]) -> Outcome:
         """Go on until all is shown, a better design turns up, or the clock says `until`."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from machines_in_boxes import quietly, solved
 
+from loomopt.boxes import Enclosure
 from loomopt.solving.global_bound.levels import HELD, Levels, _Level
 from loomopt.solving.global_bound.scale import silent
 from loomopt.solving.global_bound.task import reduced
@@ -151,3 +152,15 @@ def test_a_good_design_is_never_lost(target):
         grown(level.tree, level.question)
         inside = (level.tree.low <= at[:, None] + 1e-15) & (at[:, None] - 1e-15 <= level.tree.high)
         assert inside.all(axis=0).any()
+
+
+def test_a_formula_that_intervals_do_not_know_is_told(monkeypatch):
+    found = solved("beatup", "balance")
+
+    def unknown(self, power):
+        raise TypeError("unsupported operand")
+
+    monkeypatch.setattr(Enclosure, "__pow__", unknown)
+    outcome = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly)
+    assert not outcome.proven
+    assert outcome.why == "a formula of this scene does not run in intervals"

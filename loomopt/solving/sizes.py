@@ -1,0 +1,17 @@
+"""How wide a search looks, and how far apart its starts are: what costs time, and decides no verdict."""
+
+SCREENED_NODES, DESIGNS, MOVED_DESIGNS, PROJECTIONS, SCREENED_STARTS = 48, 512, 64, 3, 4
+"""A search's look at many designs: nodes of a turn, designs, how many of the best are moved onto their limits, in so
+many steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
+
+APART, CLOSER_TOGETHER, FAR_END, LONGEST_STEP = 0.35, 0.6, 0.02, 0.3
+"""Of the box of variables: distance of starts (rms), its factor until there are enough, what a flipped variable stays
+from its end, and the longest step of a projection."""
+
+BETTER, FLIPS = 1e-8, 2
+"""What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
+flips."""
+
+LEVELS_APART, VIOLATION_WEIGHT, WORST, REGULAR = 100.0, 10.0, 10.0, 1e-6
+"""A search's merit in natural sizes: factor between objectives, weight of the worst violation, and what stands for no
+value; share of a row's own size by which its projection is held regular."""

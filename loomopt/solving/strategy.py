@@ -1,0 +1,121 @@
+"""How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from loomopt.nlp import exchange
+from loomopt.nlp.point import Known, Point, sampler_at
+from loomopt.solving.elastic import least
+from loomopt.solving.screening import Screening
+from loomopt.solving.search import OnStart, Search, judged, tried
+from loomopt.solving.sizes import BETTER, DESIGNS, FLIPS, SCREENED_STARTS
+from loomopt.tolerances import MORE_STARTS
+
+
+def searched(search: Search, count: int | None, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
+    """Return the search after so many starts, or as wide as it takes; after none where `near` leads on.
+
+    count: the job's own starts and random ones; None for a search of the best basin. More are tried where none is
+    certified; where no start leads to a design, only if one is admissible as far as can be seen.
+    """
+    if near is not None:
+        search = tried(search, near.x, near)
+        search = judged(search) if search.candidates[-1].point.reached else search
+        if search.passed:
+            return replace(search, stayed=True)
+    if count is None:
+        search = judged(spread(search, seed, on_start))
+        if search.passed or search.clashes:
+            return search
+    done = 0
+    for wanted in dict.fromkeys((count or MORE_STARTS, max(count or 0, MORE_STARTS))):
+        chosen = exchange.starts(search.program, wanted, seed)
+        for place, start in enumerate(chosen[done:], done + 1):
+            if on_start:
+                on_start(place, len(chosen))
+            search = tried(search, start)
+        done = max(done, len(chosen))
+        search = judged(search)
+        if not search.reached and search.nearest is None:
+            search = judged(relaxed(search, chosen))
+        if search.passed or search.clashes:
+            break
+    return search
+
+
+def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
+    """Return the search after the job's own starts, the best of a look at many designs, and the best with flips.
+
+    From the best, each variable in turn is put to its far end: basins lie side by side along bounds.
+    """
+    own = exchange.starts(search.program, 1, seed)
+    screening = _screening(search, own)
+    if screening is None:
+        return search
+    began = time.perf_counter()
+    wide = not search.program.single and len(screening.free) > 0
+    drawn = _completed(search, screening.starts(seed)) if wide else []
+    search = replace(search, designs=len(drawn) and DESIGNS, solved=search.solved + time.perf_counter() - began)
+    steps = _Steps(on_start, len(own) + len(drawn))
+    for start in own:
+        search = steps.explored(search, start)
+        if not search.reached and search.nearest is None:
+            search = relaxed(search, [*own, *drawn[:SCREENED_STARTS]])
+            if search.clashes:
+                return search
+    for start in drawn:
+        search = steps.explored(search, start)
+    for _ in range(FLIPS if drawn else 0):
+        if not search.reached:
+            break
+        before = search.ranked[0]
+        flipped = _completed(search, screening.flipped(before.point.x))
+        steps.count += len(flipped)
+        for start in flipped:
+            search = steps.explored(search, start)
+        if search.ranked[0] is before:
+            break
+    return search
+
+
+@dataclass
+class _Steps:
+    """Starts as they are explored: what is told of each; count: how many are known to come."""
+
+    on_start: OnStart | None
+    count: int
+    done: int = 0
+
+    def explored(self, search: Search, start: Mapping[str, float]) -> Search:
+        """Return the search after a solve that is left as soon as it cannot be better than the best so far."""
+        self.done += 1
+        if self.on_start:
+            self.on_start(self.done, self.count)
+        if not search.reached:
+            return tried(search, start)
+        best = search.ranked[0]
+        return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
+
+
+def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> Screening | None:
+    """Return what looks at many designs, by the nodes of the first start that has a cycle; None without one."""
+    for start in (*own, search.today):
+        sampler = sampler_at(search.program, start) if start else None
+        if sampler is not None:
+            return Screening(search.program, sampler)
+    return None
+
+
+def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+    """Return the starts that assemble, with the variables that follow from the others."""
+    return [start for start in (exchange.started(search.program, each) for each in starts) if start]
+
+
+def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
+    """Return the search with where its limits' excesses are least; solved from there where there are none."""
+    began = time.perf_counter()
+    places = [*starts, *([search.today] if search.today else [])]
+    nearest = least(search.program, places, search.settings)
+    search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
+    return search if nearest is None or nearest.relaxed else tried(search, nearest.x)

@@ -1,0 +1,50 @@
+"""What a search says of itself claims no more than was done."""
+
+from dataclasses import replace
+
+import pytest
+from searches import candidate, empty
+
+from loomopt.nlp.point import Point
+from loomopt.solving import told
+from loomopt.solving.search import Candidate, Judged
+
+BEST = replace(candidate(1, 2, x=1.0), value=1002.0)
+
+
+def search(*candidates, **more):
+    return replace(empty(candidates=(BEST, *candidates)), best=Judged(BEST, BEST.point.x, None), **more)
+
+
+def left(value):
+    return Candidate(Point({"x": 9.0, "y": 0.0}, "Beaten", False, value=value), (), value)
+
+
+@pytest.mark.parametrize(
+    ("made", "sentence"),
+    [
+        (search(), "The only optimum reached by 1 solve."),
+        (search(left(1002.0), designs=512), "The only optimum reached by 2 solves, 512 designs sampled."),
+        (search(candidate(1, 3, x=2.0), left(7.0)), "Best of 2 optima reached by 3 solves."),
+        (search(stayed=True), "Solved again near the answer given; other basins were not looked at."),
+    ],
+)
+def test_what_was_done_is_told(made, sentence):
+    assert told.searched(made) == sentence
+
+
+def test_why_no_other_basin_was_looked_for():
+    made = search()
+    made = replace(made, program=replace(made.program, single="it is linear"))
+    assert told.searched(made) == "No other basin was looked for: it is linear."
+
+
+def test_solves_that_ended_in_the_best_are_those_there_and_those_left_at_its_value():
+    far, near = left(1003.0), left(1002.0 + 1e-8)
+    counts = told.counts(search(far, near, candidate(1, 2, x=1.0), candidate(1, 5, x=3.0)))
+    assert (counts["starts"], counts["starts_at_best"], counts["basins"]) == (5, 3, 2)
+
+
+def test_without_an_optimum_there_is_none_to_count():
+    counts = told.counts(empty(candidates=(left(3.0),)))
+    assert (counts["starts"], counts["starts_at_best"], counts["basins"]) == (1, 0, 0)
