@@ -4,6 +4,7 @@ import abc
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
@@ -33,6 +34,8 @@ class Job(abc.ABC):
     """What a scene may hold, where that does not depend on the scene."""
     open_boxes: str = ""
     """Why branch and bound does not close on its designs, "" where it does."""
+    loosening: Mapping[str, str] = MappingProxyType({})
+    """Variables that only limits read, and only looser as they grow, wherever the program has another variable too."""
 
     # What every job says.
 
@@ -124,10 +127,6 @@ class Job(abc.ABC):
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the NLP's variables without what is only rounding."""
         return dict(x)
-
-    def loosening(self, program: Program) -> tuple[str, ...]:
-        """Return the variables that only limits read, and that only loosen them as they grow."""
-        return ()
 
     def peaks(self, model: JobModel) -> Mapping[str, str]:
         """Return the figures that are extremes over the cycle, with their quantities."""

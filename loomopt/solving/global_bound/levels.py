@@ -61,7 +61,7 @@ class Levels:
         if self.why:
             return
         try:
-            task = reduced(program, job.loosening(program), scale.silent(program), _most(program, self.merits))
+            task = reduced(program, loosening(job, program), scale.silent(program), _most(program, self.merits))
             self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
         except OpenError as error:
             self.why = str(error)
@@ -84,6 +84,12 @@ class Levels:
         why = "; ".join(level.why() for level in still) or self.why
         lowest = still[0].lowest() if still else None
         return Outcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
+
+
+def loosening(job: Job, program: Program) -> tuple[str, ...]:
+    """Return the variables of a program that its job says only loosen limits."""
+    names = {v.name for v in program.variables}
+    return tuple(name for name, other in job.loosening.items() if {name, other} <= names)
 
 
 def _unserved(program: Program, sampler: Sampler) -> str:

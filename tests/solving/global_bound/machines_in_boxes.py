@@ -13,6 +13,7 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving.engine import solve_program
 from loomopt.solving.global_bound import scale
+from loomopt.solving.global_bound.levels import loosening
 from loomopt.solving.global_bound.task import Task, reduced
 from loomopt.solving.search import Search
 
@@ -29,7 +30,7 @@ class Solved(NamedTuple):
 
     @property
     def task(self) -> Task:
-        return reduced(self.program, self.job.loosening(self.program), scale.silent(self.program), {})
+        return reduced(self.program, loosening(self.job, self.program), scale.silent(self.program), {})
 
 
 @functools.cache

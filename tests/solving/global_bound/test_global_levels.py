@@ -7,7 +7,7 @@ import pytest
 from machines_in_boxes import quietly, solved
 
 from loomopt.boxes import Enclosure
-from loomopt.solving.global_bound.levels import HELD, Levels, _Level
+from loomopt.solving.global_bound.levels import HELD, Levels, _Level, loosening
 from loomopt.solving.global_bound.scale import silent
 from loomopt.solving.global_bound.task import reduced
 from loomopt.solving.global_bound.tree import grown
@@ -77,7 +77,7 @@ def test_the_most_is_bounded_from_above():
 def claimed(name, target, place, share):
     """Return the level of an answer whose objectives are said to be worse than they are by a share."""
     found = solved(name, target)
-    task = reduced(found.program, found.job.loosening(found.program), silent(found.program), {})
+    task = reduced(found.program, loosening(found.job, found.program), silent(found.program), {})
     levels = Levels(found.program, found.job, found.x, 1e-6)
     merits = [merit * (1 + share * (k == place)) for k, merit in enumerate(levels.merits)]
     return _Level(task, found.x, merits, place, 1e-6)
