@@ -11,7 +11,7 @@ from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, check_numbers, target_name
+from loomopt.solving.asked import ACCURACY, GAP, SECONDS, Everywhere, check_numbers, target_name
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.tolerances import SLACK
 
@@ -69,6 +69,9 @@ def solve(
     seed: int = 0,
     near: Solution | None = None,
     prove: bool = False,
+    everywhere: bool = False,
+    gap: float = GAP,
+    seconds: float = SECONDS,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     on_step: Callable[[str], None] | None = None,
@@ -76,9 +79,11 @@ def solve(
     """Return the certified optimum of a scene's target (the job's default without one), or why there is none.
 
     scene: itself, or its packaged name or path. accuracy: relative, of every whole-cycle value, 1e-11 to 0.1. starts:
-    the job's own first, then random ones drawn with `seed`. near: an answer to the same structure, from which the
-    solve starts warm. prove: whether every limit is proven at every crank angle too. on_iteration(number),
-    on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    so many, the job's own first, then random ones drawn with `seed`; without it a search for the best basin. near: an
+    answer to the same structure, from which the solve starts warm. prove: whether every limit is proven at every crank
+    angle too. everywhere: whether it is proven that no admissible design is better by more than `gap`, relative to each
+    objective, in at most so many seconds (`answer.global_bound`). on_iteration(number), on_start(number, of),
+    on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     own = _scene(scene)
     found = engine.solve(
@@ -89,6 +94,7 @@ def solve(
         seed=seed,
         near=near,
         prove=prove,
+        everywhere=Everywhere(gap, seconds, on_step or (lambda text: None)) if everywhere else None,
         on_iteration=on_iteration,
         on_start=on_start,
         on_step=on_step,

@@ -25,6 +25,7 @@ from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, r
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark, worded  # noqa: E402
 
+UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
 BAD_INPUT = 2
 SUMMARY = "Optimal design of weaving-loom mechanisms: dimensions that work, proof that they do, what each limit costs."
@@ -53,6 +54,9 @@ def solve(
     accuracy: Annotated[str, typer.Option(metavar="R", help="Relative accuracy, 1e-11 to 0.1.")] = "1e-8",
     starts: Annotated[str | None, typer.Option(metavar="N", help="So many starts; a wide search without it.")] = None,
     proven: Annotated[bool, typer.Option("--prove", help="Prove every limit at every crank angle too.")] = False,
+    everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
+    gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
+    seconds: Annotated[str, typer.Option("--time", metavar="S", help="How long --global may take, s.")] = "60",
     as_json: Json = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
 ) -> None:
@@ -64,12 +68,14 @@ def solve(
         scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
     settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
+    settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
+    settings |= {"prove": proven, "everywhere": everywhere}
     if out:
         from loomopt.views import outputs
 
         outputs.check_folder(out)
     with Progress() as progress:
-        answer = api.solve(scene, target, **settings, prove=proven, on_step=progress.say)
+        answer = api.solve(scene, target, **settings, on_step=progress.say)
     unwritten = None
     if out:
         try:
@@ -85,7 +91,8 @@ def solve(
         layout.show(*terminal.solution(answer, scene))
     if unwritten:
         raise unwritten
-    raise typer.Exit(EXIT[answer.status])
+    unproven = answer.global_bound is not None and not answer.global_bound.proven
+    raise typer.Exit(UNPROVEN if unproven and answer.status == "optimal" else EXIT[answer.status])
 
 
 def accuracy(

@@ -79,14 +79,19 @@ class Cycle:
 
     def coefficients(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
         """Return offset, rad, and the coefficient of each declared corner in the node's angle."""
+        turns, weights = self.shares(piece, u, corners)
+        return TURN * turns, weights
+
+    def shares(self, piece: int, u: float, corners: int) -> tuple[float, Floats]:
+        """Return the turns and the share of each declared corner of which a node's angle is made."""
         weights = np.zeros(corners)
         if not self.order:
-            return TURN * u, weights
+            return u, weights
         first, second = self.order[piece], self.order[(piece + 1) % self.pieces]
         wrapped = second[1] + (piece + 1) // self.pieces
         weights[first[0]] += 1 - u
         weights[second[0]] += u
-        return TURN * (first[1] * (1 - u) + wrapped * u), weights
+        return first[1] * (1 - u) + wrapped * u, weights
 
     def begins(self, corners: Sequence[Number], pi: Number) -> list[Number]:
         """Return `starts` in another number system: corners: as declared, flat, rad; pi: that system's own."""

@@ -1,4 +1,4 @@
-"""The number systems one formula runs in: float, NumPy arrays, jets, CasADi symbols, mpmath, SymPy, balls, recordings.
+"""The number systems formulas run in: float, NumPy arrays, jets, CasADi, mpmath, SymPy, balls, boxes, recordings.
 
 A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
 integers, so it is written once. Each system is imported only when it is asked for.
@@ -166,6 +166,23 @@ def ball_series(centre: float, half: float) -> Number:
     """Return the series of a variable itself around the ball centre ± half."""
     flint = importlib.import_module("flint")
     return flint.arb_series([flint.arb(centre, half), 1], ORDER)
+
+
+@functools.cache
+def boxes() -> Maths:
+    """Intervals rounded outward, and their slopes, over arrays of boxes: every result encloses the true one."""
+    from loomopt import boxes
+
+    return Maths("boxes", boxes.sin, boxes.cos, boxes.sqrt, boxes.atan2, boxes.PI, boxes.interval, boxes.chosen)
+
+
+@functools.cache
+def box_series() -> Maths:
+    """Truncated Taylor series along the cycle, over arrays of boxes: every result encloses the true one."""
+    from loomopt import box_series, boxes
+
+    own = box_series
+    return Maths("box series", own.sin, own.cos, own.sqrt, own.atan2, boxes.PI, boxes.interval, own.chosen)
 
 
 @functools.cache

@@ -16,7 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
-    "jets tracing",
+    "jets boxes box_series tracing",
     "maths errors frozen interrupts tolerances lazy",
     "units",
     "quantities",

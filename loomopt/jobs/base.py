@@ -4,6 +4,7 @@ import abc
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
@@ -31,6 +32,10 @@ class Job(abc.ABC):
     name: str
     own_schema: SceneSchema
     """What a scene may hold, where that does not depend on the scene."""
+    open_boxes: str = ""
+    """Why branch and bound does not close on its designs, "" where it does."""
+    loosening: Mapping[str, str] = MappingProxyType({})
+    """Variables that only limits read, and only looser as they grow, wherever the program has another variable too."""
 
     # What every job says.
 

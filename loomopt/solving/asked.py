@@ -1,9 +1,49 @@
 """What a solve is asked for, checked before anything is computed."""
 
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
 from loomopt.errors import BadInput
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY as ACCURACY
 from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
+
+GAP, SECONDS = 1e-3, 60.0
+"""What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""
+LEAST_GAP, MOST_GAP = 1e-6, 0.5
+"""Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
+
+
+class Everywhere(NamedTuple):
+    """That an answer be proven best of all admissible designs; say: is told how far the proof has come.
+
+    gap: relative, what is left open; seconds: how long it may take.
+    """
+
+    gap: float = GAP
+    seconds: float = SECONDS
+    say: Callable[[str], None] = lambda text: None
+
+
+def check_everywhere(asked: Everywhere) -> None:
+    """Raise BadInput for a gap or a time outside what can be kept."""
+    if not LEAST_GAP <= asked.gap <= MOST_GAP:
+        raise BadInput(
+            "the gap is out of range",
+            key="--gap",
+            value=f"{asked.gap:g}",
+            allowed=f"{LEAST_GAP:g} to {MOST_GAP:g}",
+            remedy="Write --gap 1e-3, or leave it out.",
+        )
+    if not 0 < asked.seconds < math.inf:
+        raise BadInput(
+            "the time is out of range",
+            key="--time",
+            value=f"{asked.seconds:g}",
+            allowed="seconds, more than 0",
+            remedy="Write --time 60, or leave it out.",
+        )
 
 
 def target_name(scene: Scene, target: str | None) -> str:

@@ -84,7 +84,7 @@ class Batch:
         self.pieces, self.u = like.grid(SCREENED_NODES)
         self.names = [variable.name for variable in program.variables]
         own = [limit for limit in program.limits if limit.family != "variable"]
-        self.limits = [limit for limit in own if limit.family != "cycle" or like.cycle.on(limit.where).any()]
+        self.limits = [limit for limit in own if limit.family != "cycle" or like.on(limit.row, limit.where).any()]
 
     def judged(self, x: Floats, directions: Floats | None = None) -> Judged:
         """Return what designs x, (designs, variables) SI, are worth; directions: (variables, n) for jets, SI."""
@@ -116,7 +116,7 @@ class Batch:
 
     def _highest(self, values: Number, limit: Limit) -> Number:
         """Return the largest of what is compared with a limit's bound, (designs,)."""
-        on = np.flatnonzero(self.like.cycle.on(limit.where)[self.pieces])
+        on = np.flatnonzero(self.like.on(limit.row, limit.where)[self.pieces])
         plain = _plain(values)[on]
         heights = plain if limit.row in self.program.model.signed else np.abs(plain)
         top = on[np.argmax(np.where(np.isfinite(heights), heights, np.inf), axis=0)]
@@ -130,7 +130,8 @@ class Batch:
         found: list[Floats] = []
         for group in objective.groups:
             if objective.form == "peak":
-                rows = [reading.like.heights(row, whole[row]).max(axis=0) for row in group]
+                on = {row: self.like.on(row)[self.pieces] for row in group}
+                rows = [self.like.heights(row, whole[row][on[row]]).max(axis=0) for row in group]
             else:
                 rows = [np.asarray(reading.single(row), dtype=np.float64) for row in group]
                 rows = [np.abs(row) for row in rows] if objective.form == "magnitude" else rows

@@ -2,7 +2,7 @@
 
 import functools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +13,11 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
 from loomopt.solving import elastic, report, told
-from loomopt.solving.asked import ACCURACY, check_numbers, target_name
+from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
+from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
 
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
@@ -56,6 +57,7 @@ def solve(
     seed: int = 0,
     near: Solution | None = None,
     prove: bool = False,
+    everywhere: Everywhere | None = None,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     on_step: Callable[[str], None] | None = None,
@@ -66,6 +68,7 @@ def solve(
     without it a search for the best basin, its designs drawn with `seed`;
     near: an answer to start warm from (one of another structure is no help and is left alone);
     prove: whether to prove every limit of the answer at every crank angle;
+    everywhere: to prove that no admissible design is better, and how closely;
     on_iteration: called with each iteration's number;
     on_start: called with each start's number and how many there are;
     on_step: called with what is being done, before each step that may take long.
@@ -76,6 +79,8 @@ def solve(
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
     check_numbers(accuracy, starts)
+    if everywhere:
+        check_everywhere(everywhere)
     settings = Settings(accuracy, callback=_callback(on_iteration), on_step=on_step).at(f"building the {target}")
     imported = _import_solver()
     begun = time.perf_counter()
@@ -83,14 +88,17 @@ def solve(
     made = time.perf_counter() - begun
     today, warm = job.values(program, job.today(scene)), near.point if near else None
     search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
+    sold = job.sizes(scene)
+    search, bound = _claimed(search, everywhere, sold) if everywhere else (search, None)
     search, answer, reported = _answer(scene, target, search)
-    for name, sizes in job.sizes(scene).items() if answer.status == "optimal" else ():
+    for name, sizes in sold.items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts or 1, "seed": seed, "on_start": on_start}
         options["on_step"] = replace(settings, step=f"trying sizes of {name}").say
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
     if prove and answer.certificate:
         settings.at("proving")
         answer = _proven(scene, target, answer)
+    answer = replace(answer, global_bound=bound)
     solver = {**answer.solver, "evaluations": Tally.positions - evaluated}
     if answer.certificate:
         solver["error_estimate"] = answer.certificate.error
@@ -126,6 +134,13 @@ def _proven(scene: Scene, target: str, answer: Solution) -> Solution:
     from loomopt.solving.proof import proven
 
     return proven(scene, target, answer)
+
+
+def _claimed(search: Search, everywhere: Everywhere, sold: Mapping[str, Sequence[float]]) -> tuple[Search, GlobalBound]:
+    """Return the search, with a better best where boxes led to one, and what is proven of all designs."""
+    from loomopt.solving.global_bound.claim import claimed
+
+    return claimed(search, everywhere, f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else "")
 
 
 def _import_solver() -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
 from loomopt.scene_document import copied
-from loomopt.solving.verdict import Certificate
+from loomopt.solving.verdict import Certificate, GlobalBound
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
@@ -149,6 +149,8 @@ class Solution(Evaluation):
     """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
     proofs: "Proofs | None" = None
     """What was proven at every crank angle, where that was asked for."""
+    global_bound: GlobalBound | None = None
+    """What is proven of all admissible designs, where that was asked for."""
     today: Callable[[], Evaluation] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -182,6 +184,7 @@ class Solution(Evaluation):
             ],
             "certificate": certificate_dict(self.certificate) if self.certificate else None,
             "solver": dict(self.solver),
+            "global": self.global_bound.as_dict() if self.global_bound else None,
             "time": dict(self.time),
         }
         if self.proofs:

@@ -1,7 +1,9 @@
-"""What a certificate says: plain records."""
+"""What a certificate says, and a proof of all designs: plain records."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from loomopt.program.program import Limit, Objective
 from loomopt.tolerances import ROUNDED
@@ -70,3 +72,57 @@ class Certificate:
     def residual(self) -> float:
         """The largest KKT residual of all levels."""
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
+
+
+Sense = Literal["least", "least magnitude", "most"]
+"""What of a figure is sought."""
+
+
+@dataclass(frozen=True)
+class GlobalLevel:
+    """What is shown of one objective at all admissible designs that are as good at the levels before it.
+
+    objective: its figure; sense: what of it is sought; best: the answer's, bound: what no design is below, or above
+    where the most is sought, SI; gap: between them, relative; band: by how much designs may be worse than `best` and
+    still be asked at later levels, SI; proven: whether the gap is the one that was asked for.
+    """
+
+    objective: str
+    sense: Sense
+    best: float
+    bound: float
+    gap: float
+    band: float
+    proven: bool
+
+
+@dataclass(frozen=True)
+class GlobalBound:
+    """What is proven of all admissible designs; boxes, seconds: what it took; why: why it is not proven."""
+
+    levels: tuple[GlobalLevel, ...]
+    boxes: int
+    seconds: float
+    why: str = ""
+
+    @property
+    def proven(self) -> bool:
+        """Whether no admissible design is better, level by level, by more than the gap that was asked for."""
+        return not self.why
+
+    @property
+    def gap(self) -> float:
+        """The gap of the level that has come least far, relative; infinite without a bound."""
+        return max((level.gap for level in self.levels), default=math.inf)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `solve --json` prints."""
+        return {
+            "proven": self.proven,
+            "gap": self.gap if math.isfinite(self.gap) else None,
+            "bound": {level.objective: level.bound for level in self.levels if math.isfinite(level.bound)},
+            "band": {level.objective: level.band for level in self.levels[:-1]},
+            "boxes": self.boxes,
+            "seconds": self.seconds,
+            "why": self.why or None,
+        }

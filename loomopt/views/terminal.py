@@ -7,6 +7,7 @@ from loomopt.jobs import registry
 from loomopt.quantities import exact
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution, remedies
+from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.tolerances import SLACK
@@ -35,6 +36,8 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
         parts += [retyped(answer, scene), _binding(answer)]
         parts += certificate(answer)
     parts += proven(answer.proofs) if answer.proofs else []
+    if answer.global_bound:
+        parts.append(everywhere(answer.global_bound, scene))
     if answer.solver.get("starts", 1) > 1:
         parts.append(_starts(answer, scene))
     time = answer.time
@@ -134,6 +137,28 @@ def certificate(answer: Solution) -> list[str]:
     unique = "unique" if found.unique else "not unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
     return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
+
+
+BEYOND = {-1: "below", 1: "above"}
+
+
+def everywhere(found: GlobalBound, scene: Scene) -> str:
+    """Return what is proven of all admissible designs, in one line."""
+    words = Words(scene)
+    said: list[str] = []
+    kept: list[str] = []
+    for level in found.levels:
+        name = f"|{level.objective}|" if level.sense == "least magnitude" else level.objective
+        side = 1 if level.sense == "most" else -1
+        among = f"of those with {' and '.join(kept)}, none" if kept else "no admissible design in these bounds"
+        if level.bound == 0.0 and level.proven:
+            said.append(f"{name} is 0, less than which there is none")
+        elif math.isfinite(level.bound):
+            said.append(f"{among} has {name} {BEYOND[side]} {words.bounded(level.objective, level.bound, side)}")
+        kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
+    head = f"Proven best, gap {100 * found.gap:.2g} %" if found.proven else f"NOT proven best: {found.why}"
+    cost = f" ({found.boxes} boxes, {found.seconds:.1f} s)" if found.boxes else ""
+    return f"{head}{': ' if said else ''}{'; '.join(said)}{cost}"
 
 
 def _starts(answer: Solution, scene: Scene) -> str:

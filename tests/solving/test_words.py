@@ -162,3 +162,8 @@ def test_what_is_out_of_proportion_is_told_last(relaxations, order):
     """Capitals are out of proportion; joined by a comma, limits give way together."""
     found = [told(n, n.islower(), "," not in group) for group in relaxations.split() for n in group.split(",")]
     assert [tuple(each.limit for each in remedy) for remedy in remedies(found)] == order
+
+
+@pytest.mark.parametrize(("side", "text"), [(-1, "76.9041 N*m"), (1, "76.9042 N*m")])
+def test_what_is_never_passed_is_rounded_outward(side, text):
+    assert Words(lo.load("beatup")).bounded("M3_fdc", 76.90412098, side) == text

@@ -20,6 +20,7 @@ class Beatup(Job):
 
     name = "beatup"
     own_schema = SCHEMA
+    loosening = {"r4e": "s"}  # noqa: RUF012 (never changed)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the crank-rocker with the effects the scene calls for."""
@@ -72,11 +73,7 @@ class Beatup(Job):
         """Return ψ, ψ', ψ'', the terms, M3 and Md."""
         values = sampler.given.values
         return Columns(
-            {
-                "psi [rad]": lambda at: -at.pose.q,
-                "psi_1 [1]": lambda at: -at.pose.q1,
-                "psi_2 [1]": lambda at: -at.pose.q2,
-            },
+            {"psi [rad]": lambda i: -i.pose.q, "psi_1 [1]": lambda i: -i.pose.q1, "psi_2 [1]": lambda i: -i.pose.q2},
             "N*m",
             ("M3 [N*m]", lambda at: at.force),
             ("Md [N*m]", lambda at: at.crank_torque),

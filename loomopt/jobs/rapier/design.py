@@ -16,12 +16,12 @@ from loomopt.mechanisms.turning_points import crossing
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
+from loomopt.program.turning import settled
 from loomopt.scenes import Scene
 
 SAMPLES = 720
 TOUCHES = 1e-9
 """Share of s_dwell by which a travel that only touches it may exceed it: less than any limit's tolerance."""
-NEWTON = 6
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def read(sampler: Sampler) -> Reading:
     outward = max(found, key=lambda extreme: extreme.value)
     stroke, phi = 0.0, 0.0
     if outward.value > 0.0:
-        phi = _settled(sampler, sampler.angle(outward))
+        phi = settled(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
         stroke = sampler.at_angle(("S",), phi)[0]
     room = sampler.given.values.get("s_dwell")
     if room is None:
@@ -50,19 +50,6 @@ def read(sampler: Sampler) -> Reading:
     extremes = [sampler.angle(extreme) for extreme in found]
     after, before = (_dwell(sampler, extremes, float(room), side) for side in (1, -1))
     return Reading(stroke, phi % TURN, after, before)
-
-
-def _settled(sampler: Sampler, angle: float) -> float:
-    """Return the crank angle, rad, of a turning point of the head after Newton's method from nearby."""
-    for _ in range(NEWTON):
-        slope, bend = sampler.at_angle(("S_1", "peak_acceleration"), angle)
-        step = slope / bend if bend else 0.0
-        if abs(step) > 1e-3:
-            return angle
-        angle -= step
-        if abs(step) < 1e-15:
-            break
-    return angle
 
 
 def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:

@@ -20,6 +20,7 @@ class Rapier(Job):
 
     name = "rapier"
     own_schema = SCHEMA
+    open_boxes = "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the drive with the effects the scene calls for."""

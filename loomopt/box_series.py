@@ -1,0 +1,147 @@
+"""Truncated Taylor series over boxes: a quantity along the cycle, bounded between nodes for all designs of a box.
+
+Value, slope and half the curvature in u, each an enclosure with slopes in the design [as `maths.balls` for one design].
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt import boxes
+from loomopt.boxes import Enclosure, Floats, Interval, interval
+
+Number = boxes.Number
+
+
+class Terms(NamedTuple):
+    """The coefficients of 1, t and t²."""
+
+    value: Number
+    slope: Number
+    bend: Number
+
+
+class Series(Enclosure):
+    """A number along u; what stands beside it in a formula, an enclosure of the design, has no slope in u.
+
+    An enclosure's own class steps back for it, for Python asks a subclass first.
+    """
+
+    __slots__ = ("terms",)
+
+    def __init__(self, terms: Terms) -> None:
+        self.terms = terms
+
+    def __add__(self, other: Number) -> "Series":
+        """Return the sum."""
+        if isinstance(other, Series):
+            return Series(Terms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
+        return Series(self.terms._replace(value=self.terms.value + other))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> "Series":
+        """Return the opposite."""
+        return Series(Terms(*(-a for a in self.terms)))
+
+    def __pos__(self) -> "Series":
+        """Return the number itself."""
+        return self
+
+    def __sub__(self, other: Number) -> "Series":
+        """Return the difference."""
+        if isinstance(other, Series):
+            return Series(Terms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
+        return Series(self.terms._replace(value=self.terms.value - other))
+
+    def __rsub__(self, other: Number) -> "Series":
+        """Return the difference, the other number first."""
+        return (-self).__add__(other)
+
+    def __mul__(self, other: Number) -> "Series":
+        """Return the product."""
+        if not isinstance(other, Series):
+            return Series(Terms(*(a * other for a in self.terms)))
+        a, b = self.terms, other.terms
+        slope = a.value * b.slope + a.slope * b.value
+        return Series(Terms(a.value * b.value, slope, a.value * b.bend + a.slope * b.slope + a.bend * b.value))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Number) -> "Series":
+        """Return the quotient."""
+        if not isinstance(other, Series):
+            return Series(Terms(*(a / other for a in self.terms)))
+        a, b = self.terms, other.terms
+        value = a.value / b.value
+        slope = (a.slope - value * b.slope) / b.value
+        return Series(Terms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
+
+    def __rtruediv__(self, other: Number) -> "Series":
+        """Return the quotient, the other number on top."""
+        return Series(Terms(other, interval(0.0), interval(0.0))) / self
+
+    def __pow__(self, power: int) -> "Series":
+        """Return a power of a whole number above 0."""
+        found = self
+        for _ in range(power - 1):
+            found = found * self
+        return found
+
+
+def _whole(x: Number) -> Terms:
+    return x.terms if isinstance(x, Series) else Terms(x, interval(0.0), interval(0.0))
+
+
+def _waves(x: Series) -> tuple[Series, Series]:
+    """Return sine and cosine."""
+    angle, slope, bend = x.terms
+    sine, cosine, half = boxes.sin(angle), boxes.cos(angle), slope * slope / 2
+    return (
+        Series(Terms(sine, cosine * slope, cosine * bend - sine * half)),
+        Series(Terms(cosine, -sine * slope, -sine * bend - cosine * half)),
+    )
+
+
+def sin(x: Number) -> Number:
+    """Return the sine."""
+    return _waves(x)[0] if isinstance(x, Series) else boxes.sin(x)
+
+
+def cos(x: Number) -> Number:
+    """Return the cosine."""
+    return _waves(x)[1] if isinstance(x, Series) else boxes.cos(x)
+
+
+def sqrt(x: Number) -> Number:
+    """Return the square root."""
+    if not isinstance(x, Series):
+        return boxes.sqrt(x)
+    root = boxes.sqrt(x.terms.value)
+    slope = x.terms.slope / (root * 2)
+    return Series(Terms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
+
+
+def atan2(y: Number, x: Number) -> Number:
+    """Return the angle of (x, y) in (−π, π]."""
+    if not isinstance(y, Series) and not isinstance(x, Series):
+        return boxes.atan2(y, x)
+    up, right = _whole(y), _whole(x)
+    square = right.value * right.value + up.value * up.value
+    slope = (right.value * up.slope - up.value * right.slope) / square
+    swell = right.value * right.slope + up.value * up.slope
+    bend = (right.value * up.bend - up.value * right.bend - slope * swell) / square
+    return Series(Terms(boxes.atan2(up.value, right.value), slope, bend))
+
+
+def chosen(place: Number, values: Sequence[Number]) -> Number:
+    """Return the value at a place that is data: one for all, or one for each node and box."""
+    if not any(isinstance(value, Series) for value in values):
+        return boxes.chosen(place, values)
+    return Series(Terms(*(boxes.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
+
+
+def along(low: Floats, high: Floats) -> Series:
+    """Return u itself between two ends, (nodes, 1)."""
+    return Series(Terms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))

@@ -1,0 +1,93 @@
+"""From a search to what may be said of all designs: a better box ends in a new solve, an unproven claim says why."""
+
+from dataclasses import replace
+
+import pytest
+from machines_in_boxes import solved
+
+import loomopt as lo
+from loomopt.jobs import registry
+from loomopt.nlp.point import Settings
+from loomopt.solving.asked import Everywhere
+from loomopt.solving.engine import solve_program
+from loomopt.solving.global_bound.claim import claimed
+from loomopt.solving.global_bound.levels import Levels, Outcome
+from loomopt.solving.search import Search, objectives
+
+
+def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
+    """The best of narrower bounds, taken for the best of all: its certificate there passes by itself."""
+    wide = solved("beatup", "torque")
+    scene = lo.load("beatup").set("bounds.l3.min", "152 mm")
+    narrow = solve_program(registry.of(scene).program(scene, "torque"), wide.job, Settings())
+    assert narrow.best is not None
+    here = narrow.best.candidate
+    worse = replace(narrow, program=wide.program, candidates=(here,))
+    assert worse.passed
+    found, bound = claimed(worse, Everywhere(1e-3, 60.0))
+    assert bound.proven
+    assert found.best is not None
+    assert found.best.candidate.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
+    assert found.best.candidate.objectives[0] < here.objectives[0] * (1 - 1e-3)
+
+
+def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypatch):
+    """Where a level is open after half the time, a solve starts from its most promising box."""
+    wide = solved("beatup", "balance")
+    worse = solved("beatup", "balance", "bounds.l3.min=152 mm")
+    assert worse.search.best is not None
+    here = replace(worse.search, program=wide.program, candidates=(worse.search.best.candidate,))
+    monkeypatch.setattr(Levels, "run", lambda self, until, say: Outcome(why="open", lowest=wide.x))
+    found, _ = claimed(here, Everywhere(1e-3, 0.2))
+    assert found.best is not None
+    assert found.best.candidate.objectives[1] < here.best.candidate.objectives[1] - 1e-3
+
+
+def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
+    found = solved("beatup", "balance")
+    better = Outcome(better=found.x, why="a better design was found")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Levels, "run", lambda self, until, say: better)
+        search, bound = claimed(found.search, Everywhere())
+    assert search is found.search
+    assert not bound.proven
+    assert "no certified optimum was reached" in bound.why
+
+
+def test_time_that_is_up_leaves_the_gap_and_the_answer():
+    found = solved("beatup-light", "balance", "gravity")
+    said: list[str] = []
+    search, bound = claimed(found.search, Everywhere(1e-5, 0.3, said.append))
+    assert search.best is not None
+    assert not bound.proven
+    assert bound.gap > 1e-5
+    assert bound.boxes > 0
+    assert bound.seconds < 5.0
+    assert "M3_fdc is open, gap" in bound.why
+    assert " s" in bound.why
+    assert any(text.startswith("proving M3_fdc") for text in said)
+    assert bound.as_dict()["proven"] is False
+
+
+def test_nothing_is_claimed_without_a_certified_answer_or_where_it_is_refused():
+    found = solved("beatup", "balance")
+    empty = Search(found.job, found.program, Settings())
+    for search, refused, why in ((empty, "", "no certified answer"), (found.search, "sizes", "sizes")):
+        same, bound = claimed(search, Everywhere(), refused)
+        assert same is search
+        assert why in bound.why
+        said = bound.as_dict()
+        assert (said["gap"], said["bound"], said["boxes"], said["band"]) == (None, {}, 0, {})
+
+
+def test_a_proof_says_all_that_scripts_read():
+    found = solved("beatup-light", "balance")
+    _, bound = claimed(found.search, Everywhere(1e-3))
+    said = bound.as_dict()
+    assert set(said) == {"proven", "gap", "bound", "band", "boxes", "seconds", "why"}
+    assert said["proven"] is True
+    assert said["gap"] == 1e-3
+    assert said["bound"]["M3_fdc"] == pytest.approx(76.9041211, rel=1e-8)
+    assert said["bound"]["peak_torque"] == pytest.approx(82.33713853 * 0.999, rel=1e-8)
+    assert list(said["band"]) == ["M3_fdc"]
+    assert said["why"] is None
