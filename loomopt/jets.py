@@ -4,6 +4,7 @@ Truncated Taylor arithmetic in several directions at once, over NumPy arrays [Gr
 Derivatives, 2nd ed., chapter 3 and section 13.2]: exact but for rounding, no step to choose.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -100,6 +101,11 @@ class Jet:
             return self.mapped(self.v * self.v, 2 * self.v, 2.0)
         first = power * self.v ** (power - 1)
         return self.mapped(self.v**power, first, power * (power - 1) * self.v ** (power - 2))
+
+    def __rpow__(self, base: float) -> "Jet":
+        """Return a positive constant to the power of the number."""
+        v, rate = base**self.v, math.log(base)
+        return self.mapped(v, rate * v, rate * rate * v)
 
     def __getitem__(self, places: Number) -> "Jet":
         """Return entries of the values' first axis."""

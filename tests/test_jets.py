@@ -18,6 +18,7 @@ FORMULAS = {
     "product": lambda m, x, y: 2 * x * y * 0.5,
     "quotient": lambda m, x, y: x / y + 3 / x + y / 4,
     "powers": lambda m, x, y: x**2 - y**3 + x**-1 * y**4,
+    "exponents": lambda m, x, y: 1.5**y * 0.25 ** (x * y),
     "sign": lambda m, x, y: -x * +y,
     "angles": lambda m, x, y: m.sin(x * y) * m.cos(x - y),
     "root": lambda m, x, y: m.sqrt(x**2 + y**2),

@@ -3,7 +3,8 @@
 from loomopt.program.sampling import Sampler
 
 STEPS, FARTHEST, LAST = 6, 1e-3, 1e-15
-"""Newton's steps from a sampled extreme, which is right to 1e-8; rad beyond which one is none of it, and that end it."""
+"""Newton's steps from a sampled extreme, which is right to 1e-8; rad beyond which a step leads elsewhere, and that end
+them."""
 
 
 def settled(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
