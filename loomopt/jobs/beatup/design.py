@@ -84,7 +84,7 @@ def say(scene: Scene, target: str, figures: Figures) -> str:
         return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
     if target == "balance":
         return (
-            f"Balance is out of reach: the reed torque nearest to zero {where} is {front:.6g} N*m, "
+            f"Balance is out of reach: the reed torque nearest to zero found {where} is {front:.6g} N*m, "
             f"and then {peak_text}."
         )
     return {
