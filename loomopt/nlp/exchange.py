@@ -95,7 +95,7 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
     peaks = _frozen(calls.peaks(sampler))
     beside = calls.ways.beside if calls.ways else None
     if beside:
-        return _Place(x, sampler, peaks, beside.nodes, {}, None)
+        return _Place(x, sampler, peaks, beside.binding, {}, None)
     nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
@@ -152,6 +152,7 @@ def _ended(calls: Calls, result: _Round) -> Point:
             reached=result.violation <= STANDS,
             relaxed=_relaxed(program, answer.extra),
             excesses=tuple(answer.extra.tolist()),
+            binding=_binding(here, result.nlp.slots),
         )
     x, touching = polish(calls, here.x, answer.extra, point, here.peaks)
     return replace(point, x=x, binding=_frozen(touching), built=calls.built, structure=program.structure)
@@ -166,13 +167,20 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
     here, status, slots = result.after, result.answer.status, result.nlp.slots
     if calls.elastic or status not in SUCCESS or not here.raw or not calls.settings.polished:
         return None
-    prices = here.raw["lam_g"][-len(here.nodes) * slots :].reshape(len(here.nodes), slots)
-    pairs = zip(here.nodes, prices, strict=True)
-    binding = tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
+    binding = _binding(here, slots)
     loose = _frozen(calls.loose(here.sampler, here.peaks))
     point = Point(here.x, status, True, nodes=loose, raw=here.raw, binding=binding)
     followed = follow(calls, replace(point, structure=calls.program.structure))
     return replace(followed, iterations=result.iterations, value=result.answer.value) if followed else None
+
+
+def _binding(here: _Place, slots: int) -> Nodes:
+    """Return of each family the nodes that carry a multiplier where the solver stopped."""
+    if not here.nodes:
+        return ()
+    prices = here.raw["lam_g"][-len(here.nodes) * slots :].reshape(len(here.nodes), slots)
+    pairs = zip(here.nodes, prices, strict=True)
+    return tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
 
 
 def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:

@@ -27,8 +27,8 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     """
     best = None
     for start in starts:
-        most = sum(best.excesses) if best else math.inf
-        point = exchange.solve(program, start, settings, elastic=Elastic(), known=Known(most=most))
+        known = Known(best.binding, sum(best.excesses)) if best else Known()
+        point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
         best = point if point.reached else best
         if best and not best.relaxed:
             break

@@ -33,7 +33,7 @@ def searched(search: Search, count: int | None, seed: int, near: Point | None, o
             return search
     done = 0
     for wanted in dict.fromkeys((count or MORE_STARTS, max(count or 0, MORE_STARTS))):
-        chosen = exchange.starts(search.program, wanted, seed)
+        chosen = exchange.starts(search.program, wanted, seed)[:wanted]
         for place, start in enumerate(chosen[done:], done + 1):
             if on_start:
                 on_start(place, len(chosen))

@@ -16,7 +16,7 @@ VALLEYS = {"f": lambda v: (v["x"] ** 2 - 1) ** 2 + v["x"] / 4 + v["y"] ** 2}
 
 
 def test_a_solved_toy_says_how():
-    answer = toy.solve(toy.program("xy", BOWL))
+    answer = toy.solve(toy.program("xy", BOWL), starts=None)
     assert (answer.status, answer.target) == ("optimal", "least")
     assert answer.message == "Least. No limit binds. The only optimum reached by 11 solves, 512 designs sampled."
     assert answer.design == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
@@ -70,7 +70,7 @@ CLASH = (("x", -1, 2.0), ("x", 1, 1.0))
 
 
 def test_limits_that_clash_are_told_with_what_helps():
-    answer = toy.solve(toy.program("xy", BOWL, limits=CLASH))
+    answer = toy.solve(toy.program("xy", BOWL, limits=CLASH), starts=None)
     assert answer.status == "infeasible"
     assert answer.clash == ("x >= 2", "x <= 1")
     assert answer.certificate is None

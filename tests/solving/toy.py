@@ -241,8 +241,8 @@ def scene_of(job: Job) -> Scene:
     return scenes.build({"problem": {"name": job.name, "job": job.name, "title": "A toy"}}, Toys(job), "toy.toml")
 
 
-def solve(toy: Program, **options: Any) -> Solution:
-    """Return the engine's answer to a program."""
+def solve(toy: Program, starts: int | None = 1, **options: Any) -> Solution:
+    """Return the engine's answer to a program; starts: None for a search of the best basin."""
     job = ToyJob(toy)
     with mock.patch.object(registry, "of", return_value=job):
-        return engine.solve(scene_of(job), **options)
+        return engine.solve(scene_of(job), starts=starts, **options)
