@@ -138,9 +138,9 @@ TOUCHING, SETTLED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
 both the root of rounding, for a maximum's place is known no better."""
 
-POLISH_STEPS, POLISH_FARTHEST, POLISH_RANK = 3, 2e-5, 1e-10
-"""Newton steps of polishing (1e-5 squared twice is past rounding), the farthest they may lead, twice what IPOPT leaves
-of what just binds, IPOPT_TOLERANCE/BINDING, and the singular value below which rows depend."""
+POLISH_STEPS, POLISH_FARTHEST, POLISH_FARTHER, POLISH_RANK = 3, 1e-6, 2e-5, 1e-10
+"""Newton steps of polishing; the farthest they may lead, and where that is not certified, twice what IPOPT leaves of
+what just binds, IPOPT_TOLERANCE/BINDING; the singular value below which rows depend."""
 
 POLISH_MET, POLISH_DONE = 1e-12, 1e-13
 """Excess of a polished row that is rounding of its terms, and the step after which there is none left to take."""

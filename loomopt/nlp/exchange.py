@@ -44,8 +44,8 @@ class _Place(NamedTuple):
 class _Round(NamedTuple):
     """What a round gave: IPOPT's answer, and where the next one begins.
 
-    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; iterations: of all
-    rounds so far.
+    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether the
+    switches at events are those that it was solved with; iterations: of all rounds so far.
     """
 
     after: _Place
@@ -53,6 +53,7 @@ class _Round(NamedTuple):
     answer: Answer
     reached: bool
     violation: float
+    steady: bool
     iterations: int
 
 
@@ -80,9 +81,9 @@ def solve(
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or not result.reached:
             break
-        if result.violation <= settings.excess:
+        if result.violation <= settings.excess and result.steady:
             break
-        followed = _followed(calls, result)
+        followed = _followed(calls, result) if result.steady else None
         if followed:
             return followed
         if more:
@@ -134,7 +135,8 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         )
     after = _Place(answer.x, sampler, peaks, nodes, answer.raw, answer.extra)
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
-    return _Round(after, nlp, answer, reached, violation, iterations)
+    steady = sampler.stills == here.sampler.stills
+    return _Round(after, nlp, answer, reached, violation, steady, iterations)
 
 
 def _ended(calls: Calls, result: _Round) -> Point:
@@ -155,7 +157,8 @@ def _ended(calls: Calls, result: _Round) -> Point:
             binding=_binding(here, result.nlp.slots),
         )
     x, touching = polish(calls, here.x, answer.extra, point, here.peaks)
-    return replace(point, x=x, binding=_frozen(touching), built=calls.built, structure=program.structure)
+    rough, structure = x is here.x, program.structure
+    return replace(point, x=x, rough=rough, binding=_frozen(touching), built=calls.built, structure=structure)
 
 
 def _followed(calls: Calls, result: _Round) -> Point | None:

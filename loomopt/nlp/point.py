@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler, sampled
-from loomopt.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, ROUNDING, SAMPLED, SAMPLES
+from loomopt.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, POLISH_FARTHEST, ROUNDING, SAMPLED, SAMPLES
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 
@@ -32,6 +32,7 @@ class Settings:
     tolerance: float = 0.0
     hessian: str = "exact"
     polished: bool = True
+    farthest: float = POLISH_FARTHEST
     uniform: int = 0
     step: str = ""
     on_step: Callable[[str], None] | None = None
@@ -89,6 +90,8 @@ class Point:
     """The structure of the program it answers."""
     relaxed: dict[int, float] = field(default_factory=dict)
     """Elastic solves only: limit's place → excess it needs, SI."""
+    rough: bool = False
+    """Whether what binds may not be met exactly: that was farther than the settings let polishing lead."""
     excesses: tuple[float, ...] = ()
     """Elastic solves only: in natural sizes."""
     value: float = math.inf

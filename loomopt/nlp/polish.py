@@ -82,11 +82,13 @@ def _newton(
     first = nlp.rows - len(calls.families) * nlp.slots
     used = ~np.array(calls.idle_rows(nlp, nodes)[first:], dtype=bool)
     bound = binding(point.raw["lam_x"], np.concatenate([point.raw["lam_g"][:first], used.astype(float)]))
-    flat = met(nlp.jacobian, arguments, arguments["x0"], bound)
+    flat = met(nlp.jacobian, arguments, arguments["x0"], bound, calls.settings.farthest)
     return None if flat is None else (flat, float(np.abs(flat - arguments["x0"]).max()))
 
 
-def met(jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding) -> Floats | None:
+def met(
+    jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding, farthest: float = POLISH_FARTHEST
+) -> Floats | None:
     """Return x (scaled) on its binding rows and bounds, or None where that is not a clear, small step.
 
     jacobian: CasADi function (x, p) → (g, dg/dx); arguments: the solver's bounds lbx, ubx, lbg, ubg and parameters p.
@@ -107,7 +109,7 @@ def met(jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding) 
         if np.abs(step).max() <= POLISH_DONE:
             break
     values = np.asarray(jacobian(trial, arguments["p"])[0]).ravel()
-    small = np.abs(trial - x).max() <= POLISH_FARTHEST
+    small = np.abs(trial - x).max() <= farthest
     inside = np.all(trial >= lower - POLISH_MET) and np.all(trial <= upper + POLISH_MET)
     held = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
     return np.clip(trial, lower, upper) if small and inside and held else None

@@ -18,6 +18,7 @@ from loomopt.tolerances import (
     FEASIBLE,
     HELD_MARGIN,
     MOST_ALIKE,
+    POLISH_FARTHER,
     PRECISE,
     ROUNDING,
     SAME_OBJECTIVE,
@@ -165,7 +166,18 @@ def _another(search: Search) -> Search:
         search = _certified(search, candidate)
         if search.passed:
             return search
-    return replace(search, best=best)
+    return _met_farther(replace(search, best=best), best)
+
+
+def _met_farther(search: Search, best: Judged) -> Search:
+    """Return the search with its best put on what just binds, where that was too far to be sure, if that passes."""
+    if not best.candidate.point.rough:
+        return search
+    farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
+    again = tried(farther, best.candidate.point.x)
+    if again.candidates[-1].point.reached:
+        again = _certified(again, again.candidates[-1])
+    return replace(again, settings=search.settings) if again.passed else search
 
 
 def _too_weak(settings: Settings, certificate: Certificate) -> bool:

@@ -53,7 +53,7 @@ def test_what_clashes_is_left_as_it_is():
     alone = polish.binding(np.zeros(1), np.array([1.0, 0.0]))
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
     assert polish.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
-    assert polish.met(jacobian, free, np.array([1.0 + 5e-5]), alone) is None, "too far"
+    assert polish.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
 
 
 def bare(lower=(-9.0, -9.0), upper=(9.0, 9.0)):
@@ -74,8 +74,8 @@ def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
 def test_what_binds_at_its_bound_is_put_on_it():
     arguments = bare((0.0, -9.0), (9.0, 1.0))
     assert list(holds(row(-1.0), arguments, (1e-7, 1.0 - 1e-7), (-1.0, 1.0))) == [0.0, 1.0]
-    assert list(holds(row(-1.0), arguments, (2e-5, 0.5), (-1.0, 0.0))) == [0.0, 0.5], "just not too far"
-    assert holds(row(-1.0), arguments, (4e-5, 0.5), (-1.0, 0.0)) is None
+    assert list(holds(row(-1.0), arguments, (1e-6, 0.5), (-1.0, 0.0))) == [0.0, 0.5], "just not too far"
+    assert holds(row(-1.0), arguments, (2e-6, 0.5), (-1.0, 0.0)) is None
     assert list(holds(row(-1.0), arguments, (1e-7, 0.5), (-1e-6, 0.0))) == [1e-7, 0.5], "no multiplier to speak of"
 
 

@@ -78,6 +78,12 @@ def solved(name, accuracy):
     return lo.solve(scene, target, accuracy=accuracy)
 
 
+def from_one_start(name, accuracy):
+    """A search is as wide for any accuracy, and left sooner or later by chance."""
+    scene, target = CASES[name]
+    return lo.solve(scene, target, accuracy=accuracy, starts=1)
+
+
 def size(figures, name):
     """Return a figure's natural size: angles 1 rad, what may vanish the largest of its kind, else itself."""
     kind = {"M3_fdc": "peak_torque", "contact_min": "spring_force_max"}.get(name, name)
@@ -194,7 +200,7 @@ def test_the_rapiers_figures_are_those_of_the_drive_in_complex_numbers(accuracy)
 
 @pytest.mark.parametrize("name", JOBS)
 def test_no_more_is_computed_than_it_takes(name):
-    counts = [solved(name, accuracy).solver["evaluations"] for accuracy in ACCURACIES]
+    counts = [from_one_start(name, accuracy).solver["evaluations"] for accuracy in ACCURACIES]
     assert counts == sorted(counts)
     usual = dict(zip(ACCURACIES, counts, strict=True))
     assert usual[1e-9] > 1.5 * usual[1e-3]

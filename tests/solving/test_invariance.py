@@ -151,7 +151,8 @@ def test_the_order_in_which_a_scene_is_written_does_not_matter(target):
 def test_what_is_off_does_not_matter():
     scene = lo.load("beatup")
     bare = lo.scene({name: table for name, table in plain(scene.document).items() if name != "available"})
-    assert told(lo.solve(scene)) == told(lo.solve(bare))
+    ours, theirs = (lo.solve(one).as_dict() | {"time": None, "scene": None} for one in (scene, bare))
+    assert ours == theirs, "but for the scene itself, which is told"
 
 
 @pytest.mark.parametrize("target", TARGETS)
