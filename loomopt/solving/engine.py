@@ -15,6 +15,7 @@ from loomopt.scenes import Scene
 from loomopt.solving import elastic, report, told
 from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, target_name
 from loomopt.solving.catalogue import fitted
+from loomopt.solving.change import with_least_change
 from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.verdict import GlobalBound
@@ -90,6 +91,7 @@ def solve(
     search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
     sold = job.sizes(scene)
     search, bound = _claimed(search, everywhere, sold) if everywhere else (search, None)
+    search = with_least_change(search)
     search, answer, reported = _answer(scene, target, search)
     for name, sizes in sold.items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts or 1, "seed": seed, "on_start": on_start}

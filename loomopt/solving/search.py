@@ -202,10 +202,20 @@ def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, 
     search.settings.at("certifying")
     settled, said = settle(program, job.tidy(program, x))
     at = time.perf_counter()
-    exact = job.values(program, job.design(program, settled))
-    certificate = replace(certify(program, exact, search.settings.accuracy), settled=said)
+    certificate = replace(certify(program, exact(search, settled), search.settings.accuracy), settled=said)
     certified = search.certified + time.perf_counter() - at
     return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
+
+
+def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
+    """Return the variables, SI, of the design that a person reads of x (SI)."""
+    return search.job.values(search.program, search.job.design(search.program, x))
+
+
+def corrected(search: Search, found: Judged) -> Judged:
+    """Return a design moved by its certificate's own step, and judged again."""
+    _, x, certificate = _settled(search, _stepped(search.program, found.x, found.certificate.correction))
+    return Judged(found.candidate, x, certificate)
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:
