@@ -18,13 +18,15 @@ from loomopt.program.instant import Instant, Row
 from loomopt.program.numbers import LEAST_CHANGE
 from loomopt.program.program import Objective, Program, Variable
 from loomopt.solving.certificate import certify
-from loomopt.solving.search import Judged, Search, corrected, exact, judged, objectives, tried
+from loomopt.solving.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
 from loomopt.solving.settle import unchanging, wished
+from loomopt.solving.sizes import CHANGE_WEIGHTS
 from loomopt.solving.verdict import Certificate
-from loomopt.tolerances import FEASIBLE, RANK
+from loomopt.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
+CHANGED = Objective(CHANGE, CHANGE, "value", 1.0)
 
 
 def with_least_change(search: Search) -> Search:
@@ -39,50 +41,86 @@ def with_least_change(search: Search) -> Search:
     here = exact(search, best.x)
     kept = _kept(program, here)
     ways = left(program, here, best.certificate, kept)
-    if not len(ways):
+    unique = best.certificate.unique
+    if len(ways) <= unique:
+        # Of one direction it is known whether limits close it; between two of them there may be a third.
         return search
     search.settings.at(f"looking for the {LEAST_CHANGE}")
     moved = _moved(search, best, kept, ways)
-    if moved is None:
-        moved = replace(best, certificate=replace(best.certificate, open=_called(program, ways)))
-    return replace(search, best=moved, settled=search.settled + time.perf_counter() - began)
+    if moved is None and not unique:
+        moved = replace(best, certificate=replace(best.certificate, open=_called(program, ways, best)))
+    elif moved and unique and not _differ(program, moved.x, best.x):
+        moved = None
+    return replace(search, best=moved or best, settled=search.settled + time.perf_counter() - began)
+
+
+def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Say whether two designs (variables, SI) differ by more than rounding."""
+    return any(abs(one[v.name] - other[v.name]) > MOVED * v.scale for v in program.variables)
 
 
 def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) -> Judged | None:
     """Return the design of least change with its certificate; None where it has none, or a level is not as good.
 
-    kept: variables that stay; ways: directions that are open.
+    kept: variables that stay; ways: directions that are open. The weight of the earlier levels against the change is
+    raised, each solve starting warm from the one before, until all of them are held.
     """
-    program = search.program
+    program, warm = search.program, None
     task = changing(program, best.x, kept, search.today)
-    found = task and _least(replace(search, program=task, candidates=(), best=None), best.x)
-    if task is None or not found or not found.certificate.passed:
+    if task is None:
         return None
-    levels = zip(objectives(program, found.x), objectives(program, best.x), strict=True)
-    certificate = certify(program, exact(search, found.x), search.settings.accuracy)
-    if not certificate.passed or any(abs(now - then) > FEASIBLE for now, then in levels):
+    settings = search.settings if len(program.objectives) > 1 else replace(search.settings, penalty=1.0)
+    for weight in CHANGE_WEIGHTS:
+        weighed = replace(CHANGED, scale=weight / settings.penalty)
+        solved = replace(task, objectives=(*program.objectives, weighed))
+        start = warm.x if warm else best.x
+        (candidate,) = tried(Search(search.job, solved, settings), start, warm).candidates
+        if not candidate.point.reached:
+            continue
+        warm = candidate.point
+        found = _held(search, best, task, candidate) if _as_good(program, warm.x, best.x) else None
+        if found:
+            return _named(found, best, task, ways)
+    return None
+
+
+def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]) -> bool:
+    """Say whether every level of a program is the same at x as at the best (SI)."""
+    levels = zip(objectives(program, x), objectives(program, best), strict=True)
+    return all(abs(now - then) <= FEASIBLE for now, then in levels)
+
+
+def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> tuple[Judged, Certificate] | None:
+    """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
+    judging = Search(search.job, task, search.settings)
+    found = judged_as_is(judging, candidate)
+    for _ in range(CORRECTIONS):
+        before, found = found, corrected(judging, found)
+        if found is before or (found.certificate.passed and found.certificate.residual <= PRECISE):
+            break
+    if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
         return None
-    said = f"{', '.join(_called(program, ways))}: {LEAST_CHANGE}"
+    alone = certify(search.program, exact(search, found.x), search.settings.accuracy)
+    return (found, alone) if alone.passed else None
+
+
+def _named(found: tuple[Judged, Certificate], best: Judged, task: Program, ways: Floats) -> Judged:
+    """Return a design of least change with its certificate, which says what was settled and what is still open."""
+    moved, alone = found
+    said = f"{', '.join(_called(task, ways, best))}: {LEAST_CHANGE}"
     certificate = replace(
-        certificate,
+        alone,
+        unique=best.certificate.unique,
         settled=(*best.certificate.settled, said),
-        change=found.certificate.levels[-1],
-        open=() if found.certificate.unique else _called(task, left(task, found.x, found.certificate, ())),
+        change=moved.certificate.levels[-1],
+        open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
     )
-    return Judged(best.candidate, found.x, certificate)
+    return Judged(best.candidate, moved.x, certificate)
 
 
-def _least(search: Search, x: Mapping[str, float]) -> Judged | None:
-    """Return where a program's last level is least, solved from x (SI), after one step of Newton's method to spare."""
-    search = judged(tried(search, x))
-    found = search.best
-    if found is None or not found.certificate.correction:
-        return found
-    further = corrected(search, found)
-    return further if further.certificate.residual <= found.certificate.residual else found
-
-
-def changing(program: Program, x: Mapping[str, float], kept: Collection[str], today: Mapping[str, float]) -> Program | None:
+def changing(
+    program: Program, x: Mapping[str, float], kept: Collection[str], today: Mapping[str, float]
+) -> Program | None:
     """Return a program with one more level, Σ ((x − today)/width)² over its free variables; None without any.
 
     kept: variables that stay as they are at x (SI); today: values, SI, where the program's own say nothing.
@@ -90,7 +128,9 @@ def changing(program: Program, x: Mapping[str, float], kept: Collection[str], to
     own = [(name, value) for move in program.moves for name, value in move.today.items()]
     known = {**today, **dict(own), **program.today}
     widths = {v.name: _width(v) for v in program.variables if v.name not in {*kept, *program.tops}}
-    free = [name for name, width in widths.items() if 0.0 < width < math.inf and math.isfinite(known.get(name, math.inf))]
+    free = [
+        name for name, width in widths.items() if 0.0 < width < math.inf and math.isfinite(known.get(name, math.inf))
+    ]
     if not free:
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
@@ -102,7 +142,7 @@ def changing(program: Program, x: Mapping[str, float], kept: Collection[str], to
         variables=held,
         parameters={**program.parameters, **given},
         limits=tuple(limit for limit in program.limits if limit.family != "variable" or limit.row not in kept),
-        objectives=(*program.objectives, Objective(CHANGE, CHANGE, "value", 1.0)),
+        objectives=(*program.objectives, CHANGED),
         moves=(),
     )
 
@@ -151,16 +191,15 @@ def left(program: Program, x: Mapping[str, float], certificate: Certificate, kep
     scales = {v.name: v.scale for v in program.variables}
     moves = [*unchanging(program, x), *({name: 1.0} for name in kept)]
     ways = np.array([[move.get(name, 0.0) / scales[name] for name in names] for move in moves]).reshape(-1, len(names))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways = np.array([way / np.linalg.norm(way) for way in ways if way.any()]).reshape(-1, len(names))
     inside = ways @ level.T
     inside = inside[np.linalg.norm(ways - inside @ level, axis=1) <= RANK]
     turned, sizes, _ = np.linalg.svd(inside.T)
     return np.asarray(turned[:, int(np.sum(sizes > RANK)) :].T @ level)
 
 
-def _called(program: Program, ways: Floats) -> tuple[str, ...]:
-    """Return what a designer calls the variables that directions (k, variables) move."""
-    names = [v for v in program.variables if v.name not in program.held]
-    moved = np.abs(ways).max(axis=0, initial=0.0)
-    pairs = zip(names, moved, strict=True) if len(ways) else ()
-    return tuple(dict.fromkeys(v.called for v, size in pairs if size > RANK))
+def _called(program: Program, ways: Floats, of: Judged) -> tuple[str, ...]:
+    """Return what a designer calls the variables that directions (k, variables) of a judged design move."""
+    labels = {v.name: v.called for v in program.variables}
+    pairs = zip(of.certificate.level[0], np.abs(ways).max(axis=0), strict=True) if len(ways) else ()
+    return tuple(dict.fromkeys(labels[name] for name, size in pairs if size > RANK))

@@ -212,10 +212,20 @@ def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
     return search.job.values(search.program, search.job.design(search.program, x))
 
 
+def judged_as_is(search: Search, candidate: Candidate) -> Judged:
+    """Return a candidate after the silent levels with its certificate, not corrected."""
+    _, x, certificate = _settled(search, candidate.point.x)
+    return Judged(candidate, x, certificate)
+
+
 def corrected(search: Search, found: Judged) -> Judged:
-    """Return a design moved by its certificate's own step, and judged again."""
-    _, x, certificate = _settled(search, _stepped(search.program, found.x, found.certificate.correction))
-    return Judged(found.candidate, x, certificate)
+    """Return a design moved by its certificate's own step and judged again; as it is where that is worse."""
+    x = _stepped(search.program, found.x, found.certificate.correction)
+    if not found.certificate.correction or sampler_at(search.program, x) is None:
+        return found
+    _, x, certificate = _settled(search, x)
+    ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
+    return Judged(found.candidate, x, certificate) if ranks[0] <= ranks[1] else found
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

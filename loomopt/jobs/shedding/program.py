@@ -113,7 +113,9 @@ class _Task:
         free = {v.name for v in variables if v.lower < v.upper}
         linear = not self.law and not self.checks and (free <= {"K1", "X0"} or free == {"speed"})
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
-        today = named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
+        today = (
+            named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
+        )
         return Program(*task, today=today, single="the problem is linear: it has one optimum" if linear else "")
 
     def _variables(self) -> list[Variable]:
