@@ -35,11 +35,11 @@ def with_least_change(search: Search) -> Search:
     Where that has no certificate the design stays, and what is open is named.
     """
     best = search.best
-    if best is None or not best.certificate.passed:
+    if best is None or not best.certificate.passed or not best.certificate.level:
         return search
     began, program = time.perf_counter(), search.program
     here = exact(search, best.x)
-    kept = _kept(program, here)
+    kept = _kept(program, here, best.certificate)
     ways = left(program, here, best.certificate, kept)
     unique = best.certificate.unique
     if len(ways) <= unique:
@@ -171,12 +171,21 @@ def _width(variable: Variable) -> float:
     return width if math.isfinite(width) else variable.range[1] - variable.range[0]
 
 
-def _kept(program: Program, x: Mapping[str, float]) -> frozenset[str]:
-    """Return the variables that moves of their own settle at x (SI): by another rule, or whatever else moves."""
-    axes = [(move, wished(program, move, x)) for move in program.moves if move.kind == "axis"]
-    others = {name for move, wish in axes if wish and wish.toward != "today" for name in move.along}
-    alone = {name for way in unchanging(program, x) if len(way) == 1 for name in way}
-    return frozenset(others | alone)
+def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
+    """Return the variables that moves settle one by one at x (SI): by another rule, or apart from all that is open."""
+    axes = [(name, wished(program, move, x)) for move in program.moves if move.kind == "axis" for name in move.along]
+    others = {name for name, wish in axes if wish and wish.toward != "today"}
+    names, level = _level(certificate)
+    sizes = np.linalg.norm(level, axis=0)
+    apart = {name for name, size in zip(names, sizes, strict=True) if size >= 1.0 - RANK}
+    return frozenset(others | (apart & {name for name, _ in axes}))
+
+
+def _level(certificate: Certificate) -> tuple[list[str], Floats]:
+    """Return the variables of the directions (k, variables) along which nothing curves, and these."""
+    names = list(certificate.level[0]) if certificate.level else []
+    ways = [[way[name] for name in names] for way in certificate.level]
+    return names, np.array(ways).reshape(len(ways), len(names))
 
 
 def left(program: Program, x: Mapping[str, float], certificate: Certificate, kept: Collection[str]) -> Floats:
@@ -184,10 +193,9 @@ def left(program: Program, x: Mapping[str, float], certificate: Certificate, kep
 
     Without those along which the program's moves change nothing, and those of variables that are kept.
     """
-    if not certificate.level:
-        return np.zeros((0, 0))
-    names = list(certificate.level[0])
-    level = np.array([[way[name] for name in names] for way in certificate.level])
+    names, level = _level(certificate)
+    if not names:
+        return level
     scales = {v.name: v.scale for v in program.variables}
     moves = [*unchanging(program, x), *({name: 1.0} for name in kept)]
     ways = np.array([[move.get(name, 0.0) / scales[name] for name in names] for move in moves]).reshape(-1, len(names))
