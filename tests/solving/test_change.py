@@ -12,7 +12,7 @@ from loomopt.maths import FLOAT
 from loomopt.mechanisms.cam_spline import spline
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Move, Wish
-from loomopt.solving import change, engine
+from loomopt.solving import change
 from loomopt.solving.change import with_least_change
 from loomopt.solving.search import Search, judged, objectives, tried
 
@@ -26,7 +26,7 @@ def unsettled(monkeypatch):
 
     def solve(scene, target=None):
         with monkeypatch.context() as patch:
-            patch.setattr(engine, "with_least_change", lambda search: search)
+            patch.setattr(change, "with_least_change", lambda search: search)
             return lo.solve(scene, target)
 
     return solve
@@ -214,7 +214,7 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
         seen.append([objectives(search.program, each.best.x) for each in (search, after)])
         return after
 
-    monkeypatch.setattr(engine, "with_least_change", kept)
+    monkeypatch.setattr(change, "with_least_change", kept)
     answer = lo.solve(scene, target)
     assert answer.status == "optimal"
     assert answer.certificate.settled
