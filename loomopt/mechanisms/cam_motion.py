@@ -209,6 +209,13 @@ def named_knots(accelerations: Iterable[Number]) -> dict[str, Number]:
     return {f"{PREFIX}{k}": value for k, value in enumerate(accelerations)}
 
 
+def accelerations(law: CamLaw, values: Values, intervals: int) -> tuple[float, ...]:
+    """Return s'' of a law of floats at the knots of so many equal intervals; at a break of its own, that after it."""
+    ready = {**values, **law.prepared(FLOAT, values)}
+    shares = [Fraction(k, intervals) for k in range(intervals + 1)]
+    return tuple(float(law.at(FLOAT, ready, float(u), bisect.bisect_right(law.breaks, u)).s2) for u in shares)
+
+
 def segment_at(present: tuple[int, ...], angle: float, corners: tuple[float, ...]) -> float:
     """Return the segment that a cam angle lies in; corners: where those that are present begin."""
     return float(present[sum(angle >= corner for corner in corners) - 1])

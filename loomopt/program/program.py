@@ -158,6 +158,8 @@ class Program:
     """follow(model, values): the variables that follow from the others; raises ValueError where it cannot move."""
     tops: Mapping[str, str] = field(default_factory=dict)
     """Of these, the crank angles where a whole-cycle quantity is largest: variable → quantity."""
+    today: Numbers = field(default_factory=dict)
+    """Today's values, SI, of variables that are no numbers of the scene."""
     single: str = ""
     """Why every local optimum is the best there is, where that is so."""
 

@@ -145,7 +145,9 @@ def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accu
     reasons = [*_amiss(local, feasibility), *_open(cycle, accuracy), *_not_least(levels)]
     curvatures = [each.curvature for each in levels if each.curvature]
     step = next((curvature.step for curvature in curvatures if len(curvature.step)), np.zeros(0))
-    moved = dict(zip(local.derivatives.names, map(float, step * local.scales), strict=True)) if len(step) else {}
+    names = local.derivatives.names
+    moved = dict(zip(names, map(float, step * local.scales), strict=True)) if len(step) else {}
+    level = curvatures[-1].level if curvatures else ()
     return Certificate(
         not reasons,
         tuple(reasons),
@@ -160,6 +162,7 @@ def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accu
         whole_cycle="bounded" if cycle.bound == "proven" else "refined",
         correction=moved,
         step=float(np.abs(step).max(initial=0.0)),
+        level=tuple(dict(zip(names, map(float, way), strict=True)) for way in level),
     )
 
 

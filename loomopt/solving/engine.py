@@ -90,6 +90,7 @@ def solve(
     search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
     sold = job.sizes(scene)
     search, bound = _claimed(search, everywhere, sold) if everywhere else (search, None)
+    search = _least_changed(search)
     search, answer, reported = _answer(scene, target, search)
     for name, sizes in sold.items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts or 1, "seed": seed, "on_start": on_start}
@@ -141,6 +142,15 @@ def _claimed(search: Search, everywhere: Everywhere, sold: Mapping[str, Sequence
     from loomopt.solving.global_bound.claim import claimed
 
     return claimed(search, everywhere, f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else "")
+
+
+def _least_changed(search: Search) -> Search:
+    """Return the search with what its best leaves open settled by least change from today."""
+    if search.best is None or not search.best.certificate.level:
+        return search
+    from loomopt.solving import change
+
+    return change.with_least_change(search)
 
 
 def _import_solver() -> float:

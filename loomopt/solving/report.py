@@ -83,7 +83,7 @@ def with_optimum(
     passed = certificate.passed and here.admissible
     headline = job.say(scene, target, here.figures)
     if passed:
-        message = " ".join([headline, _stops(prices), searched]).strip()
+        message = " ".join(part for part in (headline, _stops(prices), _left_open(certificate), searched) if part)
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
         message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
@@ -97,6 +97,11 @@ def with_optimum(
         solver=solver,
         today=today,
     )
+
+
+def _left_open(certificate: Certificate) -> str:
+    """Say which variables could be others as well, where no rule has settled them; "" for none."""
+    return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
 
 
 def _prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:

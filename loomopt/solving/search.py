@@ -214,10 +214,30 @@ def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, 
     search.settings.at("certifying")
     settled, said = settle(program, job.tidy(program, x))
     at = time.perf_counter()
-    exact = job.values(program, job.design(program, settled))
-    certificate = replace(certify(program, exact, search.settings.accuracy), settled=said)
+    certificate = replace(certify(program, exact(search, settled), search.settings.accuracy), settled=said)
     certified = search.certified + time.perf_counter() - at
     return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
+
+
+def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
+    """Return the variables, SI, of the design that a person reads of x (SI)."""
+    return search.job.values(search.program, search.job.design(search.program, x))
+
+
+def judged_as_is(search: Search, candidate: Candidate) -> Judged:
+    """Return a candidate after the silent levels with its certificate, not corrected."""
+    _, x, certificate = _settled(search, candidate.point.x)
+    return Judged(candidate, x, certificate)
+
+
+def corrected(search: Search, found: Judged) -> Judged:
+    """Return a design moved by its certificate's own step and judged again; as it is where that is worse."""
+    x = _stepped(search.program, found.x, found.certificate.correction)
+    if not found.certificate.correction or sampler_at(search.program, x) is None:
+        return found
+    _, x, certificate = _settled(search, x)
+    ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
+    return Judged(found.candidate, x, certificate) if ranks[0] <= ranks[1] else found
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

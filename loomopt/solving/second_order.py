@@ -97,7 +97,8 @@ class Curvature:
 
     minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
     higher orders do along directions without curvature; settled: a single design is left, but for moves that change
-    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; closed: to later levels.
+    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; closed: to later levels; level:
+    directions (k, variables) that no binding row forbids and along which nothing curves, orthonormal in natural sizes.
     """
 
     minimum: bool = True
@@ -108,6 +109,7 @@ class Curvature:
     figures: Floats = field(default_factory=lambda: np.zeros(0))
     largest: float = 0.0
     closed: Closed | None = None
+    level: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,8 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         found = replace(found, figures=np.append(found.figures, abs(least) / FLAT))
         if least < -FLAT:
             return replace(found, minimum=False, unique=False)
-    found = replace(found, unique=not any(cone.ways(vector) for vector in vectors.T[values <= FLAT]))
+    still = vectors.T[values <= FLAT]
+    found = replace(found, unique=not any(map(cone.ways, still)), level=still @ cone.basis.T)
     bent, rising = values > FAINT, values > FLAT
     curve, lagrangian = _curve(local, cone, vectors[:, bent], values[bent]), _lagrangian(local, level, multipliers)
     if rising.any() and values.min() >= -FLAT:

@@ -12,6 +12,10 @@ BETTER, FLIPS = 1e-8, 2
 """What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
 flips."""
 
+CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
+"""Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
+the first. IPOPT fails at a large one from afar; from one to the next, pivots lead."""
+
 LEVELS_APART, VIOLATION_WEIGHT, WORST, REGULAR = 100.0, 10.0, 10.0, 1e-6
 """A search's merit in natural sizes: factor between objectives, weight of the worst violation, and what stands for no
 value; share of a row's own size by which its projection is held regular."""

@@ -211,13 +211,13 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
                 "stationarity": float(level.stationarity),
                 "complementarity": float(level.complementarity),
             }
-            for level in certificate.levels
+            for level in (*certificate.levels, *([certificate.change] if certificate.change else []))
         ],
         "feasibility": float(certificate.feasibility),
         "whole_cycle": {"violation": float(certificate.violation), "by": certificate.whole_cycle},
         "minimum": certificate.minimum,
         "unique": certificate.unique,
-        "settled": list(certificate.settled),
+        "settled": list(certificate.choices),
     }
 
 

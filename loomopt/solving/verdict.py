@@ -57,6 +57,17 @@ class Certificate:
     """Newton's step, SI, toward the stationary point nearby; empty where there is no curvature to follow."""
     step: float = 0.0
     """The length of that step, in natural sizes."""
+    level: tuple[Mapping[str, float], ...] = ()
+    """Directions, in natural sizes and orthonormal, along which nothing curves at the last level that was judged."""
+    change: Level | None = None
+    """The residuals of least change from today, where that was a level of its own."""
+    open: tuple[str, ...] = ()
+    """Variables, as a designer calls them, that are left as they came, though others are as good."""
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """What chose among equally good designs, and what was left open."""
+        return (*self.settled, *([f"open: {', '.join(self.open)}"] if self.open else []))
 
     @property
     def error(self) -> float:

@@ -136,7 +136,7 @@ def certificate(answer: Solution) -> list[str]:
     limits, cycle = (f"{value:.0e}" if value > 0 else "0" for value in (found.feasibility, found.violation))
     unique = "unique" if found.unique else "not unique"
     line = f"Certificate passed: limits {limits}, stationarity {worst:.0e}, whole cycle {cycle}; {unique}"
-    return [line, *([f"Chosen among equals: {'; '.join(found.settled)}"] if found.settled else [])]
+    return [line, *([f"Chosen among equals: {'; '.join(found.choices)}"] if found.choices else [])]
 
 
 BEYOND = {-1: "below", 1: "above"}

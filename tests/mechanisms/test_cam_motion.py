@@ -13,6 +13,7 @@ from loomopt.mechanisms.cam_motion import (
     Named,
     Spline,
     Tabulated,
+    accelerations,
     knots,
     middle,
     mirrored,
@@ -58,6 +59,22 @@ def test_named_and_tabulated_laws_are_those_of_their_formulas():
     tabulated = Tabulated(table)
     assert (tabulated.key, tabulated.breaks, tabulated.symmetric) == (table, table.breaks, False)
     assert tabulated.at(FLOAT, tabulated.prepared(FLOAT, {}), 0.6, 2) == table.at(FLOAT, 0.6, 2)
+
+
+@pytest.mark.parametrize("name", ["cycloidal", "modified_sine", "modified_trapezoid"])
+def test_a_law_is_sampled_at_knots_wherever_its_own_breaks_are(name):
+    law, n = Named(name), 16
+    ends = [float(end) for end in law.breaks]
+    sampled = accelerations(law, {}, n)
+    assert len(sampled) == n + 1
+    for k, value in enumerate(sampled):
+        piece = sum(k / n >= end for end in ends)
+        assert value == pytest.approx(float(LAWS[name].formula(FLOAT, k / n, piece).s2), abs=1e-14)
+
+
+def test_a_spline_law_sampled_at_its_own_knots_is_itself():
+    own = cycloid_like(8)
+    assert accelerations(Spline(8), named_knots(own), 8) == pytest.approx(own, abs=1e-14)
 
 
 def test_segments_and_pieces_are_read_by_cam_angle():

@@ -15,7 +15,7 @@ from loomopt.jobs.shedding.design import CYCLE, survived
 from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_motion import CamLaw, Spline, named_knots
+from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.owned import owned
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
@@ -113,7 +113,10 @@ class _Task:
         free = {v.name for v in variables if v.lower < v.upper}
         linear = not self.law and not self.checks and (free <= {"K1", "X0"} or free == {"speed"})
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
-        return Program(*task, single="the problem is linear: it has one optimum" if linear else "")
+        today = (
+            named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
+        )
+        return Program(*task, today=today, single="the problem is linear: it has one optimum" if linear else "")
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
@@ -135,7 +138,7 @@ class _Task:
         ]
         if self.law:
             most = self.most_acceleration
-            found += [Variable(name, -math.inf, math.inf, most, (-most, most)) for name in self.law.names]
+            found += [Variable(name, -math.inf, math.inf, most, (-most, most), "law") for name in self.law.names]
         return found
 
     def _size(self, name: str, ends: tuple[float, float]) -> float:
