@@ -14,6 +14,8 @@ UNITS = ("mm", "mm", "mm", "mm", "deg", "mm", "mm", "deg")
 WIDE_LOWER = plain.LOWER - np.array([0, 0.05, 0.02, 0.02, 0, 0.03, 0.03, np.radians(15)])
 WIDE_UPPER = plain.UPPER + np.array([0.005, 0.05, 0.02, 0.02, 0, 0.03, 0.03, np.radians(15)])
 COARSE, EVEN = 72, 256
+STROKES, LEAST_DWELL, LEAST_OBLIQUE, TRIED = (0.3, 3.0), np.radians(4), np.radians(22), 20
+"""Stroke, m, dwells and transmission angle of a drive that a scene is drawn around; how many are looked at."""
 LONGEST = np.radians(175)
 """A dwell as a variable ends here: the stroke's top lies a turn's half away."""
 
@@ -70,15 +72,15 @@ class Drive:
 
     def view(self, z, angles):
         peaks, after, before, obliques = angles
-        design = self.designs(z).T[:, :, None]
-        ends = self.arcs(z)
-        at = plain.curves(design, peaks)
-        S = [plain.curves(design, ends[0][:, None] * after)[0], plain.curves(design, -ends[1][:, None] * before)[0]]
-        S = np.hstack(S) / self.needs.band
-        cosine, most = plain.curves(design, obliques)[3], np.cos(self.needs.transmission)
-        firm = np.hstack([1 - S, 1 + S, most - cosine, most + cosine])
-        top = plain.curves(design, self._top(design, peaks, at[0]))[0] / self.needs.stroke - 1
-        return self._view(z, at[2], firm, top)
+        design, ends = self.designs(z).T[:, :, None], self.arcs(z)
+        wide = [np.broadcast_to(each, (len(z), len(each))) for each in (peaks, obliques)]
+        phi = np.hstack([wide[0], ends[0][:, None] * after, -ends[1][:, None] * before, wide[1]])
+        first, last = len(peaks), len(phi[0]) - len(obliques)
+        S, _, S_2, cosine, _ = plain.curves(design, phi)
+        travel, cosine, most = S[:, first:last] / self.needs.band, cosine[:, last:], np.cos(self.needs.transmission)
+        firm = np.hstack([1 - travel, 1 + travel, most - cosine, most + cosine])
+        top = self._top(design, peaks[S[:, :first].argmax(axis=1)][:, None])
+        return self._view(z, S_2[:, :first], firm, top / self.needs.stroke - 1)
 
     def _view(self, z, S_2, firm, top):
         if self.target == "dwell":
@@ -91,14 +93,13 @@ class Drive:
             level = np.hstack([S_2, -S_2])
         return View((level,), firm, top)
 
-    def _top(self, design, phi, S):
-        """Return where each design's stroke is reached: the grid's top, and Newton steps."""
-        even = np.linspace(0, 2 * np.pi, COARSE, endpoint=False)
-        at = even[plain.curves(design, even)[0].argmax(axis=1)][:, None]
-        for _ in range(3):
-            _, S_1, S_2, *_ = plain.curves(design, at)
-            at = at - np.where(S_2 < 0, np.clip(S_1 / np.where(S_2 < 0, S_2, -1.0), -0.1, 0.1), 0.0)
-        return at
+    def _top(self, design, phi):
+        """Return each design's largest S near angles, one each: Newton steps."""
+        for _ in range(2):
+            _, S_1, S_2, *_ = plain.curves(design, phi)
+            phi = phi - np.where(S_2 < 0, np.clip(S_1 / np.where(S_2 < 0, S_2, -1.0), -0.1, 0.1), 0.0)
+        S, S_1, S_2, *_ = plain.curves(design, phi)
+        return S - np.where(S_2 < 0, S_1 * S_1 / np.where(S_2 < 0, 2 * S_2, -1.0), 0.0)
 
     def sharper(self, z, angles):
         x, (after, before) = self.designs(z), self.arcs(z)
@@ -179,11 +180,14 @@ def drawn(rng):
 
 def _anchor(rng, ends, band):
     """Return a random drive within bounds that closes, dwells and is not folded flat; None where none is found."""
+    drives, phi = rng.uniform(*ends, (2000, 8)), np.linspace(0, 2 * np.pi, COARSE, endpoint=False)
     with np.errstate(all="ignore"):
-        for x in rng.uniform(*ends, (200, 8)):
-            stroke, at = plain.stroke(x)
+        S, _, _, cosine, _ = plain.curves(drives.T[:, :, None], phi)
+        top, open_enough = S.max(axis=1), np.abs(cosine).max(axis=1) < np.cos(LEAST_OBLIQUE)
+        halfway = np.abs(phi[S.argmax(axis=1)] - np.pi) < 1.0
+        still = np.abs(S[:, [1, -1]]).max(axis=1) < band
+        for x in drives[open_enough & halfway & still & (top > STROKES[0]) & (top < STROKES[1])][:TRIED]:
             dwells = [plain.dwell(x, side, band) for side in (1, -1)]
-            good = min(plain.margins(x)) > 1.01 and plain.transmission(x) > np.radians(22) and 0.3 < stroke < 3.0
-            if good and min(dwells) > np.radians(4) and max(dwells) < np.radians(80) and abs(at - np.pi) < 1.0:
+            if min(plain.margins(x)) > 1.01 and min(dwells) > LEAST_DWELL and plain.transmission(x) > LEAST_OBLIQUE:
                 return x
     return None

@@ -18,7 +18,7 @@ ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 RPM = math.pi / 30
 FINE, SHARES, CLOSER = 2001, 65, 201
 SPEEDS = 400
-"""Speeds tried above and below the one claimed."""
+"""Speeds tried up to three times the one claimed."""
 
 
 def summits(of, low, high, keep=0.02):
@@ -155,11 +155,17 @@ class Frame:
 
     def _faster(self, claimed):
         """Yield today's spring at the highest of many speeds that keep contact, found closer and closer."""
-        K1, X0 = self.K1[0], self.X0[0]
-        at = -claimed[0] if claimed else 1.0
-        shares = np.concatenate([at * np.linspace(1e-3, 3, SPEEDS), [at * (1 + 2e-6)]])
-        for share in shares:
-            yield {"K1": K1, "X0": X0, "speed": float(share) * self.plain_scene.rpm * RPM}
+
+        def design(share):
+            return {"K1": self.K1[0], "X0": self.X0[0], "speed": float(share) * self.plain_scene.rpm * RPM}
+
+        shares = np.linspace(0, 3 * (-claimed[0] if claimed else 1.0), SPEEDS)[1:]
+        kept = [k for k, share in enumerate(shares) if self.excess(design(share)) <= 0.0]
+        low, high = (shares[kept[-1]], shares[min(kept[-1] + 1, len(shares) - 1)]) if kept else (0.0, shares[0])
+        for _ in range(50):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.excess(design(middle)) <= 0.0 else (low, middle)
+        yield design(low)
 
     def _programme(self):
         """Return the least of the linear programme in K1, P = K1 X0 and the peak, rows added where it breaks them."""

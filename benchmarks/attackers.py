@@ -3,7 +3,7 @@
 A task is a scene's question by hand: a design is a point z of the unit box, and one call views many at once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -18,6 +18,8 @@ ROUNDS = 5
 ADMISSIBLE = 1e-9
 INSIDE = 2e-10
 """What rows are held to at the end, so that the referee's finer look finds them within `ADMISSIBLE`."""
+SAME = 1e-4
+"""Rms distance in the unit box of points that are one end."""
 HOPELESS, HOPEFUL = 1e-4, 1e-5
 """A violation, and a level above the claimed one, at which a start is given up."""
 STEEP = 10.0
@@ -110,13 +112,22 @@ class Rows:
         self.slopes = [(rows[1:half] - rows[half:]).T / (2 * STEP) for rows in found]
 
 
-def solved(task: Task, start: np.ndarray, claimed: float, level: int = 0, held: tuple[float, ...] = ()) -> np.ndarray:
+def solved(
+    task: Task,
+    start: np.ndarray,
+    claimed: float,
+    level: int = 0,
+    held: tuple[float, ...] = (),
+    ends: Sequence[np.ndarray] = (),
+) -> np.ndarray | None:
     """Return where SLSQP ends from a start, extremes it misses added round after round, put onto its limits.
 
-    Rows only make a level worse: it is given up where a few of them already leave it no better than claimed.
+    Rows only make a level worse: a start is given up where a few of them already leave it no better than claimed, and
+    where it comes to one of the ends of others.
     """
-    angles, y = task.coarse, np.append(start, 0.0)
-    y[-1] = viewed(task, y[None, :-1], angles).levels[level].max()
+    coarse = task.coarse
+    angles, y = coarse, np.append(start, 0.0)
+    y[-1] = viewed(task, y[None, :-1], coarse).levels[level].max()
     slope = np.eye(len(y))[-1]
     for _ in range(ROUNDS):
         rows, before = Rows(task, angles, level, held), y
@@ -128,11 +139,13 @@ def solved(task: Task, start: np.ndarray, claimed: float, level: int = 0, held: 
             method="SLSQP",
             bounds=[(0.0, 1.0)] * task.size + [(None, None)],
             constraints=[rows.part(kind) for kind in kinds],
-            options={"ftol": 1e-9 if angles is task.coarse else 1e-12, "maxiter": 60},
+            options={"ftol": 1e-9 if angles is coarse else 1e-12, "maxiter": 60},
         )
         y = np.clip(found.x, [0.0] * task.size + [-np.inf], [1.0] * task.size + [np.inf])
         if broken(viewed(task, y[None, :-1], angles))[0] > HOPELESS or y[-1] > claimed + HOPEFUL:
             break
+        if angles is coarse and any(np.sqrt(np.mean((y[:-1] - end) ** 2)) < SAME for end in ends):
+            return None
         angles = task.sharper(y[:-1], angles)
         if np.abs(y - before).max() < 1e-9:
             break
@@ -197,12 +210,16 @@ def attacked(
     start there is, in place of the best of many, an evolved one and random ones. A later level is sought with the
     claimed earlier ones held.
     """
-    claims = claimed or (np.inf,)
+    claims, ends = claimed or (np.inf,), list[np.ndarray]()
     for start in _starts(task, seed) if near is None else [near]:
-        found = solved(task, start, claims[0])
+        found = solved(task, start, claims[0], ends=ends)
+        if found is None:
+            continue
+        ends.append(found)
         yield found
         for level in range(1, len(claims)):
-            yield solved(task, found, claims[level], level, claims[:level])
+            later = solved(task, found, claims[level], level, claims[:level])
+            yield found if later is None else later
 
 
 def _starts(task: Task, seed: int) -> Iterator[np.ndarray]:
