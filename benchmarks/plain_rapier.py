@@ -192,11 +192,11 @@ def margins(design):
     return (l5 + l6) / reach.max(), reach.min() / abs(l5 - l6)
 
 
-def violation(design, needs=NEEDS):
+def violation(design, needs=NEEDS, lower=LOWER, upper=UPPER):
     """Return by how much the worst limit is exceeded, each relative to itself; the transmission angle in rad."""
     ends = curves(design, np.array([-needs.before, needs.after]))[0]
     excess = [
-        (np.maximum(LOWER - design, design - UPPER) / WIDTH).max(),
+        (np.maximum(lower - design, design - upper) / WIDTH).max(),
         abs(stroke(design)[0] / needs.stroke - 1),
         np.abs(np.append(extremes(design, 0, -needs.before, needs.after)[1], ends)).max() / needs.band - 1,
         needs.transmission - transmission(design),

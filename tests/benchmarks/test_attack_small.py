@@ -1,0 +1,146 @@
+"""A small fixed draw of random scenes attacked from outside (benchmarks/attack.py), and that the attack has teeth."""
+
+import dataclasses
+import importlib
+import json
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_benchmarks_small import FOLDER
+
+import loomopt as lo
+
+COUNTS = {"rapier": 3, "beatup": 5, "shedding": 10}
+NARROW = {
+    "l4": "8 21 mm",
+    "l5": "455 563 mm",
+    "l6": "175 263 mm",
+    "l3p": "153 191 mm",
+    "alpha": "24.3 38.5 deg",
+    "C0x": "418 502 mm",
+    "C0y": "161 280 mm",
+    "phi40": "138.7 170.4 deg",
+}
+"""Bounds in which all random starts end in a wide basin of 0.92531 m/rad², and a narrow one holds 0.84456."""
+
+
+@pytest.fixture(scope="module")
+def attack():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(FOLDER))
+        yield importlib.import_module("attack")
+
+
+@pytest.mark.parametrize("job", COUNTS)
+def test_no_answer_of_the_draw_is_beaten_broken_refuted_or_left_uncertified(job):
+    command = [sys.executable, str(FOLDER / "attack.py"), "--jobs", job, "--count", str(COUNTS[job]), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    said = json.loads(done.stdout)
+    assert said["failures"] == []
+    assert done.returncode == 0, done.stderr
+    row = said["rows"][0]
+    assert row["tried"] == COUNTS[job]
+    assert row["optimal"] == row["matched"] > 0, "the attack must come as far as the answers do by itself"
+
+
+def narrow_drive(rapier):
+    """Return the scene with a narrow basin, as the attack sees it."""
+    plain, ends = rapier.plain, []
+    changes: dict[str, object] = {}
+    for name, text in NARROW.items():
+        low, high, unit = text.split()
+        changes[f"bounds.{name}"] = {"min": f"{low} {unit}", "max": f"{high} {unit}"}
+        ends.append([float(low) / 1e3, float(high) / 1e3] if unit == "mm" else np.radians([float(low), float(high)]))
+    changes |= {"operation.stroke": "932 mm", "operation.s_dwell": "5.1 mm"}
+    changes |= {"operation.dwell_after": "17.1 deg", "operation.dwell_before": "31.6 deg"}
+    order = [plain.NAMES.index(name) for name in NARROW]
+    lower, upper = np.empty((2, 8))
+    lower[order], upper[order] = np.array(ends).T
+    needs = plain.Needs(0.932, 0.0051, *np.radians([17.1, 31.6]))
+    return rapier.Drive("stroke-dwell", changes, lower, upper, needs)
+
+
+def test_a_certified_optimum_of_the_wrong_basin_is_beaten(attack, monkeypatch):
+    monkeypatch.setitem(attack.CALLS, "default", {"starts": 1})
+    trial = attack.Trial(narrow_drive(importlib.import_module("attack_rapier")), seed=0)
+    trial.solved(["default"])
+    assert trial.answer.certificate.passed
+    assert trial.answer.figures["peak_acceleration"] == pytest.approx(0.9253096, abs=1e-6)
+    trial.judged()
+    assert [kind for kind, _ in trial.verdicts] == ["beaten"]
+    assert trial.found[1][0] == pytest.approx(0.84455731, abs=1e-7)
+
+
+@pytest.fixture
+def frame(attack):
+    """Return an easy scene with its answer, to be spoilt."""
+    numbers = (number for number in range(99) if attack.scene_of("shedding", 0, number).question == "stiffness")
+    trial = attack.Trial(attack.scene_of("shedding", 0, next(numbers)), 0)
+    trial.solved(["default"])
+    assert trial.answer.status == "optimal"
+    return trial
+
+
+def verdicts(trial, **spoilt):
+    trial.answer = trial.answers["default"] = SimpleNamespace(
+        **{name: getattr(trial.answer, name) for name in ("status", "design", "figures", "certificate", "message")}
+        | spoilt
+    )
+    trial.judged()
+    return [kind for kind, _ in trial.verdicts]
+
+
+def test_an_answer_as_it_is_stands(frame):
+    assert verdicts(frame) == []
+    assert frame.matched
+
+
+def test_an_answer_that_is_a_little_worse_is_beaten(frame):
+    design = {**frame.answer.design, "K1": frame.answer.design["K1"] * 1.0001}
+    assert verdicts(frame, design=design, figures={"K1": design["K1"]}) == ["beaten"]
+
+
+def test_an_answer_that_breaks_a_limit_or_states_another_figure_is_broken(frame):
+    design = {**frame.answer.design, "K1": frame.answer.design["K1"] * 0.999}
+    assert verdicts(frame, design=design) == ["broken", "broken"]
+
+
+def test_a_wrong_verdict_of_no_admissible_design_is_refuted(frame):
+    assert verdicts(frame, status="infeasible") == ["refuted"]
+
+
+@pytest.mark.parametrize(
+    ("reasons", "kind"),
+    [
+        (["second order open"], "uncertified: second order open"),
+        (["second order open", "another"], "uncertified: other"),
+        (["stationarity 1"], "uncertified: other"),
+    ],
+)
+def test_what_is_not_certified_is_told_apart(frame, reasons, kind):
+    certificate = dataclasses.replace(frame.answer.certificate, passed=False, reasons=tuple(reasons))
+    assert verdicts(frame, status="uncertified", certificate=certificate) == [kind]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "expected"),
+    [
+        ((1.0, 5.0), (1.000002, 1.0), True),
+        ((1.0, 5.0), (1.0000005, 1.0), False),
+        ((1.0, 0.9), (1.0, 1.0), True),
+        ((1.00000001, 0.9), (1.0, 1.0), False),
+    ],
+)
+def test_designs_are_compared_objective_by_objective(attack, one, other, expected):
+    assert attack.better(one, other) == expected
+
+
+@pytest.mark.parametrize("job", COUNTS)
+def test_a_scene_is_the_same_by_its_number_and_is_read(attack, job):
+    one, other = (attack.scene_of(job, 3, 4) for _ in range(2))
+    assert (one.changes, one.target) == (other.changes, other.target)
+    assert one.changes != attack.scene_of(job, 3, 5).changes
+    assert lo.load(one.base).update(one.changes).job == job
