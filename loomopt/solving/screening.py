@@ -19,9 +19,11 @@ from loomopt.solving.sizes import (
     CLOSER_TOGETHER,
     DESIGNS,
     FAR_END,
+    FEWEST,
     LEVELS_APART,
     LONGEST_STEP,
-    MOVED_DESIGNS,
+    MOST_NODES,
+    MOVED_SHARE,
     PROJECTIONS,
     REGULAR,
     SCREENED_STARTS,
@@ -48,12 +50,14 @@ class Screening:
         kept = [variable.name in program.tops or variable.name in chained for variable in variables]
         self.free = np.flatnonzero((self.high > self.low) & ~np.array(kept))
         self.tops = np.flatnonzero(tops)
+        # A cycle of many pieces has many nodes, and its variables are more: the same time for fewer designs.
+        self.count = min(DESIGNS, max(MOST_NODES // len(self.batch.u), FEWEST))
 
     def starts(self, seed: int) -> list[Start]:
         """Return starts far apart: the best of those moved onto their limits, then the best as they were drawn."""
-        drawn = self.placed(points(DESIGNS, len(self.free), seed))
+        drawn = self.placed(points(self.count, len(self.free), seed))
         merits = self.merits(drawn)
-        best = np.argsort(merits, kind="stable")[:MOVED_DESIGNS]
+        best = np.argsort(merits, kind="stable")[: self.count // MOVED_SHARE]
         moved = self.projected(drawn[best])
         kept = (*self.diverse(moved, self.merits(moved)), *self.diverse(drawn, merits))
         return [self.start(design) for design in kept]

@@ -1,8 +1,11 @@
 """How wide a search looks, and how far apart its starts are: what costs time, and decides no verdict."""
 
-SCREENED_NODES, DESIGNS, MOVED_DESIGNS, PROJECTIONS, SCREENED_STARTS = 48, 512, 64, 3, 4
-"""A search's look at many designs: nodes of a turn, designs, how many of the best are moved onto their limits, in so
-many steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
+SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
+"""A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
+steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
+
+MOST_NODES, FEWEST = 65536, 32
+"""Nodes of all designs together, where a cycle has many of its own, and the fewest designs that are looked at."""
 
 APART, CLOSER_TOGETHER, FAR_END, LONGEST_STEP = 0.35, 0.6, 0.02, 0.3
 """Of the box of variables: distance of starts (rms), its factor until there are enough, what a flipped variable stays

@@ -9,7 +9,7 @@ from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, sampler_at
 from loomopt.solving.elastic import least
 from loomopt.solving.search import OnStart, Search, at, judged, tried
-from loomopt.solving.sizes import BETTER, DESIGNS, FLIPS, SCREENED_STARTS
+from loomopt.solving.sizes import BETTER, FLIPS, SCREENED_STARTS
 from loomopt.tolerances import MORE_STARTS
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     began = time.perf_counter()
     screening = None if search.program.single else _screening(search, own)
     drawn = _completed(search, screening.starts(seed)) if screening else []
-    search = replace(search, designs=len(drawn) and DESIGNS, solved=search.solved + time.perf_counter() - began)
+    looked, spent = screening.count if screening else 0, time.perf_counter() - began
+    search = replace(search, designs=looked, solved=search.solved + spent)
     steps = _Steps(on_start, len(own) + len(drawn))
     for start in own:
         search = steps.explored(search, start)

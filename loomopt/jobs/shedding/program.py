@@ -27,6 +27,7 @@ from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
+ONE_OPTIMUM = "the problem is one of linear programmes"
 SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
@@ -109,14 +110,16 @@ class _Task:
         limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
         limits += self._checks() + (self._law(self.law) if self.law else [])
         starts, moves = self._starts(variables), self._moves(variables)
-        # Every force is linear in K1 and K1 X0, and in the speed's square [Qiu21, eq 6].
-        free = {v.name for v in variables if v.lower < v.upper}
-        linear = not self.law and not self.checks and (free <= {"K1", "X0"} or free == {"speed"})
+        # Every force is linear in K1 and K1 X0, and in the speed's square [Qiu21, eq 6]. With a free law any stiffer
+        # spring keeps contact too, and the laws that do for one stiffness are convex.
+        free = {v.name for v in variables if v.lower < v.upper} - set(self.law.names if self.law else ())
+        spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
+        linear = not self.checks and (spring or free == {"speed"})
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
         today = (
             named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
         )
-        return Program(*task, today=today, single="the problem is linear: it has one optimum" if linear else "")
+        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "")
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
