@@ -27,7 +27,7 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     """
     best = None
     for start in starts:
-        known = Known(best.binding, sum(best.excesses)) if best else Known()
+        known = Known(best.binding, sum(best.excesses) - NEEDED) if best else Known()
         point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
         best = point if point.reached else best
         if best and not best.relaxed:

@@ -4,7 +4,7 @@ import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
@@ -12,13 +12,14 @@ from loomopt.nlp.point import Point, Settings
 from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
-from loomopt.solving import elastic, report, told
+from loomopt.solving import report
 from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, target_name
-from loomopt.solving.catalogue import fitted
-from loomopt.solving.search import Judged, Search
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
+
+if TYPE_CHECKING:
+    from loomopt.solving.search import Judged, Search
 
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 """What is said of the solver where no start assembles."""
@@ -95,6 +96,8 @@ def solve(
     for name, sizes in sold.items() if answer.status == "optimal" else ():
         options: dict[str, Any] = {"accuracy": accuracy, "starts": starts or 1, "seed": seed, "on_start": on_start}
         options["on_step"] = replace(settings, step=f"trying sizes of {name}").say
+        from loomopt.solving.catalogue import fitted
+
         answer = fitted(scene, answer, name, sizes, functools.partial(solve, target=target, **options))
     if prove and answer.certificate:
         settings.at("proving")
@@ -117,13 +120,14 @@ def solve_program(
     near: Point | None = None,
     on_start: Callable[[int, int], None] | None = None,
     today: Mapping[str, float] | None = None,
-) -> Search:
+) -> "Search":
     """Return how far a search for a program's certified optimum comes; no scene is read, nothing is said in words.
 
     near: where a neighbour's solve ended, to start warm from; one of another structure is left alone; today: today's
     machine by variable, SI, one more place to look for an admissible design from. The rest is as in `solve`. Raises
     KeyboardInterrupt on Ctrl-C.
     """
+    from loomopt.solving.search import Search
     from loomopt.solving.strategy import searched
 
     same = near is not None and near.structure == program.structure
@@ -137,14 +141,16 @@ def _proven(scene: Scene, target: str, answer: Solution) -> Solution:
     return proven(scene, target, answer)
 
 
-def _claimed(search: Search, everywhere: Everywhere, sold: Mapping[str, Sequence[float]]) -> tuple[Search, GlobalBound]:
+def _claimed(
+    search: "Search", everywhere: Everywhere, sold: Mapping[str, Sequence[float]]
+) -> "tuple[Search, GlobalBound]":
     """Return the search, with a better best where boxes led to one, and what is proven of all designs."""
     from loomopt.solving.global_bound.claim import claimed
 
     return claimed(search, everywhere, f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else "")
 
 
-def _least_changed(search: Search) -> Search:
+def _least_changed(search: "Search") -> "Search":
     """Return the search with what its best leaves open settled by least change from today."""
     if search.best is None or not search.best.certificate.level:
         return search
@@ -170,10 +176,12 @@ def _callback(on_iteration: Callable[[int], None] | None) -> Any:
     return IterationCallback(on_iteration)
 
 
-def _answer(scene: Scene, target: str, search: Search) -> tuple[Search, Solution, float]:
+def _answer(scene: Scene, target: str, search: "Search") -> "tuple[Search, Solution, float]":
     """Return the solution, or the reason there is none; the search with the time of that; seconds of saying."""
     clash, began = Clash(), time.perf_counter()
     if search.best is None and search.nearest and search.nearest.relaxed:
+        from loomopt.solving import elastic
+
         clash = elastic.clash(search.program, search.nearest, search.settings, Words(scene))
         search = replace(search, solved=search.solved + time.perf_counter() - began)
     began = time.perf_counter()
@@ -184,8 +192,10 @@ def _answer(scene: Scene, target: str, search: Search) -> tuple[Search, Solution
     return search, answer, time.perf_counter() - began
 
 
-def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
+def _without(scene: Scene, target: str, search: "Search", clash: Clash) -> Solution:
     """Return the answer where no design was reached."""
+    from loomopt.solving import told
+
     job, program, points = search.job, search.program, [each.point for each in search.candidates]
     solver: dict[str, Any] = {**NOT_SOLVED, **told.counts(search)}
     if points:
@@ -196,8 +206,10 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
     return report.without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
 
 
-def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
+def _with(scene: Scene, target: str, search: "Search", best: "Judged") -> Solution:
     """Return the answer of the best design that was reached."""
+    from loomopt.solving import told
+
     job, program, point = search.job, search.program, best.candidate.point
     solver: dict[str, Any] = {**NOT_SOLVED, **told.counts(search)}
     solver |= {"status": point.status, "iterations": point.iterations}

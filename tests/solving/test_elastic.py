@@ -10,6 +10,7 @@ from loomopt.nlp.point import Point, Settings
 from loomopt.solving import elastic
 from loomopt.solving.elastic import clash, least
 from loomopt.solving.words import Words
+from loomopt.tolerances import NEEDED
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 
@@ -87,9 +88,9 @@ def test_where_a_design_needs_nothing_the_search_for_the_least_relaxation_ends(m
 @pytest.mark.parametrize(
     ("sums", "most", "best"),
     [
-        ((2.0, 1.5, 1.0), (math.inf, 2.0, 1.5), 1.0),
-        ((2.0, None, 1.0), (math.inf, 2.0, 2.0), 1.0),
-        ((None, 2.0, None), (math.inf, math.inf, 2.0), 2.0),
+        ((2.0, 1.5, 1.0), (math.inf, 2.0 - NEEDED, 1.5 - NEEDED), 1.0),
+        ((2.0, None, 1.0), (math.inf, 2.0 - NEEDED, 2.0 - NEEDED), 1.0),
+        ((None, 2.0, None), (math.inf, math.inf, 2.0 - NEEDED), 2.0),
         ((None, None), (math.inf, math.inf), None),
     ],
 )
