@@ -15,7 +15,7 @@ with pytest.MonkeyPatch.context() as patch:
     plain = importlib.import_module("plain_shedding")
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
-KEYS += ["binding", "certificate", "solver", "time"]
+KEYS += ["binding", "certificate", "solver", "global", "time"]
 FIGURES = ["K1", "X0", "contact_min", "contact_max", "spring_force_max", "travel", "contact_speed", "law_acceleration"]
 FIGURES += ["pressure_angle_max", "curvature_min"]
 UNITS = {"K1": "N/m", "X0": "m", "contact_min": "N", "contact_max": "N", "spring_force_max": "N", "travel": "m"}

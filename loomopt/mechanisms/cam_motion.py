@@ -235,10 +235,15 @@ def mirrored(values: Values, shares: Sequence[Number]) -> tuple[Number, ...]:
 
 
 def middle(law: CamLaw, values: Values) -> tuple[float, float]:
-    """Return the u where a law of floats passes s = 1/2 for good, and the number of its piece."""
+    """Return the u where a law of floats passes s = 1/2 for good, and the number of its piece.
+
+    Raises ValueError for numbers that make no law: it never lies below 1/2.
+    """
     ends = (Fraction(0), *law.breaks, Fraction(1))
     pieces = reversed(range(len(ends) - 1))
-    piece = next(k for k in pieces if law.at(FLOAT, values, float(ends[k]), k).s < HALF)
+    piece = next((k for k in pieces if law.at(FLOAT, values, float(ends[k]), k).s < HALF), None)
+    if piece is None:
+        raise ValueError("the law does not pass its middle")
 
     def above(u: float) -> float:
         return float(law.at(FLOAT, values, u, piece).s) - HALF

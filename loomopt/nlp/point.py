@@ -22,7 +22,7 @@ class Settings:
     given; penalty: weight between levels; callback: of each iteration; on_step: told what is being done before it may
     take long, `step` and what of it. For studies of methods: samples: of one turn; tolerance:
     IPOPT's; hessian: "exact" or IPOPT's own "limited-memory"; polished: whether Newton's method ends a solve; uniform:
-    so many equal nodes of a turn instead of the exchange.
+    so many equal nodes of a turn instead of the exchange. farthest: natural sizes that polishing may lead.
     """
 
     accuracy: float = 1e-8
@@ -32,8 +32,8 @@ class Settings:
     tolerance: float = 0.0
     hessian: str = "exact"
     polished: bool = True
-    farthest: float = POLISH_FARTHEST
     uniform: int = 0
+    farthest: float = POLISH_FARTHEST
     step: str = ""
     on_step: Callable[[str], None] | None = None
 

@@ -65,7 +65,8 @@ class Ladder:
 
     settings: coarse to fine. run(setting): what is timed. read(setting, result): the values it gave, not timed.
     reference(quantity): what they are compared with, None where there is none tight enough. step(setting): what the
-    error may be a power of; None for settings that are no sizes.
+    error may be a power of; None for settings that are no sizes. counted(result): positions that a run looked at, all
+    that it did without it.
     """
 
     method: str
@@ -75,6 +76,7 @@ class Ladder:
     read: Callable[[Any, Any], Outcome]
     reference: Callable[[str], Reference | None]
     step: Callable[[Any], float] | None = None
+    counted: Callable[[Any], int] | None = None
 
 
 @dataclass(frozen=True)
@@ -120,8 +122,9 @@ def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
     least, spent, evaluations = math.inf, 0.0, 0
     for _ in range(repeats):
         before, began = Tally.positions, time.perf_counter()
-        ladder.run(setting)
+        result = ladder.run(setting)
         took, evaluations = time.perf_counter() - began, Tally.positions - before
+        evaluations = ladder.counted(result) if ladder.counted else evaluations
         least, spent = min(least, took), spent + took
         if spent > BUDGET:
             break

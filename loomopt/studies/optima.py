@@ -83,6 +83,7 @@ def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
         read,
         functools.partial(_reference, target),
         float,
+        lambda answer: int(answer.solver["evaluations"]),
     )
 
 

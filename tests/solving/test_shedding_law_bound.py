@@ -120,7 +120,8 @@ def cli(capsys):
 
 def answered(cli, *arguments):
     status, out, err = cli(*arguments, "--json")
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert err == "" or err.startswith("Remark: the scene is that of "), "an answer brings its own"
     return json.loads(out, parse_constant=pytest.fail)
 
 
