@@ -96,7 +96,7 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
     peaks = _frozen(calls.peaks(sampler))
     beside = calls.ways.beside if calls.ways else None
     if beside:
-        return _Place(x, sampler, peaks, beside.binding, {}, None)
+        return _Place(x, sampler, peaks, beside.nodes, {}, None)
     nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
