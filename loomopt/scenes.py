@@ -108,6 +108,17 @@ class Scene:
         units += [table[name].unit for table in (self.bounds, self.limits) if name in table]
         return next((unit for unit in units if fits(unit, kind)), DISPLAY_UNIT[kind])
 
+    def shown_in(self, kind: str) -> str:
+        """Return the unit in which a person sees quantities of a kind: the first one the scene writes, else ours."""
+        named: list[tuple[tuple[str, ...], type[Table]]] = [
+            (("mechanism",), self.schema.mechanism),
+            (("operation",), self.schema.operation),
+        ]
+        named += [(("effects", *effect.path), effect.own) for effect in self.active]
+        texts = [looked_up(self.document, (*path, key)) for path, own in named for key in own.model_fields]
+        units = [unit_of(text) for text in texts if isinstance(text, str) and text[:1] in "+-.0123456789"]
+        return next((unit for unit in units if fits(unit, kind)), DISPLAY_UNIT[kind])
+
     def set(self, key: str, value: object) -> "Scene":
         """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
         return self.update({key: value})
