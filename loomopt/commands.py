@@ -190,10 +190,11 @@ def export(
     off: Without = None,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
+    from loomopt import api
     from loomopt.views import outputs
 
-    scene, given, _ = read_asked(problem, design, target, sets, on, off)
-    outputs.linkage(out, scene, given)
+    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    outputs.linkage(out, scene, given, *([outputs.what(api.evaluate(scene, given, name))] if given else []))
     remark(f"Wrote {out}")
     remarked(scene, given)
 

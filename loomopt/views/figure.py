@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from loomopt import files
+from loomopt.picture.drawing import sheet
 from loomopt.picture.panels import ANGLE, Panel, each, split
 from loomopt.picture.shapes import (
     CAPITAL,
@@ -34,8 +35,8 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".pdf", ".svg")
 """Formats a figure can be written in."""
 
-_PAGE = 240.0
-"""Longer side of a drawing's page, mm."""
+_PAGE = 240 / 25.4
+"""Longer side of a drawing's page, inches."""
 _STYLE = {"svg.hashsalt": "loomopt", "pdf.fonttype": 42, "font.size": 9.0, "axes.titlesize": 9.0}
 _COLOURS = ("#1d4ed8", "#c2410c", "#047857", "#7c3aed", "#b91c1c", "#0e7490", "#a16207")
 _NAME_SIZE = 8.0
@@ -51,9 +52,9 @@ def draw(drawing: Drawing, path: Path) -> None:
     if files.suffix(path, SUFFIXES) == ".svg":
         path.write_text(svg.render(drawing), encoding="utf-8")
         return
+    drawing = sheet(drawing)
     box = extent(drawing)
-    scale = _PAGE / max(box.right - box.left, box.top - box.bottom)
-    inches = scale / 25.4
+    inches = _PAGE / max(box.right - box.left, box.top - box.bottom)
     with _own_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
         figure = _figure((box.right - box.left) * inches, (box.top - box.bottom) * inches)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
@@ -258,7 +259,7 @@ def _name(axes: Any, names: Sequence[tuple[float, str]]) -> None:
 
 
 def _append(axes: Any, primitive: Primitive, layer: Layer, text_height: float, points: float, order: int) -> None:
-    """Add a primitive to axes in mm; points: printer's points per mm of the drawing."""
+    """Add a primitive to axes in m; points: printer's points per m of the drawing."""
     from matplotlib import lines, patches
 
     unit = text_height / NOMINAL_HEIGHT * points

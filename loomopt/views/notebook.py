@@ -2,11 +2,10 @@
 
 from html import escape
 
-from loomopt.designs import flat
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
-from loomopt.views import svg, terminal
+from loomopt.views import outputs, svg, terminal
 from loomopt.views.layout import Grid, spaced
 
 
@@ -15,8 +14,9 @@ def answer(solution: Solution, scene: Scene) -> str:
     where the scene gives what a drawing needs."""
     shown = terminal.solution(solution, scene)
     parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
-    view = registry.of(scene).views
-    drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, flat(solution.design)))
+    drawn = ""
+    if not registry.of(scene).views.missing(scene):
+        drawn = svg.render(outputs.drawing(scene, solution.design, outputs.what(solution)))
     return f"<div>{''.join(parts)}{drawn}</div>"
 
 

@@ -5,6 +5,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from loomopt.picture.shapes import Drawing
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
@@ -68,7 +71,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     }
     view = registry.of(scene).views
     if not view.missing(scene):
-        contents["linkage.svg"] = svg.render(view.linkage(scene, flat(solution.design)))
+        contents["linkage.svg"] = svg.render(drawing(scene, solution.design, what(solution)))
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         _make(folder, made)
@@ -137,22 +140,47 @@ def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], pl
     figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
 
 
-def linkage(path: Path, scene: Scene, design: Design) -> None:
+def what(found: Evaluation) -> str:
+    """Say in a few words what the design of an evaluation or of an answer is."""
+    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
+    said = f"; limits not held: {broken}" if broken else ""
+    if not isinstance(found, Solution):
+        return f"a given design{said}"
+    return f"{_DESIGNS.get(found.status, found.status)} for {found.target}{said}"
+
+
+_DESIGNS = {
+    "optimal": "best design",
+    "infeasible": "nearest design",
+    "uncertified": "uncertified design",
+    "failed": "no design found: where the search ended",
+    "interrupted": "interrupted: the best design so far",
+}
+"""What an answer's design is, by its status."""
+
+
+def drawing(scene: Scene, design: Design, said: str = "today's machine") -> "Drawing":
+    """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
+    found = registry.of(scene).views.linkage(scene, flat(design))
+    return replace(found, title=f"{scene.name}: {said}")
+
+
+def linkage(path: Path, scene: Scene, design: Design, said: str = "today's machine") -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
     from loomopt.views import dxf, svg
 
-    ending, view, given = suffix(path, DRAWINGS), registry.of(scene).views, flat(design)
+    ending = suffix(path, DRAWINGS)
     if ending == ".csv":
-        text(path, view.joints_csv(scene, given))
+        text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
     elif ending == ".svg":
-        text(path, svg.render(view.linkage(scene, given)))
+        text(path, svg.render(drawing(scene, design, said)))
     else:
-        atomically(path, functools.partial(dxf.write, view.linkage(scene, given)))
+        atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
 
 
-def picture(path: Path, scene: Scene, design: Design) -> None:
+def picture(path: Path, scene: Scene, design: Design, said: str = "today's machine") -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.views import figure
 
     suffix(path, PICTURES)
-    atomically(path, functools.partial(figure.draw, registry.of(scene).views.linkage(scene, flat(design))))
+    atomically(path, functools.partial(figure.draw, drawing(scene, design, said)))

@@ -75,11 +75,11 @@ def test_labels_are_read_back(document):
 
 
 def test_a_stroke_through_many_points_is_one_polyline(tmp_path):
-    points = tuple(Point(math.cos(k), math.sin(k)) for k in range(6))
-    dxf.write(Drawing("", 1.0, (Line("notes", points, closed=True),)), tmp_path / "a.dxf")
+    points = tuple(Point(math.cos(k) / 1e3, math.sin(k) / 1e3) for k in range(6))
+    dxf.write(Drawing("", 0.001, (Line("notes", points, closed=True),)), tmp_path / "a.dxf")
     (polyline,) = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
     assert polyline.closed
-    assert [point[:2] for point in polyline.get_points()] == [pytest.approx(point) for point in points]
+    assert [point[:2] for point in polyline.get_points()] == [pytest.approx((1e3 * x, 1e3 * y)) for x, y in points]
 
 
 def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):

@@ -8,6 +8,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
+from loomopt.picture.units import told
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
@@ -22,13 +23,13 @@ class RapierViews(JobViews):
         """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name)
+        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, told(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV, mm. Raises BadInput."""
+        """Return its joints as CSV. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
-        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design))
+        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), told(scene))
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""

@@ -19,6 +19,7 @@ from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import drawing as shedding_drawing
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.picture import shapes
+from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, svg
 
@@ -136,9 +137,9 @@ def test_the_positions_are_the_dwells_and_the_least_cam_force():
         "least cam force": least,
     }
     _, centre, profile, *_ = plain(scene, plain_cam.cycloidal, np.array(list(found.theta.values())))
-    for at, middle, touched in zip(found.skeleton().joints.values(), centre, profile, strict=True):
-        assert at["C"] == pytest.approx(tuple(middle), abs=1e-9)
-        assert at["T"] == pytest.approx(tuple(touched), abs=1e-9)
+    for at, middle, touched in zip(found.skeleton.joints.values(), centre, profile, strict=True):
+        assert at["C"] == pytest.approx(tuple(middle / 1e3), abs=1e-12)
+        assert at["T"] == pytest.approx(tuple(touched / 1e3), abs=1e-12)
 
 
 def table(scene, design):
@@ -148,7 +149,7 @@ def table(scene, design):
 
 
 COLUMNS = ["theta [deg]", "X [mm]", "pitch_x [mm]", "pitch_y [mm]", "profile_x [mm]", "profile_y [mm]"]
-COLUMNS += ["pressure_angle [deg]", "curvature [1/m]"]
+COLUMNS += ["pressure_angle [deg]", "curvature [1/mm]"]
 
 
 def test_the_profile_as_a_table_is_the_plain_cams(made):
@@ -162,7 +163,7 @@ def test_the_profile_as_a_table_is_the_plain_cams(made):
     assert rows["pressure_angle [deg]"].to_numpy() == pytest.approx(np.degrees(pressure), abs=1e-7)
     corners = np.cumsum([scene.mechanism[name] for name in SEGMENTS])
     inside = np.min(np.abs(theta[:, None] - np.array([0, *corners])), axis=1) > 1e-9
-    exact, shown = curvature[inside], rows["curvature [1/m]"].to_numpy()[inside]
+    exact, shown = curvature[inside], 1e3 * rows["curvature [1/mm]"].to_numpy()[inside]
     assert shown == pytest.approx(exact, rel=1e-7, abs=1e-6)
 
 
@@ -189,7 +190,7 @@ def test_an_angle_stands_twice_only_where_the_curvature_jumps():
     assert sorted(set(twice["theta [deg]"])) == [120, 180, 300]
     swing, rise, arm = scene.mechanism["arm_swing"], scene.mechanism["rise"], scene.mechanism["arm"]
     assert arm * swing * math.pi**2 / 2 / rise**2 > 0.02, "m: the harmonic's jump of l phi''"
-    assert np.all(np.abs(np.diff(twice["curvature [1/m]"])[::2]) > 0.1)
+    assert np.all(np.abs(np.diff(twice["curvature [1/mm]"])[::2]) > 1e-4)
 
 
 def test_the_table_says_where_it_comes_from_and_what_the_workshop_must_know():
@@ -217,12 +218,12 @@ def test_a_freed_rise_and_a_free_law_are_drawn_as_the_design_says():
 @pytest.mark.parametrize("name", PACKAGED)
 def test_no_two_texts_overlap_and_all_stand_on_the_sheet(name):
     scene = lo.load(name)
-    drawing = registry.of(scene).views.linkage(scene, {})
+    drawing = sheet(registry.of(scene).views.linkage(scene, {}))
     texts = [p for p in drawing.primitives if isinstance(p, Text)]
     boxes = [shapes.text_box(text, drawing.height) for text in texts]
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
-    sheet = shapes.extent(drawing)
-    assert all(sheet.left < box.left and box.right < sheet.right for box in boxes)
+    paper = shapes.extent(drawing)
+    assert all(paper.left < box.left and box.right < paper.right for box in boxes)
     assert {primitive.layer for primitive in drawing.primitives} <= LAYERS.keys()
     shown = {text.text for text in texts}
     assert {name, "A", "B", "C", "B'", "C'", "arm = 130", "roller_radius = 20", "base_radius = 50"} <= shown
@@ -236,7 +237,7 @@ def test_the_svg_shows_the_profile_at_full_scale():
     assert 'data-layer="profile"' in svg.render(drawing)
     (line,) = [p for p in drawing.primitives if isinstance(p, Line) and p.layer == "profile"]
     assert line.closed
-    assert [c.radius for c in drawing.primitives if isinstance(c, Circle) and c.layer == "near dwell"] == [20]
+    assert [c.radius for c in drawing.primitives if isinstance(c, Circle) and c.layer == "near dwell"] == [0.02]
 
 
 def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
@@ -244,7 +245,7 @@ def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
     scene = lo.load("shedding").update(changes)
     assert lo.evaluate(scene).figures["curvature_max"] > 1 / 0.020
     drawing = registry.of(scene).views.linkage(scene, {})
-    assert any("UNDERCUT" in p.text for p in drawing.primitives if isinstance(p, Text))
+    assert any("UNDERCUT" in text for _, text in drawing.legend)
 
 
 def without(scene, *names):
@@ -284,5 +285,5 @@ def test_the_least_force_of_a_design_is_where_its_figures_say(tmp_path):
     scene, stiff = lo.load("shedding"), {"K1": 102602.609425357, "X0": 0.08}
     angle = registry.of(scene).figures(scene, stiff)["contact_angle"]
     assert math.degrees(angle) == pytest.approx(88.3705853902866, abs=1e-6)
-    legend = [p.text for p in registry.of(scene).views.linkage(scene, stiff).primitives if isinstance(p, Text)]
+    legend = [text for _, text in registry.of(scene).views.linkage(scene, stiff).legend]
     assert "B'' C''  least cam force, 0 N: cam at 88.37°" in legend
