@@ -80,16 +80,15 @@ def _found(wish: Wish, strokes: Floats, taken: Sequence[Spot], unit: float, lead
     for ring in itertools.chain(RINGS, (RINGS[-1] * FARTHER**k for k in itertools.count(1))):
         if best and ring >= least:
             return best
-        spots = [
-            (ring + (abs(turn) + which) / 3, _beside(wish, near, ring * unit, wish.side + turn * math.pi / 8))
-            for (which, near), turn in itertools.product(enumerate(wish.near), TURNS)
-        ]
-        free = _free(np.array([spot.box for _, spot in spots]), strokes, taken, CLEAR * unit)
-        for cost, spot in sorted(itertools.compress(spots, free)):
-            way = _between(spot, unit)
-            if cost < least and not (_gap(spot) > leader * unit and _meets(way, taken, unit)):
-                cost += BEHIND if _crossed(way, strokes, unit) else 0.0
-                best, least = (spot, cost) if cost < least else (best, least)
+        for which, near in enumerate(wish.near):
+            spots = [_beside(wish, near, ring * unit, wish.side + turn * math.pi / 8) for turn in TURNS]
+            free = _free(np.array([spot.box for spot in spots]), strokes, taken, CLEAR * unit)
+            for turn, spot in itertools.compress(zip(TURNS, spots, strict=True), free):
+                cost = ring + (abs(turn) + which) / 3
+                way = _between(spot, unit)
+                if cost < least and not (_gap(spot) > leader * unit and _meets(way, taken, unit)):
+                    cost += BEHIND if _crossed(way, strokes, unit) else 0.0
+                    best, least = (spot, cost) if cost < least else (best, least)
     raise AssertionError("rings go on without end")
 
 
@@ -104,12 +103,19 @@ def _beside(wish: Wish, near: tuple[float, float], gap: float, side: float) -> S
 
 def _free(boxes: Floats, strokes: Floats, taken: Sequence[Spot], room: float) -> NDArray[np.bool_]:
     """Say of each box, (n, 4), whether no stroke and no box that is taken comes nearer to it than `room`."""
-    low, high = boxes[:, :2] - room, boxes[:, 2:] + room
-    near = strokes[np.all((strokes > low.min(axis=0)) & (strokes < high.max(axis=0)), axis=1)]
-    hit = np.any(np.all((near > low[:, None]) & (near < high[:, None]), axis=2), axis=1)
-    for left, bottom, right, top in (spot.box for spot in taken):
-        hit |= np.all((low < (right, top)) & (high > (left, bottom)), axis=1)
+    left, bottom, right, top = (boxes + np.array([-room, -room, room, room])).T[:, :, None]
+    x, y = strokes[_within(strokes, left.min(), bottom.min(), right.max(), top.max())].T
+    hit = np.any((x > left) & (x < right) & (y > bottom) & (y < top), axis=1)
+    for other in (spot.box for spot in taken):
+        across = (left < other.right) & (right > other.left)
+        hit |= (across & (bottom < other.top) & (top > other.bottom))[:, 0]
     return np.asarray(~hit)
+
+
+def _within(points: Floats, left: float, bottom: float, right: float, top: float) -> NDArray[np.bool_]:
+    """Say which points, (n, 2), lie between four sides."""
+    x, y = points.T
+    return np.asarray((x > left) & (x < right) & (y > bottom) & (y < top))
 
 
 def _gap(spot: Spot) -> float:
@@ -125,11 +131,9 @@ def _between(spot: Spot, unit: float) -> Floats:
 
 def _meets(way: Floats, taken: Sequence[Spot], unit: float) -> bool:
     """Say whether a way comes too near to a box that is taken."""
-    room = CLEAR * unit
-    return any(
-        bool(np.any(np.all((way > np.array(box[:2]) - room) & (way < np.array(box[2:]) + room), axis=1)))
-        for box in (spot.box for spot in taken)
-    )
+    r = CLEAR * unit
+    boxes = (spot.box for spot in taken)
+    return any(np.any(_within(way, box.left - r, box.bottom - r, box.right + r, box.top + r)) for box in boxes)
 
 
 def _crossed(way: Floats, strokes: Floats, unit: float) -> bool:
@@ -138,6 +142,6 @@ def _crossed(way: Floats, strokes: Floats, unit: float) -> bool:
     if not len(inner):
         return False
     low, high = inner.min(axis=0) - STEP * unit, inner.max(axis=0) + STEP * unit
-    near = strokes[np.all((strokes > low) & (strokes < high), axis=1)]
+    near = strokes[_within(strokes, *low, *high)]
     apart = near[:, None] - inner
     return bool(np.any(np.hypot(apart[..., 0], apart[..., 1]) < 0.7 * STEP * unit))

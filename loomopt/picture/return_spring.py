@@ -46,7 +46,7 @@ class ReturnSpring:
     def strokes(self) -> list[Primitive]:
         """Return the spring, its load in both positions, preload and travel."""
         h, (slack, top, bottom) = self.h, self.levels
-        loads = [Line(LAYER, (at.towards(math.pi, COIL * h), at.towards(0.0, BAR * h))) for at in (top, bottom)]
+        loads = [Line(LAYER, (at.towards(0.0, -COIL * h), at.towards(0.0, BAR * h))) for at in (top, bottom)]
         return [
             *ground(LAYER, self.hung, math.pi / 2, h),
             spring(LAYER, self.hung, top, COIL * h),
@@ -59,14 +59,16 @@ class ReturnSpring:
     def labels(self, units: Units) -> list[Label]:
         """Name stiffness, preload, travel and both positions of the load."""
         h, (slack, top, bottom) = self.h, self.levels
-        beside = self.hung.part(top).towards(math.pi, COIL / 2 * h)
+        beside = self.hung.part(top).towards(0.0, -COIL / 2 * h)
         first, last = top.towards(0.0, 8 * h), bottom.towards(0.0, 8 * h)
         return [
             Label(LAYER, beside, math.pi, f"K1 = {show(self.K1, units.stiffness)}"),
             along("dimensions", slack.towards(0.0, 5 * h), top.towards(0.0, 5 * h), 0.0, f"X0 = {units.size(self.X0)}"),
             along("dimensions", first, last, 0.0, f"travel = {units.size(self.travel)}"),
-            Label(LAYER, top.towards(math.pi, COIL * h), math.pi, self.upper),
-            Label(LAYER, bottom.towards(math.pi, COIL * h), math.pi, self.lower),
+            *(
+                Label(LAYER, at.towards(0.0, BAR * h), side, text, (at.towards(0.0, -COIL * h),))
+                for at, side, text in ((top, math.pi / 8, self.upper), (bottom, -math.pi / 8, self.lower))
+            ),
         ]
 
     def legend(self, units: Units) -> tuple[tuple[str, str], ...]:

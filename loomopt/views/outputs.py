@@ -146,17 +146,17 @@ def what(found: Evaluation) -> str:
     said = f"; limits not held: {broken}" if broken else ""
     if not isinstance(found, Solution):
         return f"a given design{said}"
-    return f"{_DESIGNS.get(found.status, found.status)} for {found.target}{said}"
+    return _DESIGNS[found.status].format(found.target) + said
 
 
 _DESIGNS = {
-    "optimal": "best design",
-    "infeasible": "nearest design",
-    "uncertified": "uncertified design",
-    "failed": "no design found: where the search ended",
-    "interrupted": "interrupted: the best design so far",
+    "optimal": "best design for {}",
+    "infeasible": "nearest design for {}",
+    "uncertified": "uncertified design for {}",
+    "failed": "no design for {} found, where the search ended",
+    "interrupted": "best design for {} so far, interrupted",
 }
-"""What an answer's design is, by its status."""
+"""What an answer's design is, by its status and target."""
 
 
 def drawing(scene: Scene, design: Design, said: str = "today's machine") -> "Drawing":

@@ -45,7 +45,7 @@ class Linkage:
             for name, own in self.masses.items():
                 side = -own.radius if name == COUNTERWEIGHT else own.radius
                 joints[event][name] = d.towards(psi + self.offset, side)
-        apart = [name for name in self.masses if self.offset or name == COUNTERWEIGHT]
+        apart = [at for at, own in self.masses.items() if at != REED or self.offset or not 0 < own.radius < sides.l3]
         path = Arc("paths", d, sides.l3, at.psi_front, at.psi_rear)
         links = (("A", "D"), ("B", "A"), ("B", "C"), ("D", "C"), *(("D", name) for name in apart))
         return Skeleton({"A": a, "D": d}, joints, links, (("A", sides.l1),), (path,), masses=self.masses)

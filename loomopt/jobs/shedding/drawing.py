@@ -210,7 +210,7 @@ def _labels(drawn: Picture, units: Units) -> list[Label]:
         labels.append(around(layer, centre, radius, side - half, side + half, f"{name} = {units.size(radius)}"))
     for name, (begin, end) in found.segments.items():
         if end > begin:
-            middle, *also = _points(found.at(begin + (end - begin) * np.array([0.5, 0.35, 0.65])).pitch)
+            middle, *also = _points(found.at(begin + (end - begin) * np.array([0.5, 0.35, 0.65, 0.2, 0.8])).pitch)
             outward = math.atan2(middle.y, middle.x)
             labels.append(Label("dimensions", middle, outward, f"{name} {math.degrees(end - begin):.6g}°", tuple(also)))
     return [*labels, *drawn.spring.labels(units)]

@@ -29,7 +29,10 @@ def meets(box, strokes):
         ends = np.sort(np.stack([(np.array(side) - start) / way for side in (box[:2], box[2:])]), axis=0)
     still = way == 0.0
     inside = (start > box[:2]) & (start < box[2:])
-    ends[0][still], ends[1][still] = (np.where(inside, -np.inf, np.inf)[still], np.where(inside, np.inf, -np.inf)[still])
+    ends[0][still], ends[1][still] = (
+        np.where(inside, -np.inf, np.inf)[still],
+        np.where(inside, np.inf, -np.inf)[still],
+    )
     enter, leave = np.maximum(ends[0].max(axis=1), 0.0), np.minimum(ends[1].min(axis=1), 1.0)
     return enter < leave
 
