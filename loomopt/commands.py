@@ -194,7 +194,8 @@ def export(
     from loomopt.views import outputs
 
     scene, given, name = read_asked(problem, design, target, sets, on, off)
-    outputs.linkage(out, scene, given, *([outputs.what(api.evaluate(scene, given, name))] if given else []))
+    said = outputs.what(api.evaluate(scene, given, name)) if given else ""
+    outputs.linkage(out, scene, given, said)
     remark(f"Wrote {out}")
     remarked(scene, given)
 

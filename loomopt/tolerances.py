@@ -343,8 +343,8 @@ REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 which moves more than its objective does."""
 
 CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED = 5e-7, 1e-8, 2.0
-"""How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a machine
-of a kilometre; and the chord tolerance that is promised over what is measured."""
+"""How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a huge
+machine; and the chord tolerance that is promised over what is measured."""
 
 SHOWN_AS_ZERO = 1e-8
 """Share of the largest number of its kind below which one is shown as 0: the accuracy asked by default."""

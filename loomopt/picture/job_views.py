@@ -26,7 +26,7 @@ class JobViews:
         raise NotImplementedError
 
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
-        """Return what `linkage` draws as CSV in the drawing's unit: joints and masses, or a profile. Raises BadInput."""
+        """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
         raise NotImplementedError
 
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":

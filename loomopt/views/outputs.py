@@ -27,6 +27,15 @@ CURVES = (".csv", ".parquet", *PICTURES)
 DRAWINGS = (".svg", ".dxf", ".csv")
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
+TODAY, GIVEN = "today's machine", "a given design"
+FOUND = {
+    "optimal": "best design for {}",
+    "infeasible": "nearest design for {}",
+    "uncertified": "uncertified design for {}",
+    "failed": "no design for {} found, where the search ended",
+    "interrupted": "best design for {} so far, interrupted",
+}
+"""What an answer's design is, by its status and target."""
 
 
 def document(found: Evaluation) -> str:
@@ -145,27 +154,17 @@ def what(found: Evaluation) -> str:
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     said = f"; limits not held: {broken}" if broken else ""
     if not isinstance(found, Solution):
-        return f"a given design{said}"
-    return _DESIGNS[found.status].format(found.target) + said
+        return GIVEN + said
+    return FOUND[found.status].format(found.target) + said
 
 
-_DESIGNS = {
-    "optimal": "best design for {}",
-    "infeasible": "nearest design for {}",
-    "uncertified": "uncertified design for {}",
-    "failed": "no design for {} found, where the search ended",
-    "interrupted": "best design for {} so far, interrupted",
-}
-"""What an answer's design is, by its status and target."""
-
-
-def drawing(scene: Scene, design: Design, said: str = "today's machine") -> "Drawing":
+def drawing(scene: Scene, design: Design, said: str = "") -> "Drawing":
     """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
     found = registry.of(scene).views.linkage(scene, flat(design))
-    return replace(found, title=f"{scene.name}: {said}")
+    return replace(found, title=f"{scene.name}: {said or (GIVEN if design else TODAY)}")
 
 
-def linkage(path: Path, scene: Scene, design: Design, said: str = "today's machine") -> None:
+def linkage(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
     from loomopt.views import dxf, svg
 
@@ -178,7 +177,7 @@ def linkage(path: Path, scene: Scene, design: Design, said: str = "today's machi
         atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
 
 
-def picture(path: Path, scene: Scene, design: Design, said: str = "today's machine") -> None:
+def picture(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.views import figure
 
