@@ -2,10 +2,14 @@
 
 import itertools
 import math
+from xml.etree import ElementTree
 
 import numpy as np
 
-from loomopt.picture.shapes import Drawing, Line, Text, extent, text_box
+from loomopt.picture.drawing import sheet
+from loomopt.picture.placing import Box
+from loomopt.picture.shapes import Drawing, Line, Text, text_box
+from loomopt.views import svg
 
 FINE = 500
 """Straight parts of a circle, each of which is exact to 5e-6 of its radius."""
@@ -37,19 +41,31 @@ def meets(box, strokes):
     return enter < leave
 
 
-def faults(drawing: Drawing) -> list[str]:
-    """Return what is wrong with a drawing as it is rendered: texts on texts, on strokes, beside the sheet."""
+def paper(drawing: Drawing) -> Box:
+    """Return the sheet of a drawing, m, as its SVG has it."""
+    left, top, width, height = map(float, ElementTree.fromstring(svg.render(drawing)).attrib["viewBox"].split())
+    return Box(*(side / 1000 for side in (left, -top - height, left + width, -top)))
+
+
+def faults(drawing: Drawing, on: Box | None = None) -> list[str]:
+    """Return what is wrong with a drawing, title and legend apart unless they are in it: texts on texts, on strokes,
+    beside the sheet `on`."""
     texts = [each for each in drawing.primitives if isinstance(each, Text)]
     strokes = [each for each in drawing.primitives if not isinstance(each, Text)]
     lines = np.concatenate([segments(stroke) for stroke in strokes])
     owner = np.repeat(np.arange(len(strokes)), [len(segments(stroke)) for stroke in strokes])
-    boxes, paper = [text_box(text, drawing.height) for text in texts], extent(drawing)
+    boxes = [text_box(text, drawing.height) for text in texts]
     found = []
     for (one, box), (other, second) in itertools.combinations(zip(texts, boxes, strict=True), 2):
         found += [f"{one.text!r} overlaps {other.text!r}"] if box.meets(second) else []
     for text, box in zip(texts, boxes, strict=True):
         crossing = {strokes[k].layer for k in owner[meets(box, lines)]}
         found += [f"{text.text!r} lies on a stroke of {layer}" for layer in sorted(crossing)]
-        on = paper.left < box.left and box.right < paper.right and paper.bottom < box.bottom and box.top < paper.top
-        found += [] if on else [f"{text.text!r} lies beside the sheet"]
+        inside = not on or (on.left < box.left and box.right < on.right and on.bottom < box.bottom and box.top < on.top)
+        found += [] if inside else [f"{text.text!r} lies beside the sheet"]
     return found
+
+
+def faults_of(drawing: Drawing) -> list[str]:
+    """Return what is wrong with a drawing as a job returns it, once its title and legend stand on its sheet."""
+    return faults(sheet(drawing), paper(drawing))

@@ -71,19 +71,19 @@ def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
     scene = lo.load(name)
     answer = lo.solve(scene, starts=1)
     for design, said in (({}, "today's machine"), (answer.design, outputs.what(answer))):
-        assert clear.faults(sheet(outputs.drawing(scene, design, said))) == []
+        assert clear.faults_of(outputs.drawing(scene, design, said)) == []
 
 
 @pytest.mark.parametrize("job", RANDOM)
 def test_drawings_of_inch_machines_are_clear(job):
     scene = inch.scene(job, operation__speed="350 rpm")
-    assert clear.faults(sheet(outputs.drawing(scene, {}))) == []
+    assert clear.faults_of(outputs.drawing(scene, {})) == []
 
 
 @pytest.mark.parametrize("job", RANDOM)
 def test_drawings_of_random_machines_are_clear(job):
     for drawn in drawings(job):
-        assert clear.faults(sheet(drawn)) == []
+        assert clear.faults_of(drawn) == []
 
 
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
@@ -120,6 +120,12 @@ def shown(*texts):
 )
 def test_a_made_up_overlap_is_found(texts, fault):
     assert clear.faults(shown(*texts)) == fault
+
+
+def test_a_text_beside_the_sheet_is_found():
+    beside = shown(Text("notes", Point(1.5, 0.0), "l1"))
+    assert clear.faults(beside, clear.paper(SMALL)) == ["'l1' lies beside the sheet"]
+    assert clear.faults(beside, clear.paper(beside)) == []
 
 
 def test_a_text_moved_onto_a_link_of_a_real_drawing_is_found():

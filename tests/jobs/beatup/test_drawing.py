@@ -107,7 +107,7 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
 def test_labels_are_clear_of_links_and_of_each_other(design):
     title = "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
     masses = {"m4": 50.0, "r4": 0.3 * design["l4"], "m4e": 3.0, "r4e": 0.4 * design["l4"]}
-    assert clear.faults(sheet(crank_rocker_drawing.linkage({**design, **masses}, title))) == []
+    assert clear.faults_of(crank_rocker_drawing.linkage({**design, **masses}, title)) == []
 
 
 @few

@@ -114,8 +114,8 @@ def test_both_cranks_have_their_circles_and_d_its_path_through_every_position():
 
 def test_labels_are_clear_of_links_and_of_each_other_with_a_long_title():
     title = "The rapier drive, drawn with a rather long title that runs over two lines " * 2
-    drawn = sheet(rapier_drawing.linkage(WIDER, title))
-    assert clear.faults(drawn) == []
+    drawn = rapier_drawing.linkage(WIDER, title)
+    assert clear.faults_of(drawn) == []
     assert {primitive.layer for primitive in drawn.primitives} <= LAYERS.keys()
 
 
