@@ -18,6 +18,8 @@ RINGS = (0.5, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0)
 """Distances of a label from its point that are tried first, in text heights; then ever more."""
 FARTHER = 1.3
 """Factor from each further distance to the next."""
+OUTSIDE = 100.0
+"""Distance, in text heights, from which on a leader may run over a label: that point is walled in by labels."""
 TURNS = (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8)
 """Eighths of a half turn from the side that is wished for, in the order they are tried in."""
 BEHIND = 3.0
@@ -86,7 +88,8 @@ def _found(wish: Wish, strokes: Floats, taken: Sequence[Spot], unit: float, lead
             for turn, spot in itertools.compress(zip(TURNS, spots, strict=True), free):
                 cost = ring + (abs(turn) + which) / 3
                 way = _between(spot, unit)
-                if cost < least and not (_gap(spot) > leader * unit and _meets(way, taken, unit)):
+                led = leader * unit < _gap(spot) < OUTSIDE * unit
+                if cost < least and not (led and _meets(way, taken, unit)):
                     cost += BEHIND if _crossed(way, strokes, unit) else 0.0
                     best, least = (spot, cost) if cost < least else (best, least)
     raise AssertionError("rings go on without end")

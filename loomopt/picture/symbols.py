@@ -45,7 +45,7 @@ def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:
     ]
 
 
-def ground(layer: str, middle: Point, side: float, h: float) -> list[Primitive]:
+def ground(layer: str, middle: Point, side: float, h: float) -> list[Line]:
     """Return a straight piece of hatched ground; side: direction, rad, in which the hatched side lies."""
     along = side - math.pi / 2
     starts = [middle.towards(along, (1.0 - 0.6 * step) * h) for step in range(5)]
