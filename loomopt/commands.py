@@ -47,16 +47,16 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt.jobs import registry
-    from loomopt.views import layout, scene_view
+    from loomopt import entry_points, packaged
+    from loomopt.views import layout, listing
 
-    scenes, faults = [], list(registry.brought()[1])
-    for name in registry.problems():
-        try:
-            scenes.append(registry.load(name))
-        except BadInput as error:
-            faults.append(error)
-    layout.show(scene_view.listing(scenes))
+    heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
+    if entry_points.of(entry_points.JOBS):  # what others bring is named by their own code, read whole
+        from loomopt.jobs import registry
+
+        others, faults = registry.brought_heads()
+        heads = sorted([*heads, *others])
+    layout.show(listing.grid(heads))
     for fault in faults:
         remark(f"loomopt: {fault}")
 

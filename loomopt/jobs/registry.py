@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import packaged
+from loomopt import entry_points, packaged
 from loomopt.effects.kinds import Effect, ranked
 from loomopt.errors import BadInput
 from loomopt.jobs.base import Job
@@ -25,8 +25,7 @@ from loomopt.scenes import Scene, build
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
-"""Groups of entry points."""
+JOBS, EFFECTS = entry_points.JOBS, entry_points.EFFECTS
 HERE = Path(__file__).parent
 
 
@@ -36,12 +35,7 @@ def own_names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in HERE.glob("*/job.py")))
 
 
-@functools.cache
-def _points(group: str) -> "tuple[EntryPoint, ...]":
-    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
-    from importlib.metadata import entry_points
-
-    return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
+_points = entry_points.of
 
 
 def _distribution(point: "EntryPoint") -> str:
@@ -156,6 +150,20 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
         faults += [BadInput(f"scene {n} stands in {found[n]} too", file=str(files[n]), key=n) for n in twice]
         found = files | found
     return found, tuple(faults)
+
+
+def brought_heads() -> tuple[list[packaged.Head], list[BadInput]]:
+    """Return what `loomopt list` tells of other distributions' scenes, and what is wrong with any of them."""
+    files, faults = brought()
+    heads, said = [], list(faults)
+    for name in files.keys() - packaged.problems().keys():
+        try:
+            scene = load(name)
+        except BadInput as error:
+            said.append(error)
+        else:
+            heads.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
+    return heads, said
 
 
 def problems() -> dict[str, Path]:

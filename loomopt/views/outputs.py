@@ -18,6 +18,7 @@ from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
@@ -123,7 +124,18 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
         atomically(path, functools.partial(_figure, frame, scene, flat(design)))
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path) -> None:
+def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
+    """Return a design's curves as a figure; path: a file to write it to as well. Raises BadInput."""
+    if path:
+        suffix(path, PICTURES)
+    frame, given = tables.curves(scene, design, target=target), flat(design)
+    if path:
+        atomically(path, functools.partial(_figure, frame, scene, given))
+    found: Figure = _figure(frame, scene, given)
+    return found
+
+
+def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path | None = None) -> "Figure":
     """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
     from loomopt.views import figure
 
@@ -134,7 +146,8 @@ def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], pl
         before = tables.curves(scene, {})
         today = before, view.panels(scene, {}, tuple(before.columns))
     marks = view.marks(scene, {**job.today(scene), **design})
-    figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    drawn: Figure = figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    return drawn
 
 
 def linkage(path: Path, scene: Scene, design: Design) -> None:
