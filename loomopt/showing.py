@@ -1,4 +1,4 @@
-"""How objects show themselves in Jupyter. What lays out and draws stands above them: it says here how they are shown."""
+"""How objects show themselves in Jupyter. What draws stands above them: it says here how they are shown."""
 
 from collections.abc import Callable
 

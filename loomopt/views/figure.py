@@ -98,9 +98,15 @@ def curves(
             _mark(axes, marks or {}, named=first)
             axes.tick_params(labelbottom=last)
         figure.supxlabel(f"{angle} phi [deg]", fontsize=9)
-        if path:
-            _save(figure, path)
+    if path:
+        save(figure, path)
     return figure
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure as PNG, PDF or SVG, by the path's ending, whatever the user's settings."""
+    with _own_style():
+        _save(figure, path)
 
 
 def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Any, Panel, bool, bool]]]:

@@ -121,22 +121,25 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     elif ending == ".parquet":
         atomically(path, frame.to_parquet)
     else:
-        atomically(path, functools.partial(_figure, frame, scene, flat(design)))
+        from loomopt.views import figure
+
+        atomically(path, functools.partial(figure.save, _figure(frame, scene, flat(design))))
 
 
 def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
     """Return a design's curves as a figure; path: a file to write it to as well. Raises BadInput."""
+    from loomopt.views import figure
+
     if path:
         suffix(path, PICTURES)
-    frame, given = tables.curves(scene, design, target=target), flat(design)
+    drawn = _figure(tables.curves(scene, design, target=target), scene, flat(design))
     if path:
-        atomically(path, functools.partial(_figure, frame, scene, given))
-    found: Figure = _figure(frame, scene, given)
-    return found
+        atomically(path, functools.partial(figure.save, drawn))
+    return drawn
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path | None = None) -> "Figure":
-    """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
+def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float]) -> "Figure":
+    """Return curves drawn with what the job marks and groups; today's beside a design's where it asks for them."""
     from loomopt.views import figure
 
     job, view = registry.of(scene), registry.of(scene).views
@@ -146,7 +149,7 @@ def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], pl
         before = tables.curves(scene, {})
         today = before, view.panels(scene, {}, tuple(before.columns))
     marks = view.marks(scene, {**job.today(scene), **design})
-    drawn: Figure = figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    drawn: Figure = figure.curves(frame, None, scene.title, marks, panels, today, view.angle)
     return drawn
 
 
