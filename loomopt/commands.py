@@ -51,7 +51,7 @@ def list_problems() -> None:
     from loomopt.views import layout, listing
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
-    if entry_points.of(entry_points.JOBS):  # what others bring is named by their own code, read whole
+    if entry_points.of("loomopt.jobs"):  # what others bring is named by their own code, read whole
         from loomopt.jobs import registry
 
         others, faults = registry.brought_heads()

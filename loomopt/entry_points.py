@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
-"""Groups: name = job, name = "job.effect"."""
-
 
 @functools.cache
 def of(group: str) -> "tuple[EntryPoint, ...]":

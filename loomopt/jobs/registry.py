@@ -25,7 +25,8 @@ from loomopt.scenes import Scene, build
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-JOBS, EFFECTS = entry_points.JOBS, entry_points.EFFECTS
+JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
+"""Groups of entry points."""
 HERE = Path(__file__).parent
 
 
