@@ -81,6 +81,16 @@ def _write(place: Path, text: str) -> None:
     place.write_text(text, encoding="utf-8")
 
 
+def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")]) -> None:
+    """Print the JSON Schema of a scene, for editors."""
+    import json
+
+    from loomopt.jobs import registry
+    from loomopt.views import json_schema
+
+    print(json.dumps(json_schema.scene(registry.declared(job)), indent=1, ensure_ascii=False))
+
+
 def show(
     problem: Problem,
     equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
@@ -198,7 +208,7 @@ def export(
     remarked(scene, given)
 
 
-FIRST: dict[str, Callable[..., None]] = {"list": list_problems, "new": new, "show": show}
+FIRST: dict[str, Callable[..., None]] = {"list": list_problems, "new": new, "schema": schema, "show": show}
 OF_A_DESIGN: dict[str, Callable[..., None]] = {
     "evaluate": evaluate,
     "prove": prove,

@@ -19,6 +19,7 @@ ROOMS = (
     "jets boxes box_series tracing",
     "maths errors frozen interrupts tolerances lazy showing",
     "units",
+    "quantity_patterns",
     "quantities",
     "schema files",
     "mechanisms",

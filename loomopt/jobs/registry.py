@@ -182,6 +182,12 @@ def _folder(job: str, name: str) -> Path:
     return Path(str(find(job).resources / name))
 
 
+def declared(name: str) -> SceneSchema:
+    """Return what scenes of a job may hold, effects of other distributions too. Raises BadInput for an unknown job."""
+    others = [point.name.removeprefix(f"{name}.") for point in _points(EFFECTS) if point.name.startswith(f"{name}.")]
+    return REGISTERED.schema(name, {}, others)
+
+
 def template(name: str) -> str:
     """Return the commented scene to start from. Raises BadInput for an unknown job, and one without a template."""
     place = find(name).resources / "template.toml"
