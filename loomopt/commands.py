@@ -94,22 +94,25 @@ def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lis
 def show(
     problem: Problem,
     equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
+    symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
+    sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
     figure: Annotated[Path | None, typer.Option(metavar="F", help="Draw the mechanism: .png, .svg or .pdf.")] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Show a scene as it was read; its equations; a drawing."""
-    from loomopt.views import layout, outputs, scene_view
+    """Show a scene as it was read; its equations, symbols, sources; a drawing."""
+    from loomopt.views import glossary, layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)
     if figure:
         outputs.picture(figure, scene, {})
         remark(f"Wrote {figure}")
-    if equations:
-        layout.show(*scene_view.equations(scene))
-    elif not figure:
-        layout.show(*scene_view.parts(scene))
+    shown: list[str | layout.Grid] = [*scene_view.equations(scene)] if equations else []
+    shown += glossary.parts(scene) if symbols else []
+    shown += glossary.printed(scene) if sources else []
+    if shown or not figure:
+        layout.show(*(shown or scene_view.parts(scene)))
 
 
 def evaluate(
