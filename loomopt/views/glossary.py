@@ -30,18 +30,28 @@ class Symbol(NamedTuple):
 
 def parts(scene: Scene) -> list[str | Grid]:
     """Return the tables of `loomopt show --symbols`; units are those of the scene's tables, of curves SI."""
-    schema, drawn = scene.schema, labels(scene)
-    words = Words(scene)
-    values = [each for effect in schema.effects.values() for each in _numbers(scene, effect.own, f"{effect.name}.")]
-    figures = [Symbol(each.name, words.unit(each.name), each.text) for each in schema.figures.values()]
-    tables = {
+    drawn = labels(scene)
+    grids = (_grid(title, symbols, drawn) for title, symbols in _tables(scene).items())
+    return [f"{scene.name}: {scene.schema.title}", *grids]
+
+
+def symbols(scene: Scene) -> list[Symbol]:
+    """Return every symbol; one that names a number of the scene and a figure too comes twice, the figure last."""
+    return [symbol for symbols in _tables(scene).values() for symbol in symbols]
+
+
+def _tables(scene: Scene) -> dict[str, list[Symbol]]:
+    """Return the symbols by what they are."""
+    schema, words = scene.schema, Words(scene)
+    return {
         "Operation": _numbers(scene, schema.operation),
         "Mechanism; what [bounds] frees of it is the design": _numbers(scene, schema.mechanism),
-        "Values of effects": values,
-        "Figures": figures,
+        "Values of effects": [
+            each for effect in schema.effects.values() for each in _numbers(scene, effect.own, f"{effect.name}.")
+        ],
         "Columns of the curves": list(columns(scene)),
+        "Figures": [Symbol(each.name, words.unit(each.name), each.text) for each in schema.figures.values()],
     }
-    return [f"{scene.name}: {schema.title}", *(_grid(title, symbols, drawn) for title, symbols in tables.items())]
 
 
 def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> Grid:
