@@ -29,7 +29,9 @@ WIDTH = "100"
 BLOCK = re.compile(r"^```console\n\$ loomopt (.*)\n((?:.*\n)*?)```$", re.MULTILINE)
 TABLE = re.compile(r"(<!-- symbols of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
 LEFT_OUT = "..."
-CHANGES = re.compile(r"\b\d+\.\d+ s\b|\b\d\.?\d*e-\d\d\b|\b\d+ boxes\b|Time: .*|Starts: .*")
+CHANGES = re.compile(
+    r"(?<=limits )\S+(?=, stat)|(?<=stationarity )[^,]+|(?<=cycle )[^;]+|\(\d+$|\b\d+\.\d+ s\b|Time: .*"
+)
 """What differs from run to run or from machine to machine: times, rounding, and how far a search came."""
 
 

@@ -14,6 +14,8 @@ from loomopt.units import DISPLAY_UNIT, SI_UNIT, UNITS, fits, show
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 QUANTITY = "x-quantity"
 _UNIT = r"(?:1/)?[^\s0-9.,+-][^\s,]*"
+_NEVER = (r"k?N(?:m|cm|mm)", "1/(?:s|ms|us|min|h)")
+"""Often written, and no unit of any quantity: torques without their *, and what says neither turns nor radians."""
 _NEGATIVE, _ZERO = r"^[ \t]*-[0-9.]*[1-9]", r"^[ \t]*[+-]?[0.]+(?:[eE][+-]?[0-9]+)?(?:[^0-9.eE].*)?$"
 _RATIO = rf"^[ \t]*{NUMBER}(?: */ *{NUMBER})?[ \t]*$"
 
@@ -50,7 +52,7 @@ def foreign(kind: str) -> str:
     """Return a pattern of units that are usual for other kinds of quantity and wrong for this one."""
     single = [re.escape(name) for name in UNITS if not fits(name, kind)]
     composed = {_usual(unit) for unit in SI_UNIT.values() if unit not in UNITS and unit != "1" and not fits(unit, kind)}
-    return "|".join([*single, *sorted(composed)])
+    return "|".join([*single, *sorted(composed), *_NEVER])
 
 
 def _usual(unit: str) -> str:

@@ -66,16 +66,17 @@ def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
     """Return design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
 
-    A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell.
+    A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.
     """
     from loomopt.table_frame import TableFrame
 
     words = Words(scene)
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
-        unit = words.si(name) if si else words.unit(name)
+        listed = name in scene.schema.lists
+        unit = words.si(name) if si or listed else words.unit(name)
         if value is not None:
-            cells[f"{name} [{unit}]"] = value if name in scene.schema.lists else value / factor(unit)
+            cells[f"{name} [{unit}]"] = value if listed else value / factor(unit)
     frame = TableFrame([cells])
     frame.attrs.update(provenance(scene, target=target))
     return frame

@@ -215,6 +215,6 @@ def _read(path: Path, origin: str) -> Scene:
     return build(read_document(path), REGISTERED, origin, Paths(path.parent.absolute()))
 
 
-def scene(document: Mapping[str, Any]) -> Scene:
+def scene(document: Mapping[str, object]) -> Scene:
     """Return the scene that nested tables describe, as a TOML file would. Raises BadInput."""
     return build(document, REGISTERED, "<dict>")
