@@ -51,12 +51,14 @@ def list_problems() -> None:
     from loomopt.views import layout, listing
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
-    if entry_points.of("loomopt.jobs"):  # what others bring is named by their own code, read whole
+    silent = [head.name for head in heads if not head.targets]
+    if silent or entry_points.of("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
         from loomopt.jobs import registry
 
-        others, faults = registry.brought_heads()
-        heads = sorted([*heads, *others])
-    layout.show(listing.grid(heads))
+        others, wrong = registry.brought()
+        read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
+        heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
+    layout.show(listing.grid(sorted(heads)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
@@ -101,7 +103,7 @@ def show(
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Show a scene as it was read; its equations, symbols, sources; a drawing."""
+    """Show a scene: as read, its equations, symbols, sources; draw it."""
     from loomopt.views import glossary, layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)

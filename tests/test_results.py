@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import loomopt as lo
 from loomopt.cli import run
+from loomopt.views.shown_figure import ShownFigure
 
 PNG = b"\x89PNG"
 
@@ -39,6 +40,7 @@ def tree(html):
 def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, tmp_path):
     figure = found.plot(tmp_path / "curves.svg")
     assert isinstance(figure, Figure)
+    assert isinstance(figure, ShownFigure)
     assert figure._repr_png_().startswith(PNG)
     assert figure.get_suptitle() == found.scene.title
     assert len(figure.axes) >= len(found.curves().columns) / 3

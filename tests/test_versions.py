@@ -1,6 +1,9 @@
 """The version line names what computes: the versions of CasADi and IPOPT are those that run."""
 
+import importlib.util
 import re
+import sys
+from typing import Any
 
 import casadi
 import pytest
@@ -11,7 +14,7 @@ from loomopt import cli, versions
 
 def test_the_line_names_the_casadi_and_the_ipopt_that_run(capfd):
     x = casadi.SX.sym("x")
-    options = {"print_time": False, "ipopt": {"sb": "yes", "print_level": 5, "max_iter": 0}}
+    options: dict[str, Any] = {"print_time": False, "ipopt": {"sb": "yes", "print_level": 5, "max_iter": 0}}
     casadi.nlpsol("s", "ipopt", {"x": x, "f": x**2}, options)(x0=1.0)
     banner = re.search(r"Ipopt version ([\d.]+\d)", capfd.readouterr().out)
     assert cli.run(["--version"]) == 0
@@ -25,8 +28,8 @@ def test_an_ipopt_that_does_not_tell_is_not_made_up(content, tmp_path, monkeypat
     header.parent.mkdir(parents=True)
     if content:
         header.write_text(content)
-    monkeypatch.setattr(versions.importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr(versions.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
     assert versions.ipopt() == versions.UNTOLD
     header.write_text('#define IPOPT_VERSION "3.14.1"\n')
     assert versions.ipopt() == "3.14.1"

@@ -7,7 +7,7 @@ not of this package, and where all are listed. What this package brings itself w
 import functools
 import importlib
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,18 +153,17 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     return found, tuple(faults)
 
 
-def brought_heads() -> tuple[list[packaged.Head], list[BadInput]]:
-    """Return what `loomopt list` tells of other distributions' scenes, and what is wrong with any of them."""
-    files, faults = brought()
-    heads, said = [], list(faults)
-    for name in files.keys() - packaged.problems().keys():
+def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
+    """Return what `loomopt list` tells of scenes that are read whole, and what is wrong with any of them."""
+    found, faults = [], []
+    for name in names:
         try:
             scene = load(name)
         except BadInput as error:
-            said.append(error)
+            faults.append(error)
         else:
-            heads.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
-    return heads, said
+            found.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
+    return found, faults
 
 
 def problems() -> dict[str, Path]:

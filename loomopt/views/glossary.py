@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from loomopt.effects.kinds import Check, Load
 from loomopt.jobs import registry, sources
+from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import split
 from loomopt.picture.shapes import Text
 from loomopt.quantities import quantity_of
@@ -85,9 +86,9 @@ def columns(scene: Scene) -> Iterator[Symbol]:
         yield Symbol(name, unit, said.get(name) or _derivative(name))
 
 
-def _called(views: Any) -> Mapping[str, str]:
+def _called(views: JobViews) -> Mapping[str, str]:
     """Return what a job calls the columns of its own."""
-    words = views.words() if hasattr(views, "words") else {}
+    words: Mapping[str, Any] = getattr(views, "words", dict)()
     return {name: curve.name for name, curve in words.items()}
 
 

@@ -102,8 +102,8 @@ def _limits(schema: SceneSchema) -> Json:
 
 def _given(key: str, effect: str) -> Json:
     """Return the rule that a key is given; effect: where that is on, always without one."""
-    parts = key.split(".", 1)
-    then = {"required": parts[:1], "properties": {parts[0]: {"required": parts[1:]}}}
+    table = next(table for table in TABLES if key.startswith(f"{table}."))
+    then = {"required": [table], "properties": {table: {"required": [key.removeprefix(f"{table}.")]}}}
     if not effect:
         return then
     return {"if": {"required": ["effects"], "properties": {"effects": {"required": [effect]}}}, "then": then}
@@ -126,17 +126,24 @@ def _quantity(quantity: Quantity) -> Json:
 
 def _model(model: type[Table], summary: str = "") -> Json:
     """Return a table by its model; summary: what it is, in the words of its job."""
-    found: Json = _without_null(model.model_json_schema())
+    found = _without_null(model.model_json_schema())
     return found | ({"description": summary} if summary else {})
 
 
-def _without_null(part: Any) -> Any:
+def _each(part: Json, change: Callable[[Json], Json]) -> Json:
+    """Return a schema with all schemas inside it changed."""
+
+    def inner(value: object) -> object:
+        if isinstance(value, list):
+            return [inner(each) for each in value]
+        return change(value) if isinstance(value, dict) else value
+
+    return {key: inner(value) for key, value in part.items()}
+
+
+def _without_null(part: Json) -> Json:
     """Return a part of a schema without null, which no scene can say: a key is there or it is not."""
-    if isinstance(part, list):
-        return [_without_null(each) for each in part]
-    if not isinstance(part, dict):
-        return part
-    found = {key: _without_null(value) for key, value in part.items() if key != "default" or value is not None}
+    found = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
     if "anyOf" in found:
         rest = [each for each in found.pop("anyOf") if each != {"type": "null"}]
         found = {**rest[0], **found} if len(rest) == 1 else {**found, "anyOf": rest}
@@ -147,17 +154,12 @@ def _hoisted(whole: Json) -> Json:
     """Return a schema in which each kind of quantity stands once, under $defs; a place keeps its own description."""
     kinds: dict[str, Json] = {}
 
-    def hoist(part: Any) -> Any:
-        if isinstance(part, list):
-            return [hoist(each) for each in part]
-        if not isinstance(part, dict):
-            return part
+    def hoist(part: Json) -> Json:
         if QUANTITY not in part:
-            return {key: hoist(value) for key, value in part.items()}
-        own = {key: part[key] for key in ("description", "default") if key in part}
+            return _each(part, hoist)
+        own: Json = {key: part[key] for key in ("description", "default") if key in part}
         name = re.sub(r"\W+", "_", part[QUANTITY])
         kinds.setdefault(name, {key: value for key, value in part.items() if key not in (QUANTITY, "title", *own)})
         return {"$ref": f"#/$defs/{name}", **own}
 
-    found: Json = hoist(whole)
-    return {**found, "$defs": kinds}
+    return {**hoist(whole), "$defs": kinds}

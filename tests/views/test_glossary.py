@@ -25,16 +25,14 @@ def symbols(scene):
 def test_every_number_word_and_figure_is_told_with_its_unit(job):
     scene = lo.load(job)
     told, schema = symbols(scene), scene.schema
-    models = {"": (schema.operation, schema.mechanism)}
-    models |= {f"{effect.name}.": (effect.own,) for effect in schema.effects.values()}
-    for path, owns in models.items():
-        for own in owns:
-            for name in own.model_fields:
-                quantity = quantity_of(own, name)
-                assert told[path + name, scene.shown_in(quantity.kind) if quantity else "1"]
+    models = [("", schema.operation), ("", schema.mechanism)]
+    models += [(f"{effect.name}.", effect.own) for effect in schema.effects.values()]
+    for path, own in models:
+        for name in own.model_fields:
+            quantity = quantity_of(own, name)
+            assert told[path + name, scene.shown_in(quantity.kind) if quantity else "1"]
     assert {figure.name for figure in schema.figures.values()} <= {name for name, _ in told}
-    own = {name: text for (name, _), text in told.items() if f"[{name}]" not in text}
-    assert all(re.fullmatch(r"[^\n]{5,110}", text) for name, text in own.items() if name in schema.figures)
+    assert all(5 <= len(text) <= 110 for (name, _), text in told.items() if name in schema.figures)
 
 
 @pytest.mark.parametrize("job", JOBS)
@@ -42,7 +40,7 @@ def test_every_row_of_an_answers_table_and_every_column_of_its_curves_is_told(jo
     scene = lo.load(job)
     names = {name for name, _ in symbols(scene)}
     assert set(lo.evaluate(scene).table().index) <= names
-    columns = {(split(column)[0], split(column)[1]) for column in lo.simulate(scene, accuracy=1e-2)}
+    columns = {split(str(column)) for column in lo.simulate(scene, accuracy=1e-2)}
     told = {(each.name, each.unit): each.text for each in glossary.columns(scene)}
     assert set(told) == columns
     silent = {name for (name, _), text in told.items() if not text}
@@ -94,7 +92,7 @@ def test_sources_name_every_printed_figure_with_the_verdict_and_why(job, capsys,
 
 def test_a_job_without_sources_says_so(monkeypatch, capsys):
     job = registry.find("beatup")
-    monkeypatch.setattr(type(job), "resources", property(lambda self: sources.registry.HERE))
+    monkeypatch.setattr(type(job), "resources", property(lambda self: registry.HERE))
     assert run(["show", "beatup", "--sources"]) == 2
     out, err = capsys.readouterr()
     assert out == ""

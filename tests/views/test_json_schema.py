@@ -4,6 +4,7 @@ import functools
 import json
 import re
 import tomllib
+from typing import Any
 
 import inch
 import json_walk
@@ -67,7 +68,7 @@ def test_every_packaged_scene_and_template_is_valid(name):
     assert judged(json.loads(json.dumps(ALL[name])))
 
 
-GOOD = {
+GOOD: dict[str, list[Any]] = {
     "mechanism.l1": ["0.5 mm", "1e-2 m", "1.22 in", "  31mm ", "0.000154 furlong", "31 mm^2/mm"],
     "operation.speed": ["600 turn/min", "62.8 rad/s", "3600 deg/s"],
     "operation.M0": ["745 N·m", "6594 lbf*in", "0.745 kN*m", "+7.45e2 N*m", "0 N*m", "745 J"],
@@ -77,7 +78,7 @@ GOOD = {
     "targets.retrofit.weights": [{"l1": 1, "l2": "3/2", "l3": 0.5}],
     "problem.name": ["müller-2"],
 }
-BAD = {
+BAD: dict[str, list[Any]] = {
     "mechanism.l1": ["31", 31, "31 kg", "31 N*m", "31 N/m", "-31 mm", "0 mm", "0e5 mm", "31,5 mm", "mm", "", None, {}],
     "mechanism.l5": ["31 mm"],
     "mechanism.m4e": ["-1 kg", "1 lbf"],
