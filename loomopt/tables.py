@@ -70,13 +70,13 @@ def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bo
     """
     from loomopt.table_frame import TableFrame
 
-    words = Words(scene)
+    words, shown = Words(scene), {} if si else {each["name"]: each["design"] for each in rows(solution, scene)}
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
         listed = name in scene.schema.lists
         unit = words.si(name) if si or listed else words.unit(name)
         if value is not None:
-            cells[f"{name} [{unit}]"] = value if listed else value / factor(unit)
+            cells[f"{name} [{unit}]"] = shown[name] if name in shown else value if listed else value / factor(unit)
     frame = TableFrame([cells])
     frame.attrs.update(provenance(scene, target=target))
     return frame

@@ -124,6 +124,7 @@ def printed(scene: Scene) -> list[str | Grid]:
     why = tuple((each.key, each.item, each.inputs, each.remark) for each in source.figures)
     return [
         source.citation,
+        "The suite computes every one of these figures again.",
         Grid("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
         Grid("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
     ]

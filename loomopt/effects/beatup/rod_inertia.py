@@ -20,8 +20,8 @@ class Own(Table):
     """Values of the rod."""
 
     m2: PositiveMass = Field(description="mass of the connecting rod BC")
-    s2: Length = Field(description="its centre of mass from the crank pin B")
-    JS2: PositiveInertia | None = Field(None, description="its inertia about its centre of mass, for the exact model")
+    s2: Length = Field(description="centre of mass of the rod from the crank pin B")
+    JS2: PositiveInertia | None = Field(None, description="inertia of the rod about its centre of mass; exact only")
     model: Literal["lumped", "exact"] = Field("lumped", description="two point masses, or the rigid rod itself")
 
     @field_validator("model")

@@ -30,9 +30,9 @@ class Mechanism(Table):
     l3: PositiveLength = Field(description="rocker DC, the sley")
     l4: PositiveLength = Field(description="frame AD, between main shaft and rocking shaft")
     m4e: Mass = Field(0.0, description="mass of the counterweight")
-    r4e: Length = Field(0.0, description="its distance from the rocking shaft D, opposite the reed")
+    r4e: Length = Field(0.0, description="distance of the counterweight from the rocking shaft D")
     m4: PositiveMass | None = Field(None, description="mass of the reed system without counterweight")
-    r4: Length | None = Field(None, description="its centre of mass from the rocking shaft D")
+    r4: Length | None = Field(None, description="centre of mass of the reed system from the rocking shaft D")
 
 
 class TargetTable(Table):

@@ -24,10 +24,12 @@ class Operation(Table):
     """What the drive must do."""
 
     speed: Speed | None = Field(None, description="speed of the main shaft")
-    stroke: PositiveLength | None = Field(None, description="travel of the head")
+    stroke: PositiveLength | None = Field(None, description="travel S of the head, the largest")
     s_dwell: PositiveLength | None = Field(None, description="head travel that counts as standing still")
-    dwell_after: DwellAngle | None = Field(None, description="crank angle after front dead centre without the head")
-    dwell_before: DwellAngle | None = Field(None, description="the same before front dead centre")
+    dwell_after: DwellAngle | None = Field(
+        None, description="crank angle after front dead centre that S stays within s_dwell"
+    )
+    dwell_before: DwellAngle | None = Field(None, description="crank angle before it that S stays within s_dwell")
 
 
 class Mechanism(Table):
@@ -39,15 +41,15 @@ class Mechanism(Table):
     l71: PositiveLength = Field(description="frame A0 B0, between main shaft and rocking shaft")
     phi30: Angle = Field(description="angle of the sley at front dead centre")
     l3p: PositiveLength = Field(description="arm B0 B2 of the sley, which carries link 6")
-    alpha: Angle = Field(description="angle of that arm from the sley")
+    alpha: Angle = Field(description="angle of the arm B0 B2 from the sley")
     l4: PositiveLength = Field(description="second crank C0 C, at twice the main shaft's speed")
     l5: PositiveLength = Field(description="link 5, C D")
     l6: PositiveLength = Field(description="driving link B2 D")
     C0x: Coordinate = Field(description="second shaft C0 from the rocking shaft B0, along x")
-    C0y: Coordinate = Field(description="the same along y")
+    C0y: Coordinate = Field(description="second shaft C0 from the rocking shaft B0, along y")
     phi40: Angle = Field(description="angle of the second crank at front dead centre")
     i1: PositiveNumber = Field(description="gear ratio from driving link to tape wheel, first stage")
-    i2: PositiveNumber = Field(1.0, description="gear ratio, second stage")
+    i2: PositiveNumber = Field(1.0, description="gear ratio from driving link to tape wheel, second stage")
     wheel: PositiveLength = Field(description="diameter of the tape wheel")
 
 
