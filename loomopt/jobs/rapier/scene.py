@@ -26,10 +26,8 @@ class Operation(Table):
     speed: Speed | None = Field(None, description="speed of the main shaft")
     stroke: PositiveLength | None = Field(None, description="travel S of the head, the largest")
     s_dwell: PositiveLength | None = Field(None, description="head travel that counts as standing still")
-    dwell_after: DwellAngle | None = Field(
-        None, description="crank angle after front dead centre that S stays within s_dwell"
-    )
-    dwell_before: DwellAngle | None = Field(None, description="crank angle before it that S stays within s_dwell")
+    dwell_after: DwellAngle | None = Field(None, description="angle after front dead centre within s_dwell")
+    dwell_before: DwellAngle | None = Field(None, description="angle before front dead centre within s_dwell")
 
 
 class Mechanism(Table):
