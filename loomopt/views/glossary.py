@@ -17,6 +17,8 @@ from loomopt.views.layout import Grid
 ORDINALS = ("first", "second", "third")
 GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "mu": "μ"}
 """Letters that drawings write as such."""
+SHARED = {"phi": "angle of the shaft", "motor_power": "crank torque times the speed of the shaft"}
+"""Columns that every job's curves may have."""
 DRAWN = "x"
 """What marks a symbol that the sketch shows."""
 
@@ -80,7 +82,7 @@ def columns(scene: Scene) -> Iterator[Symbol]:
     for check in scene.active:
         if isinstance(check, Check):
             said |= {name: f"at each angle; its peak is the figure {name}" for name in check.quantities}
-    said |= _called(job.views)
+    said |= _called(job.views) | SHARED
     for column in job.curves(scene, job.today(scene), steps=4):
         name, unit = split(column)
         yield Symbol(name, unit, said.get(name) or _derivative(name))
@@ -89,13 +91,11 @@ def columns(scene: Scene) -> Iterator[Symbol]:
 def _called(views: JobViews) -> Mapping[str, str]:
     """Return what a job calls the columns of its own."""
     words: Mapping[str, Any] = getattr(views, "words", dict)()
-    return {name: curve.name for name, curve in words.items()}
+    return {name: curve.name for name, curve in words.items() if curve.name}
 
 
 def _derivative(name: str) -> str:
     """Return what a column says that is a derivative of another one, by its name; "" for any other."""
-    if name == "phi":
-        return "angle of the shaft"
     base, _, order = name.rpartition("_")
     if base and order in ("1", "2", "3"):
         return f"{ORDINALS[int(order) - 1]} derivative of {base} with respect to the angle phi"

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 
 from loomopt.effects.kinds import UNBUILT, Effect
 from loomopt.quantities import Quantity, quantity_of
-from loomopt.quantity_patterns import QUANTITY
+from loomopt.quantity_patterns import QUANTITY, foreign
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Problem
 from loomopt.scenes import TABLES
@@ -44,11 +44,13 @@ def scene(schema: SceneSchema) -> Json:
 
 def display(schema: SceneSchema) -> Json:
     """Return [display]: the kinds of quantity, each with a unit."""
-    keys = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT}
-    del keys["number"]
-    return _closed(
-        {key: {"type": "string", "description": f'unit such as "{DISPLAY_UNIT[of]}"'} for key, of in keys.items()}
-    )
+    kinds = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT}
+    return _closed({key: _unit(kind) for key, kind in kinds.items() if kind != "number"})
+
+
+def _unit(kind: str) -> Json:
+    said = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+    return {"type": "string", "description": said, "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
 
 
 def _problem(schema: SceneSchema) -> Json:

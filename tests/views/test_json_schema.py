@@ -146,6 +146,14 @@ def test_the_schema_speaks_of_every_table_and_describes_every_number(job):
     assert "null" not in text
 
 
+def test_display_takes_one_unit_of_each_kind():
+    found = json_schema.display(registry.declared("beatup"))
+    right = {"length": "in", "speed": "rpm", "stiffness": "lbf/in", "rotary_damping": "N*m*s/rad"}
+    assert json_walk.valid(found, right)
+    for wrong in ({"length": "kg"}, {"length": 1}, {"lenght": "in"}, {"stiffness": "N*m"}, {"angular_speed": "rpm"}):
+        assert not json_walk.valid(found, wrong)
+
+
 def test_the_command_prints_it_and_an_unknown_job_is_refused(capsys):
     assert run(["schema", "rapier"]) == 0
     assert json.loads(capsys.readouterr().out) == of("rapier")
