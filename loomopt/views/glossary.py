@@ -88,7 +88,7 @@ def columns(scene: Scene) -> Iterator[Symbol]:
         yield Symbol(name, unit, said.get(name) or _derivative(name))
 
 
-def _called(views: JobViews) -> Mapping[str, str]:
+def _called(views: JobViews) -> dict[str, str]:
     """Return what a job calls the columns of its own."""
     words: Mapping[str, Any] = getattr(views, "words", dict)()
     return {name: curve.name for name, curve in words.items() if curve.name}
