@@ -12,6 +12,7 @@ from loomopt.quantities import quantity_of
 from loomopt.scenes import Scene
 from loomopt.schema import Table
 from loomopt.solving.words import Words
+from loomopt.units import SI_UNIT
 from loomopt.views.layout import Grid
 
 ORDINALS = ("first", "second", "third")
@@ -19,6 +20,10 @@ GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "
 """Letters that drawings write as such."""
 SHARED = {"phi": "angle of the shaft", "motor_power": "crank torque times the speed of the shaft"}
 """Columns that every job's curves may have."""
+KINDS = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"}
+"""SI unit → kind of quantity."""
+WORD = 4
+"""Letters from which on a name is a word, and no symbol."""
 DRAWN = "x"
 """What marks a symbol that the sketch shows."""
 
@@ -82,16 +87,19 @@ def columns(scene: Scene) -> Iterator[Symbol]:
     for check in scene.active:
         if isinstance(check, Check):
             said |= {name: f"at each angle; its peak is the figure {name}" for name in check.quantities}
-    said |= _called(job.views) | SHARED
+    said |= SHARED
     for column in job.curves(scene, job.today(scene), steps=4):
         name, unit = split(column)
-        yield Symbol(name, unit, said.get(name) or _derivative(name))
+        yield Symbol(name, unit, said.get(name) or _called(job.views, name, unit) or _derivative(name))
 
 
-def _called(views: JobViews) -> dict[str, str]:
-    """Return what a job calls the columns of its own."""
+def _called(views: JobViews, name: str, unit: str) -> str:
+    """Return what a job calls a column of its own; one of several of a kind by that kind too; "" where it does not."""
     words: Mapping[str, Any] = getattr(views, "words", dict)()
-    return {name: curve.name for name, curve in words.items() if curve.name}
+    curve = words.get(name)
+    if not (curve and curve.name):
+        return name.replace("_", " ") if all(len(part) >= WORD for part in name.split("_")) else ""
+    return f"{KINDS[unit]} of {curve.name}" if curve.panel and unit in KINDS else str(curve.name)
 
 
 def _derivative(name: str) -> str:
