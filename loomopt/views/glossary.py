@@ -22,8 +22,8 @@ SHARED = {"phi": "angle of the shaft", "motor_power": "crank torque times the sp
 """Columns that every job's curves may have."""
 KINDS = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"}
 """SI unit → kind of quantity."""
-WORD = 4
-"""Letters from which on a name is a word, and no symbol."""
+LONGEST_SYMBOL = 5
+"""Letters beyond which a name is made of words."""
 DRAWN = "x"
 """What marks a symbol that the sketch shows."""
 
@@ -98,7 +98,7 @@ def _called(views: JobViews, name: str, unit: str) -> str:
     words: Mapping[str, Any] = getattr(views, "words", dict)()
     curve = words.get(name)
     if not (curve and curve.name):
-        return name.replace("_", " ") if all(len(part) >= WORD for part in name.split("_")) else ""
+        return name.replace("_", " ") if len(name) > LONGEST_SYMBOL else ""
     return f"{KINDS[unit]} of {curve.name}" if curve.panel and unit in KINDS else str(curve.name)
 
 
