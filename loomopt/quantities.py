@@ -11,9 +11,11 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, GetCoreSchemaHandler
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from loomopt.quantity_patterns import NUMBER as _NUMBER
+from loomopt.quantity_patterns import schema
 from loomopt.tolerances import NARROWEST
 from loomopt.units import DISPLAY_UNIT as DISPLAY_UNIT
 from loomopt.units import SI_UNIT as SI_UNIT
@@ -29,7 +31,6 @@ _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque"
 _LONGEST_TEXT = 100
 _MOST_DIGITS, _MOST_ZEROS = 20, 16
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(_NUMBER)
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
@@ -219,6 +220,12 @@ class Quantity(NamedTuple):
         """Let pydantic read a field of this type by `validate`."""
         return core_schema.no_info_plain_validator_function(self.validate)
 
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return what an editor may check of it."""
+        kind, least, above, below = self
+        said = f"{described(kind)}, {self.range}" if self.range else described(kind)
+        return schema(kind, least, above, below, said)
+
 
 class NumberList(NamedTuple):
     """A list of pure numbers, as in TOML or as JSON text; at most `longest` of them."""
@@ -237,6 +244,10 @@ class NumberList(NamedTuple):
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Let pydantic read a field of this type by `validate`."""
         return core_schema.no_info_plain_validator_function(self.validate)
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return what an editor may check of it."""
+        return {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": self.longest}
 
 
 def _parsed(text: str) -> object:

@@ -15,6 +15,7 @@ from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Table
+from loomopt.showing import Shown
 from loomopt.units import DISPLAY_UNIT, fits
 
 _Own = TypeVar("_Own", bound=Table)
@@ -35,8 +36,8 @@ class Jobs(Protocol):
         """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Shown):
     """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
 
     document: the raw tables, never to be changed; origin: the file they came from; schema: what its job declares.
@@ -46,22 +47,22 @@ class Scene:
     paths: where the files lie that it names.
     """
 
-    document: Mapping[str, Any] = field(repr=False)
+    document: Mapping[str, Any]
     origin: str
-    schema: SceneSchema = field(repr=False)
-    jobs: Jobs = field(repr=False, compare=False)
+    schema: SceneSchema
+    jobs: Jobs = field(compare=False)
     name: str
     title: str
-    source: str = field(repr=False)
+    source: str
     operation: Mapping[str, float]
     mechanism: Mapping[str, float]
-    tables: Mapping[str, Table] = field(repr=False)
+    tables: Mapping[str, Table]
     effects: Mapping[str, Table]
-    active: tuple[Effect, ...] = field(repr=False)
+    active: tuple[Effect, ...]
     bounds: Mapping[str, Bound]
     limits: Mapping[str, Limit]
-    targets: Mapping[str, Table] = field(repr=False)
-    paths: Paths = field(repr=False, compare=False)
+    targets: Mapping[str, Table]
+    paths: Paths = field(compare=False)
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -70,6 +71,10 @@ class Scene:
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths]]:
         """Return how to make it again: from its tables, for formulas do not pickle."""
         return build, (self.document, self.jobs, self.origin, self.paths)
+
+    def __repr__(self) -> str:
+        on = ", ".join(self.effects) or "none"
+        return f"<Scene {self.name}: {self.title} (job {self.job}; effects {on})>"
 
     @property
     def job(self) -> str:

@@ -63,6 +63,25 @@ def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
+def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
+    """Return design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
+
+    A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.
+    """
+    from loomopt.table_frame import TableFrame
+
+    words, shown = Words(scene), {} if si else {each["name"]: each["design"] for each in rows(solution, scene)}
+    cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
+    for name, value in {**solution.design, **solution.figures}.items():
+        listed = name in scene.schema.lists
+        unit = words.si(name) if si or listed else words.unit(name)
+        if value is not None:
+            cells[f"{name} [{unit}]"] = shown[name] if name in shown else value if listed else value / factor(unit)
+    frame = TableFrame([cells])
+    frame.attrs.update(provenance(scene, target=target))
+    return frame
+
+
 def curves(
     scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
 ) -> "pd.DataFrame":

@@ -17,14 +17,15 @@ JOBS = registry.own_names()
 
 ROOMS = (
     "jets boxes box_series tracing",
-    "maths errors frozen interrupts tolerances lazy",
+    "maths errors frozen interrupts tolerances lazy showing",
     "units",
+    "quantity_patterns",
     "quantities",
     "schema files",
     "mechanisms",
     "effects",
     "scene_errors owned scene_schema",
-    "scene_document scene_paths scene_tables packaged",
+    "scene_document scene_paths scene_tables packaged entry_points",
     "scenes balance cycle",
     "designs answers",
     "scene_csv provenance",
@@ -36,7 +37,8 @@ ROOMS = (
     "tables table_frame",
     "studies",
     "views",
-    "api shell commands cli __main__",
+    "results",
+    "api shell commands cli versions __main__",
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}

@@ -19,6 +19,7 @@ from loomopt.jobs.base import Job
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
+from loomopt.showing import Shown
 from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
@@ -56,9 +57,9 @@ class Proof:
         return {name: value for name, value in vars(self).items() if name != "kind"}
 
 
-@dataclass(frozen=True)
-class Proofs:
-    """All proofs of one design."""
+@dataclass(frozen=True, repr=False)
+class Proofs(Shown):
+    """All proofs of one design; in Jupyter they show themselves as a table."""
 
     problem: str
     target: str
@@ -68,6 +69,15 @@ class Proofs:
     def passed(self) -> bool:
         """Whether everything is proven."""
         return all(proof.status == "proven" for proof in self.proofs)
+
+    @property
+    def said(self) -> str:
+        """What came of them, in one sentence."""
+        missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
+        return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
+
+    def __repr__(self) -> str:
+        return f"<Proofs {self.problem}, {self.target}: {self.said}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `prove --json` prints."""

@@ -68,21 +68,22 @@ def draw(drawing: Drawing, path: Path) -> None:
 
 def curves(
     frame: "pd.DataFrame",
-    path: Path,
+    path: Path | None,
     title: str,
     marks: Mapping[str, float] | None = None,
     panels: Sequence[Panel] = (),
     today: tuple["pd.DataFrame", Sequence[Panel]] | None = None,
     angle: str = "crank angle",
-) -> None:
-    """Write small diagrams over `phi [rad]` as PNG, PDF or SVG; angles are shown in degrees.
+) -> Any:
+    """Return small diagrams over `phi [rad]`, angles in degrees; written as PNG, PDF or SVG where there is a path.
 
     marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
     is shaded. panels: what to show, one panel per column with its unit without them. today: curves and panels of
     today's machine, drawn beside where a panel asks for it. angle: what phi is.
     Raises BadInput as `draw` does, and ValueError where there is no column.
     """
-    files.suffix(path, SUFFIXES)
+    if path:
+        files.suffix(path, SUFFIXES)
     panels = panels or each(frame.columns)
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
@@ -98,6 +99,14 @@ def curves(
             _mark(axes, marks or {}, named=first)
             axes.tick_params(labelbottom=last)
         figure.supxlabel(f"{angle} phi [deg]", fontsize=9)
+    if path:
+        save(figure, path)
+    return figure
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write a figure as PNG, PDF or SVG, by the path's ending, whatever the user's settings."""
+    with _own_style():
         _save(figure, path)
 
 
@@ -302,9 +311,10 @@ def _own_style(*texts: str) -> Iterator[None]:
 def _figure(width: float, height: float) -> Any:
     """Return an empty figure, inches, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), facecolor="white")
+    from loomopt.views.shown_figure import ShownFigure
+
+    figure = ShownFigure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 

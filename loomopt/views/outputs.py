@@ -19,6 +19,7 @@ from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from loomopt.picture.shapes import Drawing
 
@@ -132,11 +133,25 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     elif ending == ".parquet":
         atomically(path, frame.to_parquet)
     else:
-        atomically(path, functools.partial(_figure, frame, scene, flat(design)))
+        from loomopt.views import figure
+
+        atomically(path, functools.partial(figure.save, _figure(frame, scene, flat(design))))
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path) -> None:
-    """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
+def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
+    """Return a design's curves as a figure; path: a file to write it to as well. Raises BadInput."""
+    from loomopt.views import figure
+
+    if path:
+        suffix(path, PICTURES)
+    drawn = _figure(tables.curves(scene, design, target=target), scene, flat(design))
+    if path:
+        atomically(path, functools.partial(figure.save, drawn))
+    return drawn
+
+
+def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float]) -> "Figure":
+    """Return curves drawn with what the job marks and groups; today's beside a design's where it asks for them."""
     from loomopt.views import figure
 
     job, view = registry.of(scene), registry.of(scene).views
@@ -146,7 +161,8 @@ def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], pl
         before = tables.curves(scene, {})
         today = before, view.panels(scene, {}, tuple(before.columns))
     marks = view.marks(scene, {**job.today(scene), **design})
-    figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    drawn: Figure = figure.curves(frame, None, scene.title, marks, panels, today, view.angle)
+    return drawn
 
 
 def what(found: Evaluation) -> str:

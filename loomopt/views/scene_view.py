@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,18 +16,6 @@ from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""
-
-
-def listing(scenes: Iterable[Scene]) -> Grid:
-    """Return the packaged scenes: title, targets, source."""
-    lines: list[tuple[str, str]] = []
-    for scene in scenes:
-        lines += [
-            (scene.name, scene.title),
-            ("", f"job {scene.job}; targets {', '.join(scene.schema.targets)}"),
-            ("", f"source: {scene.source or 'not given'}"),
-        ]
-    return Grid("", ("problem", "what it is"), tuple(lines))
 
 
 def parts(scene: Scene) -> list[str | Grid]:

@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Axis, Check, Demand
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
@@ -25,30 +27,24 @@ OPENED = "coils are drawn open at the top"
 
 
 class Own(Table):
-    """springs: how many share K1; wire, diameter (mean), m, turns (active), initial_tension (N): one of them.
+    """The coils of one return spring, their steel, and what they must keep."""
 
-    shear_modulus, elasticity, Pa, density, kg/m³: its steel; strength: of 1 mm wire, Pa, falls as d^−strength_exponent.
-    shear_share, bending_share: shares of the strength that body and hooks may carry; spring_length: space inside the
-    hooks with the shed fully open, m; surge_ratio: least surge frequency over the cam's; hook_factor: bend radius of
-    the hooks over half the coil diameter; sizes: whether a free wire is one of the preferred sizes, or any.
-    """
-
-    springs: PositiveNumber = 2.0
-    wire: PositiveLength
-    diameter: PositiveLength
-    turns: PositiveNumber
-    initial_tension: Force
-    shear_modulus: PositivePressure
-    elasticity: PositivePressure
-    density: PositiveDensity
-    strength: PositivePressure
-    strength_exponent: PureNumber
-    shear_share: PositiveNumber
-    bending_share: PositiveNumber
-    spring_length: PositiveLength
-    surge_ratio: PositiveNumber = 13.0
-    hook_factor: PositiveNumber = 1.0
-    sizes: Literal["preferred", "any"] = "preferred"
+    springs: PositiveNumber = Field(2.0, description="how many springs share K1")
+    wire: PositiveLength = Field(description="diameter of the wire")
+    diameter: PositiveLength = Field(description="mean diameter of the coil")
+    turns: PositiveNumber = Field(description="active turns")
+    initial_tension: Force = Field(description="force at which the turns begin to part")
+    shear_modulus: PositivePressure = Field(description="shear modulus of the steel")
+    elasticity: PositivePressure = Field(description="modulus of elasticity of the steel")
+    density: PositiveDensity = Field(description="density of the steel")
+    strength: PositivePressure = Field(description="tensile strength of wire of 1 mm")
+    strength_exponent: PureNumber = Field(description="exponent with which the strength falls as the wire grows")
+    shear_share: PositiveNumber = Field(description="share of the strength that shear in the body may take")
+    bending_share: PositiveNumber = Field(description="share of the strength that bending of the hooks may take")
+    spring_length: PositiveLength = Field(description="space inside the hooks with the shed fully open")
+    surge_ratio: PositiveNumber = Field(13.0, description="least surge frequency over that of the cam")
+    hook_factor: PositiveNumber = Field(1.0, description="bend radius of the hooks over half the coil's diameter")
+    sizes: Literal["preferred", "any"] = Field("preferred", description="a free wire's: those that are sold, or any")
 
 
 def coil(own: Values) -> Coil:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
 from loomopt import scene_csv
 from loomopt.effects import found
@@ -51,70 +51,68 @@ LAW = Literal[
 
 
 class Operation(Table):
-    """speed: cam shaft, rad/s; N_min: least cam force that counts as contact, N."""
+    """What the motion must do."""
 
-    speed: Speed | None = None
-    N_min: Force = 0.0
+    speed: Speed | None = Field(None, description="speed of the cam shaft")
+    N_min: Force = Field(0.0, description="least cam force that counts as contact")
 
 
 class Frame(Table):
-    """The heald frame and its cam today, m and rad.
+    """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
-    travel: of the frame; law: of the rise, and mirrored of the return; law_coefficients: s'' of a spline law at evenly
-    spaced knots; law_table: CSV of a tabulated law. rise, far_dwell, near_dwell (and return): cam angles, a whole turn
-    together. arm, centre_distance, base_radius (of the roller's centre), roller_radius, arm_swing: the follower.
-    K1, X0: return spring, N/m, of both springs together, and its elongation with the shed open upward.
-    """
-
-    travel: Length
-    law: LAW = "cycloidal"
-    law_coefficients: Numbers | None = None
-    law_table: str | None = None
-    rise: SegmentAngle
-    far_dwell: SegmentAngle
-    near_dwell: SegmentAngle
-    base_radius: PositiveLength | None = None
-    arm: PositiveLength | None = None
-    centre_distance: PositiveLength | None = None
-    roller_radius: PositiveLength | None = None
-    arm_swing: Angle | None = None
-    K1: Stiffness
-    X0: Length
+    travel: Length = Field(description="travel of the heald frame")
+    law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
+    law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
+    law_table: str | None = Field(None, description="CSV file of a tabulated law")
+    rise: SegmentAngle = Field(description="cam angle of the rise")
+    far_dwell: SegmentAngle = Field(description="cam angle with the shed open downward")
+    near_dwell: SegmentAngle = Field(description="cam angle with the shed open upward")
+    base_radius: PositiveLength | None = Field(None, description="base circle of the roller's centre B, about A")
+    arm: PositiveLength | None = Field(None, description="arm CB of the follower")
+    centre_distance: PositiveLength | None = Field(None, description="from the cam shaft A to the arm's pivot C")
+    roller_radius: PositiveLength | None = Field(None, description="radius of the roller")
+    arm_swing: Angle | None = Field(None, description="angle through which the arm swings")
+    K1: Stiffness = Field(description="stiffness of the return spring, both springs together")
+    X0: Length = Field(description="elongation of the return spring with the shed open upward")
 
 
 # `return` is a word of the language: no field of a class can be written so.
-Mechanism: type[Table] = create_model("Mechanism", __base__=Frame, **{"return": (SegmentAngle, ...)})  # type: ignore[call-overload]
+RETURNED = {"return": (SegmentAngle, Field(description="cam angle of the return"))}
+Mechanism: type[Table] = create_model("Mechanism", __base__=Frame, **RETURNED)  # type: ignore[call-overload]
 
 
 class TargetTable(Table):
-    """expected: figures the target is known to reach, SI; shown, never used to solve."""
+    """What every target's table may hold."""
 
-    expected: dict[str, Any] | None = None
+    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class LawTarget(TargetTable):
-    """intervals: of the spline; symmetric: whether s(u) + s(1 − u) = 1 is asked; acceleration: largest |s''|."""
+    """Values of the target law."""
 
-    intervals: int = 16
-    symmetric: bool = False
-    acceleration: PositiveNumber = CYCLOID
+    intervals: int = Field(16, description="intervals of the spline")
+    symmetric: bool = Field(False, description="whether s(u) + s(1 − u) = 1 is asked")
+    acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
+
+SAID = {name: field.description or "" for own in (Operation, Frame) for name, field in own.model_fields.items()}
+"""What figures are that are numbers of the scene too."""
 
 VARIABLES = {"K1": "stiffness", "X0": "length"}
 
 FIGURES = {
     figure.name: figure
     for figure in (
-        Figure("K1", "stiffness", "return spring, both springs together", sides=()),
-        Figure("X0", "length", "its elongation with the shed open upward", sides=()),
+        Figure("K1", "stiffness", SAID["K1"], sides=()),
+        Figure("X0", "length", SAID["X0"], sides=()),
         Figure("contact_min", "force", "least cam force over the cycle", sides=("min",)),
         Figure("contact_angle", "angle", "cam angle where it is least", sides=()),
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
         Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=()),
-        Figure("speed", "angular speed", "cam shaft speed", sides=()),
+        Figure("speed", "angular speed", SAID["speed"], sides=()),
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
         Figure("spring_stretch", "length", "largest elongation of the return spring", sides=("max",)),
-        Figure("travel", "length", "travel of the heald frame", sides=()),
+        Figure("travel", "length", SAID["travel"], sides=()),
         Figure("law_acceleration", "number", "peak |s''| of the cam law", sides=("max",)),
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),
