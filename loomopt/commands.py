@@ -146,7 +146,7 @@ def prove(
     if as_json:
         print(outputs.json_text(found.as_dict()))
     else:
-        layout.show(*terminal.proofs(found))
+        layout.show(*terminal.proofs(found, scene))
     raise typer.Exit(0 if found.passed else DIFFERS)
 
 

@@ -24,7 +24,7 @@ ROOMS = (
     "mechanisms",
     "effects",
     "scene_errors owned scene_schema",
-    "scene_document scene_paths scene_tables packaged",
+    "scene_document scene_paths scene_tables scene_display packaged",
     "scenes balance cycle",
     "designs answers",
     "scene_csv provenance",
