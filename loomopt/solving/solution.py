@@ -124,11 +124,11 @@ class Evaluation:
         return {
             "problem": self.problem,
             "effects": list(self.effects),
-            "reached": dict(self.reached),
             "design": dict(self.design),
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
             "limits": [limit.as_dict() for limit in self.limits],
+            "reached": dict(self.reached),
         }
 
 

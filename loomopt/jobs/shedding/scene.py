@@ -139,23 +139,13 @@ def check(scene: Scene) -> None:
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
         if not scene.mechanism[name] >= NARROWEST:
-            raise _refused(
-                scene,
-                f"mechanism.{name}",
-                f"the {name} takes no cam angle",
-                f"{scene.show(NARROWEST, 'angle')} and more",
-            )
+            least = f"{scene.show(NARROWEST, 'angle')} and more"
+            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
         problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
-        turn = scene.show(2 * math.pi, "angle", 9)
-        raise _refused(
-            scene,
-            f"mechanism.{keys}",
-            problem,
-            f"{turn} together",
-            "Correct one of them.",
-        )
+        turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
+        raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
     if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
         dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
         check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")

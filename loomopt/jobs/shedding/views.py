@@ -23,7 +23,7 @@ FORCE = "N [N]"
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
 FLOATS, NARROW = 1e-3, math.radians(5.0)
-"""Share of the largest cam force that holds no roller; rad: a narrower stretch is where the force touches zero."""
+"""Share of the spring's largest force that holds no roller; rad: a narrower stretch is where the force touches zero."""
 
 
 class SheddingViews(JobViews):
@@ -104,13 +104,13 @@ def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
     """Say over which cam angles nothing holds the roller on the cam, where no least force is asked for."""
     if scene.operation["N_min"] > 0.0:
         return
-    spans = near_zero(sampler, "lift", FLOATS * abs(sampler.peak("cam_force")), NARROW)
+    spans = near_zero(sampler, "lift", FLOATS * abs(sampler.static["spring_force_max"]), NARROW)
     if spans:
         told = " and ".join(f"from {scene.show(a, 'angle', 4)} to {scene.show(b, 'angle', 4)}" for a, b in spans)
         whole = scene.show(sum(end - begin for begin, end in spans), "angle", 3)
         yield (
-            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of its largest {told}: the roller floats "
-            f"for {whole} of the turn. What helps: an N_min above 0"
+            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of the spring's largest force {told}: the "
+            f"roller floats for {whole} of the turn. What helps: an N_min above 0"
         )
 
 
