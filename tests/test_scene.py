@@ -85,9 +85,11 @@ def test_every_packaged_number_says_where_it_comes_from(name):
 
 def test_the_template_loads_with_and_without_its_optional_tables():
     assert scene(tomllib.loads(TEMPLATE)).hash == BEATUP.hash
-    everything = re.sub(r"^# (\[targets|\w+ = )", r"\1", TEMPLATE, flags=re.MULTILINE)
+    everything = re.sub(r"^# (\[targets|\[display|\w+ = )", r"\1", TEMPLATE, flags=re.MULTILINE)
     everything = everything.replace("[available.", "[effects.")
-    assert list(scene(tomllib.loads(everything)).effects) == list(BEATUP.schema.effects)
+    whole = scene(tomllib.loads(everything))
+    assert list(whole.effects) == list(BEATUP.schema.effects)
+    assert (whole.shown_in("length"), BEATUP.shown_in("length")) == ("in", "mm")
 
 
 @pytest.mark.parametrize(("unit", "millimetres"), [("m", "1000"), ("km", "1e6"), ("in", "25.4"), ("ft", "304.8")])
