@@ -62,6 +62,12 @@ def units(
     return _completed({**first, **read(document.get("display", {}), "")})
 
 
+def unit_for(si: str, known: Mapping[str, str]) -> str:
+    """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity."""
+    kind = next((kind for kind, unit in SI_UNIT.items() if unit == si), None)
+    return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
+
+
 def _written(
     document: Mapping[str, Any],
     schema: SceneSchema,

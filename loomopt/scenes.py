@@ -108,6 +108,10 @@ class Scene:
         """Return the unit in which a person sees quantities of a kind."""
         return self.units[kind]
 
+    def unit_for(self, si: str) -> str:
+        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        return scene_display.unit_for(si, self.units)
+
     def show(self, value: float, kind: str, digits: int = 6) -> str:
         """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
         return show(value, self.units[kind], digits)

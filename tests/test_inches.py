@@ -267,3 +267,10 @@ def test_a_unit_that_is_none_exits_with_2_and_one_line(capsys, given):
     assert out == ""
     assert err.count("\n") == 1
     assert "display" in err
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_a_table_of_an_inch_scene_has_no_metric_length(name):
+    """Whatever a unit is composed of: m/rad beside in/rad^2 would be of two systems."""
+    for units in seen(all_on(in_inches(name))):
+        assert [unit for unit in units if re.search(r"\b(mm|m|N|kg)\b", unit)] == []

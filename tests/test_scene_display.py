@@ -97,6 +97,12 @@ def test_a_kind_that_nobody_wrote_is_composed_of_the_scenes_own_units(display, e
     assert units(lo.scene({**BARE, "display": display}), *COMPOSED) == expected
 
 
+def test_a_curve_of_no_kind_is_seen_in_the_scenes_own_units_too():
+    assert [RAPIER.unit_for(si) for si in ("m", "m/rad", "rad", "1")] == ["mm", "m/rad", "deg", "1"]
+    inches = inch.scene("shedding")
+    assert [inches.unit_for(si) for si in ("m/rad", "N*m", "rad", "1")] == ["in/rad", "lbf*in", "deg", "1"]
+
+
 def test_an_inch_scene_has_pounds_of_both_kinds_where_it_writes_none():
     assert units(lo.scene({**BARE, "display": {"length": "inch"}}), "force", "mass") == ["lbf", "lb"]
     assert units(lo.scene(BARE), "force", "mass") == ["N", "kg"]

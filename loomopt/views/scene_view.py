@@ -12,13 +12,11 @@ from loomopt.jobs import registry
 from loomopt.owned import label, owned
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
-from loomopt.units import SI_UNIT, factor
+from loomopt.units import factor
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""
-KINDS = {unit: kind for kind, unit in SI_UNIT.items()}
-"""SI unit of a curve → the kind of quantity it shows."""
 
 
 def listing(scenes: Iterable[Scene]) -> Grid:
@@ -158,8 +156,8 @@ def _width(curve: tuple[str, list[str]]) -> int:
 def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     """Return a curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
     symbol, _, si = name.removesuffix("]").partition(" [")
-    unit = scene.shown_in(KINDS[si]) if si in KINDS else si
-    numbers = np.asarray(values, dtype=float) / factor(unit if si in KINDS else "1")
+    unit = scene.unit_for(si)
+    numbers = np.asarray(values, dtype=float) * (1.0 if unit == si else factor(si) / factor(unit))
     known = numbers[np.isfinite(numbers)]
     largest = float(np.max(np.abs(known), initial=0.0))
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0

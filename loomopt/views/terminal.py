@@ -197,7 +197,7 @@ def proofs(found: "Proofs", scene: Scene) -> list[str | Grid]:
     words, angle, lines = Words(scene), scene.shown_in("angle"), []
     for proof in found.proofs:
         unit = words.unit(proof.limit.removeprefix("peak "))
-        sizes = (f"{proof.margin / factor(unit):.3g}", f"{proof.slack / factor(unit):.1g}")
+        sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
         shown = "" if unit == "1" else unit
         lines.append((joined(proof.text), proof.status, *sizes, shown, str(proof.boxes), place))
