@@ -22,6 +22,7 @@ from loomopt.units import SI_UNIT as SI_UNIT
 from loomopt.units import UNITS as UNITS
 from loomopt.units import QuantityError as QuantityError
 from loomopt.units import Unit
+from loomopt.units import ascii_unit as ascii_unit
 from loomopt.units import factor as factor
 from loomopt.units import fits as fits
 from loomopt.units import parse_unit as parse_unit
@@ -146,9 +147,14 @@ def _check_dimension(unit: Unit, unit_text: str, number: str, kind: str) -> None
             "an angular speed in rpm, turn/min, deg/s or rad/s",
             f'If turns are meant, write "{turns:g} rpm"',
         )
+    raise _refusal(kind, misfit(unit_text, kind), f"Write it in {DISPLAY_UNIT[kind]}")
+
+
+def misfit(unit_text: str, kind: str) -> str:
+    """Return what a unit is of that is none of a kind of quantity, in words."""
     others = [other for other in SI_UNIT if other != "number" and fits(unit_text, other)]
     what = f"a unit of {others[0]}, not of {kind}" if others else f"not a unit of {kind}"
-    raise _refusal(kind, f'"{unit_text}" is {what}', f"Write it in {DISPLAY_UNIT[kind]}")
+    return f'"{unit_text}" is {what}'
 
 
 def _refusal(kind: str, problem: str, remedy: str = "") -> QuantityError:

@@ -8,7 +8,7 @@ import functools
 import math
 import re
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 
 class QuantityError(ValueError):
@@ -70,6 +70,14 @@ SI_UNIT: dict[str, str] = {
 DISPLAY_UNIT = SI_UNIT | {"length": "mm", "angle": "deg", "angular speed": "rpm", "pressure": "MPa"}
 """Kind of quantity → the unit it is shown in where a scene writes none."""
 
+
+class Shown(Protocol):
+    """shown(value, kind, digits): an SI value as text in the unit in which a person sees its kind of quantity."""
+
+    def __call__(self, value: float, kind: str, digits: int = 6, /) -> str:
+        """Return the text; digits: significant ones."""
+
+
 _LARGEST_EXPONENT = 4
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -89,6 +97,11 @@ def show(value: float, unit_text: str, digits: int = 6) -> str:
     return number if unit_text == "1" else f"{number} {unit_text}"
 
 
+def usual(value: float, kind: str, digits: int = 6) -> str:
+    """Return an SI value as text in the unit of its kind where no scene says another."""
+    return show(value, DISPLAY_UNIT[kind], digits)
+
+
 def fits(unit_text: str, kind: str) -> bool:
     """Say whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
     *mechanical, angle = parse_unit(unit_text).powers
@@ -104,8 +117,7 @@ def parse_unit(text: str) -> Unit:
     """
     if text == "1":
         return Unit(Fraction(1), (0, 0, 0, 0))
-    plain = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
-    tokens = _TOKEN.findall(plain)
+    tokens = _TOKEN.findall(ascii_unit(text))
     reciprocal = tokens[:2] == ["1", "/"]
     if reciprocal:
         tokens[:2] = []
@@ -113,6 +125,11 @@ def parse_unit(text: str) -> Unit:
     if tokens:
         raise _unit_error(text)
     return _times(parse_unit("1"), unit, -1) if reciprocal else unit
+
+
+def ascii_unit(text: str) -> str:
+    """Return a unit's text in ASCII: N·m² as N*m^2, ° as deg."""
+    return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
 
 
 def _product(tokens: list[str], text: str) -> Unit:

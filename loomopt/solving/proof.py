@@ -64,6 +64,7 @@ class Proofs(Shown):
     problem: str
     target: str
     proofs: tuple[Proof, ...]
+    scene: Scene
 
     @property
     def passed(self) -> bool:
@@ -99,7 +100,8 @@ def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, 
     own, asked = job.adopted(scene, full, name)
     program = job.program(own, asked)
     reads = _readings(own, job, program, full, slack)
-    return Proofs(scene.name, name, tuple(_merged(list(_proofs(program, job, Words(own), *reads)))))
+    found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
+    return Proofs(scene.name, name, found, scene)
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:

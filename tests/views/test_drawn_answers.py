@@ -45,7 +45,7 @@ def test_the_nearest_design_of_an_infeasible_target_is_drawn_as_such(nearest, tm
     said, _, named = title(drawn).partition("; limits not held: ")
     assert said == "beatup: nearest design for balance"
     assert set(named.split(", ")) == broken != set()
-    assert "nearest design" in notebook.answer(nearest, nearest.scene)
+    assert "nearest design" in notebook.html(nearest)
 
 
 def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, capsys):

@@ -15,6 +15,7 @@ from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
 from loomopt.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
 from loomopt.schema import Figure, Table, Values
+from loomopt.units import Shown, usual
 
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""
@@ -111,10 +112,15 @@ def sold(own: Own) -> Mapping[str, Sequence[float]]:
 
 
 def explain(
-    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Own, clash: Iterable[str]
+    known: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    own: Own,
+    clash: Iterable[str],
+    shown: Shown = usual,
 ) -> str:
     """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
 
+    shown(value, kind, digits): a value as text in the reader's unit.
     tau >= 2 K_W (X0 + travel) f sqrt(2 G rho) follows from rate, surge frequency and shear stress [Shigley, ch. 10].
     """
     named = {limit.split()[0] for limit in clash}
@@ -130,8 +136,8 @@ def explain(
         return ""
     return (
         f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
-        f"{1e3 * stretch:.4g} mm carry at least {1e-6 * least:.4g} MPa of shear, whatever their size "
-        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {1e-6 * most:.4g} MPa at most. "
+        f"{shown(stretch, 'length', 4)} carry at least {shown(least, 'pressure', 4)} of shear, whatever their size "
+        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {shown(most, 'pressure', 4)} at most. "
         "Less preload asks for a stiffer spring. A lower speed, less travel or a softer cam law (target law) helps."
     )
 
@@ -169,8 +175,8 @@ EFFECT: Check[object] = Check(
             "turns": "8",
             "initial_tension": "100 N",
             "springs": "2",
-            "shear_modulus": "77.2 GPa",
-            "elasticity": "203.4 GPa",
+            "shear_modulus": "77200 MPa",
+            "elasticity": "203400 MPa",
             "density": "7850 kg/m^3",
             "strength": "1974 MPa",
             "strength_exponent": "0.108",

@@ -7,6 +7,7 @@ from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup.design import BALANCE
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.mechanisms import counterweight
@@ -14,7 +15,7 @@ from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
@@ -58,7 +59,8 @@ def program(scene: Scene, target: str) -> Program:
     limits += demanded(scene, physics.checks, known, {})
     margins = physics.kinematics.groups[""].margins
     limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in margins]
-    limits += _target_limits(scene, target, sizes)
+    asked = _target_limits(scene, target, sizes)
+    limits += asked
     taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
@@ -66,7 +68,8 @@ def program(scene: Scene, target: str) -> Program:
     starts = _starts(variables, known, direct, target == "retrofit")
     moves = (*_moves(variables, known, limited, sizes.most), *scene_numbers.axis_moves(scene, known, limited))
     objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
-    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves)
+    task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves
+    return Program(*task, goals=(BALANCE,) if target == "balance" else goals(asked))
 
 
 class _Sizes:

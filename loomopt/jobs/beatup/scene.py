@@ -13,6 +13,7 @@ from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureN
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
+from loomopt.units import Shown, usual
 
 
 class Operation(Table):
@@ -86,15 +87,15 @@ TARGETS = {
 }
 
 
-def fault(design: Mapping[str, float]) -> str:
+def fault(design: Mapping[str, float], shown: Shown = usual) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
-    return crank_rocker_faults.fault(*(design[name] for name in named)) if len(named) == 4 else ""
+    return crank_rocker_faults.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
 
 
 def check(scene: Scene) -> None:
     """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
-    reason = fault(scene.mechanism)
+    reason = fault(scene.mechanism, scene.show)
     if reason:
         raise BadInput(
             f"today's machine is not a crank-rocker: {reason}",

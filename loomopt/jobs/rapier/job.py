@@ -52,7 +52,7 @@ class Rapier(Job):
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum is worth."""
-        return designs.say(target, figures)
+        return designs.say(scene, target, figures)
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return S with three derivatives, φ3, φ6, φ63, the transmission angle, the terms, tape force and torque."""

@@ -110,7 +110,7 @@ TARGETS = {
 
 def check(scene: Scene) -> None:
     """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
-    fault = rapier_faults.named(scene.mechanism)
+    fault = rapier_faults.named(scene.mechanism, scene.show)
     if fault:
         raise BadInput(
             f"today's drive does not turn all round: {fault}",

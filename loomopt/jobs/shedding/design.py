@@ -25,7 +25,6 @@ from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY
-from loomopt.units import show
 
 CYCLE = {
     "contact_min": "lift",
@@ -124,10 +123,9 @@ def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) 
     dwells: what alone the cam force is judged in; "" for all round.
     """
     size = {name: value or 0.0 for name, value in figures.items()}
-    stiffness = show(size["K1"], scene.unit("K1", "stiffness"), 9)
-    speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
+    stiffness, speed = scene.show(size["K1"], "stiffness", 9), scene.show(size["speed"], "angular speed", 9)
     kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
-    peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {size['contact_max']:.6g} N"
+    peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {scene.show(size['contact_max'], 'force')}"
     said = {
         "stiffness": f"The least return spring that {kept} has {stiffness}.",
         "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
@@ -140,14 +138,14 @@ def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) 
 def _today(scene: Scene, found: Figures) -> str:
     """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
     least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
-    wanted, angle = scene.operation["N_min"], math.degrees(found["contact_angle"] or 0.0)
-    spring = f"Today's spring ({show(scene.mechanism['K1'], scene.unit('K1', 'stiffness'), 9)})"
+    wanted, force = scene.operation["N_min"], scene.show(least, "force")
+    spring = f"Today's spring ({scene.show(scene.mechanism['K1'], 'stiffness', 9)})"
     if least >= wanted - CLOSE * max(most, 1.0):
-        return f"{spring} holds: the cam force is never less than {least:.6g} N."
-    lost = f"the cam force would be {least:.6g} N at {angle:.4f} deg"
+        return f"{spring} holds: the cam force is never less than {force}."
+    lost = f"the cam force would be {force} at {scene.show(found['contact_angle'] or 0.0, 'angle')}"
     speed = found["contact_speed"]
     if speed:
-        lost += f"; it holds up to {show(speed, scene.unit('speed', 'angular speed'), 7)}"
+        lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
 
 

@@ -104,7 +104,7 @@ def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
         remedy = f"Give them in [mechanism]; a roller follower has {', '.join(FOLLOWER)}"
         raise refusal("the cam cannot be drawn without its follower", scene.origin, keys, remedy=remedy)
     job = registry.of(scene)
-    fault = scene.schema.fault(job.numbers_of(scene, design))
+    fault = scene.schema.fault(job.numbers_of(scene, design), scene.show)
     if fault:
         raise refusal(f"the cam cannot be drawn: {fault}", scene.origin, "mechanism", remedy="Correct it")
     return Cam(job.sampler(scene, design))

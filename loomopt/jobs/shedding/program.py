@@ -20,7 +20,7 @@ from loomopt.owned import owned
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
@@ -119,7 +119,8 @@ class _Task:
         today = (
             named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
         )
-        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "")
+        contact = goals(replace(each, name="contact_min") for each in limits if each.name == "N_min")
+        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "", goals=contact)
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
@@ -209,7 +210,7 @@ class _Task:
                 found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
                 continue
             own = v.name != "speed" or "speed" in self.limited
-            found += [replace(each, relaxable=own and each.value > 0.0) for each in bound_limits(v)]
+            found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
         return found
 
     def _contact(self) -> list[Limit]:

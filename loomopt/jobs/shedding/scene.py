@@ -29,6 +29,7 @@ from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
 from loomopt.tolerances import NARROWEST, SAME_ANGLE
+from loomopt.units import Shown, usual
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -136,16 +137,18 @@ def check(scene: Scene) -> None:
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
         if not scene.mechanism[name] >= NARROWEST:
-            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", f"{NARROWEST:g} rad and more")
+            least = f"{scene.show(NARROWEST, 'angle')} and more"
+            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-        problem, keys = f"the cam's segments add to {math.degrees(total):.9g} deg: {given}", ", ".join(SEGMENTS)
-        raise _refused(scene, f"mechanism.{keys}", problem, "360 deg together", "Correct one of them.")
+        problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
+        turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
+        raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
     if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
         dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
         check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
     check_law(scene)
-    reason = _follower(scene.mechanism)
+    reason = _follower(scene.mechanism, scene.show)
     if reason:
         raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
@@ -208,14 +211,14 @@ def _table(scene: Scene) -> cam_spline.Table:
         raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
 
 
-def _follower(numbers: Mapping[str, Any]) -> str:
+def _follower(numbers: Mapping[str, Any], shown: Shown) -> str:
     """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
-    return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}))
+    return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}), shown)
 
 
-def fault(numbers: Mapping[str, Any]) -> str:
+def fault(numbers: Mapping[str, Any], shown: Shown = usual) -> str:
     """Say why a design, SI, cannot work as this cam; "" when it can."""
     coefficients = tuple(map(float, knots(numbers)))
     reason = cam_spline.fault(coefficients) if coefficients else ""
@@ -225,7 +228,7 @@ def fault(numbers: Mapping[str, Any]) -> str:
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
     short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
-    return f"the {short[0]} takes no cam angle" if short else _follower(numbers)
+    return f"the {short[0]} takes no cam angle" if short else _follower(numbers, shown)
 
 
 SCHEMA = SceneSchema(

@@ -12,6 +12,7 @@ from loomopt.maths import FLOAT, Number
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Mark, Panel, split
 from loomopt.program.sampling import Sampler
+from loomopt.program.stretches import near_zero
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 FORCE = "N [N]"
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
+FLOATS, NARROW = 1e-3, math.radians(5.0)
+"""Share of the spring's largest force that holds no roller; rad: a narrower stretch is where the force touches zero."""
 
 
 class SheddingViews(JobViews):
@@ -91,9 +94,24 @@ class SheddingViews(JobViews):
         return tuple(shown)
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: forces that are known in the dwells only, an undercut cam."""
+        """Return what there is to remark upon: forces known in the dwells only, a roller that floats, an undercut."""
         sampler = registry.of(scene).sampler(scene, design)
-        return (*_partly(sampler), *(() if self.missing(scene) else _undercut(scene, design)))
+        undercut = () if self.missing(scene) else _undercut(scene, design)
+        return (*_partly(sampler), *_floating(scene, sampler), *undercut)
+
+
+def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
+    """Say over which cam angles nothing holds the roller on the cam, where no least force is asked for."""
+    if scene.operation["N_min"] > 0.0:
+        return
+    spans = near_zero(sampler, "lift", FLOATS * abs(sampler.static["spring_force_max"]), NARROW)
+    if spans:
+        told = " and ".join(f"from {scene.show(a, 'angle', 4)} to {scene.show(b, 'angle', 4)}" for a, b in spans)
+        whole = scene.show(sum(end - begin for begin, end in spans), "angle", 3)
+        yield (
+            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of the spring's largest force {told}: the "
+            f"roller floats for {whole} of the turn. What helps: an N_min above 0"
+        )
 
 
 def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
@@ -101,12 +119,13 @@ def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
 
     found = drawing.cam(scene, design)
     if found.undercut:
-        angle = math.degrees(found.sampler.angle(found.undercut))
-        roller, radius = 1000 * found.follower.roller_radius, 1000 / found.undercut.value
+        roller, radius = found.follower.roller_radius, 1 / found.undercut.value
+        angle, most = scene.show(found.sampler.angle(found.undercut), "angle", 5), scene.show(radius, "length", 4)
         yield (
-            f"the cam is undercut at {angle:.2f} deg: the roller's centre turns there with a radius of {radius:.4g} "
-            f"mm, {roller - radius:.3g} mm less than roller_radius = {roller:.6g} mm, so the profile is cut away and X "
-            f"not followed. What helps: a roller_radius below {radius:.4g} mm, or a larger base_radius"
+            f"the cam is undercut at {angle}: the roller's centre turns there with a radius of {most}, "
+            f"{scene.show(roller - radius, 'length', 3)} less than roller_radius = {scene.show(roller, 'length')}, so "
+            f"the profile is cut away and X not followed. What helps: a roller_radius below {most}, or a larger "
+            f"base_radius"
         )
 
 
