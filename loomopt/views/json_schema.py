@@ -9,11 +9,12 @@ from pydantic import TypeAdapter
 from loomopt.effects.kinds import UNBUILT, Effect
 from loomopt.quantities import Quantity, quantity_of
 from loomopt.quantity_patterns import QUANTITY, foreign
+from loomopt.scene_display import KINDS
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Problem
 from loomopt.scenes import TABLES
 from loomopt.schema import Table
-from loomopt.units import DISPLAY_UNIT, SI_UNIT
+from loomopt.units import DISPLAY_UNIT
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -44,8 +45,7 @@ def scene(schema: SceneSchema) -> Json:
 
 def display(schema: SceneSchema) -> Json:
     """Return [display]: the kinds of quantity, each with a unit."""
-    kinds = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT}
-    return _closed({key: _unit(kind) for key, kind in kinds.items() if kind != "number"})
+    return _closed({key: _unit(kind) for key, kind in KINDS.items()})
 
 
 def _unit(kind: str) -> Json:
