@@ -1,5 +1,7 @@
 """Curves over the cycle, written once: the motion as a job names it, each effect's term, force, torque, checks."""
 
+import itertools
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -15,14 +17,17 @@ from loomopt.units import SI_UNIT
 
 STEPS = 720
 ANGLE = "phi [rad]"
+POWER = "motor_power [W]"
+COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
 
 
 class Columns(NamedTuple):
     """What curves show.
 
-    motion: column name with unit → formula. force: column of the output force, and the quantity (of which sign) that
+    motion: column name with unit → formula; from name_1, name_2 … with respect to φ follow name_t, name_tt … with
+    respect to time, where the speed is known. force: column of the output force, and the quantity (of which sign) that
     it is; torque: likewise of the crank. unit: of the output's terms; the drive's are torques. checks: unit of each
-    check's quantity. after: what stands after the torque. also: crank angles, rad, that are rows too. closed: whether
+    check's quantity. after: what stands after torque and power. also: crank angles, rad, that are rows too. closed: whether
     the row at 2π is one.
     """
 
@@ -49,6 +54,7 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     if sampler.model.known_in:
         unknown = ~np.any([sampler.cycle.on(where)[pieces] for where in sampler.model.known_in], axis=0)
     found = {ANGLE: phi} | {name: _column(formula, at, u) for name, formula in columns.motion.items()}
+    found |= _in_time(found, at)
     loads = sampler.model.loads
     for load, term in zip(loads, at.terms().values(), strict=True):
         whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
@@ -59,10 +65,36 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     if columns.force and any(load.acts == "output" for load in loads):
         found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:
-        found[columns.torque[0]] = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
+        torque = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
+        found |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: torque * at.pose.omega})
     for name, unit in columns.checks.items():
         found[f"{name} [{unit}]"] = _column(sampler.model.formula(name), at, u)
     return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
+
+
+def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
+    """Return the derivatives with respect to time of what has columns of those with respect to φ, SI.
+
+    x˙ = x' ω, x¨ = x'' ω² + x' ω̇; the third, x''' ω³, at constant speed only. None where the speed is not known.
+    """
+    omega, change = at.pose.omega, at.pose.omega_dot
+    if omega is None:
+        return {}
+    known, found = {split(column)[0]: values for column, values in columns.items()}, dict[str, Floats]()
+    for name, unit in map(split, columns):
+        for order in itertools.takewhile(lambda k: f"{name}_{k}" in known, (1, 2, 3) if change is None else (1, 2)):
+            rate = known[f"{name}_{order}"] * omega**order
+            power = f"^{order}" if order > 1 else ""
+            found[f"{name}_{'t' * order} [{unit}/s{power}]"] = (
+                rate if change is None or order == 1 else rate + known[f"{name}_1"] * change
+            )
+    return found
+
+
+def split(column: str) -> tuple[str, str]:
+    """Return a column's name and unit."""
+    match = COLUMN.fullmatch(column)
+    return (match["name"], match["unit"]) if match else (column, "1")
 
 
 def _column(formula: Formula, at: Instant, u: Floats) -> Floats:
