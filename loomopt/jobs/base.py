@@ -104,11 +104,13 @@ class Job(abc.ABC):
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
     ) -> dict[str, Floats]:
-        """Return the curves of a design over one turn, units in the column names; figures of checks stand last."""
+        """Return the curves of a design over one turn, units in the column names; every peak that is a figure is a row."""
         sampler = self.sampler(scene, design)
+        tops = [sampler.extremes(quantity) for quantity in self.peaks(sampler.model).values()]
+        peaks = [sampler.angle(found[0]) for found in tops if found]
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
-        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, also)
+        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, [*peaks, *also])
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt import maths
+from loomopt.balance import Acting
 from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.frozen import Frozen
 from loomopt.program.instant import Formula, Instant
@@ -27,8 +28,8 @@ class Columns(NamedTuple):
     motion: column name with unit → formula; from name_1, name_2 … with respect to φ follow name_t, name_tt … with
     respect to time, where the speed is known. force: column of the output force, and the quantity (of which sign) that
     it is; torque: likewise of the crank. unit: of the output's terms; the drive's are torques. checks: unit of each
-    check's quantity. after: what stands after torque and power. also: crank angles, rad, that are rows too. closed: whether
-    the row at 2π is one.
+    check's quantity. after: what stands after torque and power. also: crank angles, rad, that are rows too. closed:
+    whether the row at 2π is one.
     """
 
     motion: Mapping[str, Formula]
@@ -58,10 +59,9 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     loads = sampler.model.loads
     for load, term in zip(loads, at.terms().values(), strict=True):
         whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
-        name = getattr(load, "symbol", "") or load.name
         partial = bool(getattr(load, "known_in", dict)(sampler.model.words_of(load.name)))
         unit = columns.unit if load.acts == "output" else SI_UNIT["torque"]
-        found[f"{name} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
+        found[f"{load_name(load)} [{unit}]"] = np.where(unknown, np.nan, whole) if partial else whole
     if columns.force and any(load.acts == "output" for load in loads):
         found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:
@@ -82,13 +82,17 @@ def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:
         return {}
     known, found = {split(column)[0]: values for column, values in columns.items()}, dict[str, Floats]()
     for name, unit in map(split, columns):
-        for order in itertools.takewhile(lambda k: f"{name}_{k}" in known, (1, 2, 3) if change is None else (1, 2)):
-            rate = known[f"{name}_{order}"] * omega**order
-            power = f"^{order}" if order > 1 else ""
-            found[f"{name}_{'t' * order} [{unit}/s{power}]"] = (
-                rate if change is None or order == 1 else rate + known[f"{name}_1"] * change
-            )
+        by_angle = [known.get(f"{name}_{order}") for order in ((1, 2, 3) if change is None else (1, 2))]
+        for order, values in enumerate(itertools.takewhile(lambda each: each is not None, by_angle), 1):
+            rate = values * omega**order
+            rate = rate if change is None or order == 1 else rate + by_angle[0] * change
+            found[f"{name}_{'t' * order} [{unit}/s{f'^{order}' if order > 1 else ''}]"] = rate
     return found
+
+
+def load_name(load: Acting) -> str:
+    """Return what a load's column is called."""
+    return getattr(load, "symbol", "") or load.name
 
 
 def split(column: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
 from loomopt.views import outputs
-from loomopt.views.figure import _COLOURS, _figure, _own_style, _save
+from loomopt.views.figure import COLOURS, _figure, _own_style, _save
 from loomopt.views.layout import Grid, joined
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
@@ -105,7 +105,7 @@ def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Ro
     alike = any(_sized(rows) and len({row.evaluations for row in rows}) == 1 for rows in ladders)
     ladders = [rows for rows in ladders if rows[0].method != NUMBERS]
     for place, rows in enumerate(ladders):
-        method, colour, mark = rows[0].method, _COLOURS[place % len(_COLOURS)], MARKS[place % len(MARKS)]
+        method, colour, mark = rows[0].method, COLOURS[place % len(COLOURS)], MARKS[place % len(MARKS)]
         errors = [max(row.error or 0.0, LEAST) for row in rows]
         name = f"{quantity}, {method}"
         label = f"{method}, order {study.orders[name]:.2f}" if name in study.orders else method

@@ -18,6 +18,7 @@ from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
@@ -120,21 +121,29 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     elif ending == ".parquet":
         atomically(path, frame.to_parquet)
     else:
-        atomically(path, functools.partial(_figure, frame, scene, flat(design)))
+        from loomopt.views import figure
+
+        drawn = plotted(frame, scene, flat(design), target)
+        atomically(path, functools.partial(figure.save, drawn))
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path) -> None:
-    """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
-    from loomopt.views import figure
+def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None) -> "Figure":
+    """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
+
+    design: SI; today's without one. target: what it was found for.
+    """
+    from loomopt.picture.panels import in_units
+    from loomopt.views import curve_figure
 
     job, view = registry.of(scene), registry.of(scene).views
-    panels = view.panels(scene, design, tuple(frame.columns))
-    today = None
-    if design and any(panel.today for panel in panels):
-        before = tables.curves(scene, {})
-        today = before, view.panels(scene, {}, tuple(before.columns))
-    marks = view.marks(scene, {**job.today(scene), **design})
-    figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    now = job.today(scene)
+    own = {**now, **design}
+    panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
+    today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
+    subject = (target or "design") if design else "today"
+    title = f"{scene.name}, {subject}: curves over the cycle"
+    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
+    return drawn
 
 
 def linkage(path: Path, scene: Scene, design: Design) -> None:
