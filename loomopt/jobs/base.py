@@ -104,7 +104,7 @@ class Job(abc.ABC):
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
     ) -> dict[str, Floats]:
-        """Return the curves of a design over one turn, units in the column names; every peak that is a figure is a row."""
+        """Return the curves of a design over one turn, units in the column names; peaks that are figures are rows."""
         sampler = self.sampler(scene, design)
         tops = [sampler.extremes(quantity) for quantity in self.peaks(sampler.model).values()]
         peaks = [sampler.angle(found[0]) for found in tops if found]

@@ -14,15 +14,15 @@ from loomopt.picture.shapes import plain
 from loomopt.program.curves import ANGLE
 from loomopt.units import factor, show
 from loomopt.views import figure
-from loomopt.views.figure import COLOURS
-from loomopt.views.heads import SIZE, Entry, head
+from loomopt.views.figure import COLOURS, STYLES
+from loomopt.views.heads import LEGEND, SIZE, Entry, head
+from loomopt.views.pages import EDGE, Cell, stack, widen
 
 if TYPE_CHECKING:
     import pandas as pd
 
 DASHED = (0, (4, 2))
-"""Today's machine beside a design: no other curve is drawn so."""
-STYLES = ("-", (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (9, 1.5)))
+"""Today's machine beside a design: no other curve of it is drawn so."""
 TODAY, LINE, LIMIT = "#6b7280", "#374151", "#b91c1c"
 SAME = 1e-9
 """deg; rows this near to an angle are at it."""
@@ -67,24 +67,20 @@ def curves(
     """
     if path:
         files.suffix(path, figure.SUFFIXES)
-    panels = panels or each(frame.columns)
+    panels = panels or each(tuple(frame.columns))
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
     design, before = _turn(frame, marks or {}), _turn(*today) if today else None
     with figure._own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
-        page, placed = _grid(panels)
-        page.suptitle(plain(title), fontsize=11, parse_math=False)
-        entries = [_panel(axes, panel, design, before) for axes, panel, _, _ in placed]
-        if before:
-            _legend(page)
-        page.supxlabel(f"{angle} phi [deg]", fontsize=9)
-        page.get_layout_engine().execute(page)  # from here on the axes have their width
+        page, cells = _grid(panels)
+        entries = [_panel(cell.axes, panel, design, before) for cell, panel in cells]
+        widen(page, [cell for cell, _ in cells])
         heads = {}
-        for (axes, panel, first, last), shown in zip(placed, entries, strict=True):
-            axes.tick_params(labelbottom=last)
-            names = _mark(axes, design.marks) if first else _mark(axes, design.marks)[:0]
-            heads[axes] = head(axes, f"{panel.title}{_bracketed(panel)}", shown, names)
-        _grow(page, placed, heads)
+        for (cell, panel), shown in zip(cells, entries, strict=True):
+            names = _mark(cell.axes, design.marks)
+            heads[cell.axes] = head(cell.axes, f"{panel.title}{_bracketed(panel)}", shown, names if cell.first else ())
+        stack(page, [cell for cell, _ in cells], heads)
+        _entitle(page, title, f"{angle} phi [deg]", both=before is not None)
     if path:
         figure.save(page, path)
     return page
@@ -97,44 +93,36 @@ def _turn(frame: "pd.DataFrame", marks: Mapping[str, float]) -> Turn:
     return Turn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks)
 
 
-def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Any, Panel, bool, bool]]]:
-    """Return a figure and its axes with their panels, and whether each is the first and the last of its column.
-
-    Wide panels stand on top, the others below in columns of their own.
-    """
+def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
+    """Return a figure and its axes with their panels: wide ones on top, the others below in columns of their own."""
     on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
     wide = 1 if len(panels) <= 4 else 2
     rows, height = math.ceil(len(others) / wide), len(on_top)
-    page = figure._figure(WIDTHS[wide - 1], 1.5 * (rows + height) + 0.9)
-    page.set_layout_engine("constrained")
-    grid = page.add_gridspec(height + rows, wide, height_ratios=[HIGH_WIDE] * height + [HIGH] * rows)
+    page = figure._figure(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0)
     shared: Any = None
-    placed = []
+    cells = []
     for place, panel in enumerate([*on_top, *others]):
         column, row = divmod(max(place - height, 0), rows or 1)
-        spec = grid[place, :] if panel.wide else grid[height + row, column]
-        shared = axes = page.add_subplot(spec, sharex=shared)
+        shared = axes = page.add_axes((0.1, 0.1, 0.5, 0.5), sharex=shared, label=str(place))
         last = panel.wide or row == rows - 1 or place == len(panels) - 1
-        placed.append((axes, panel, place == 0 or (row == 0 and not height), last))
-    return page, placed
+        first = place == 0 or (row == 0 and not height)
+        where, high = (place, HIGH_WIDE) if panel.wide else (height + row, HIGH)
+        cells.append((Cell(axes, where, column, high, panel.wide, last, first), panel))
+    return page, cells
 
 
-def _grow(page: Any, placed: Sequence[tuple[Any, Panel, bool, bool]], heads: Mapping[Any, float]) -> None:
-    """Make the figure as high as its axes and what stands above them; heads: heights, pt."""
-    rows: dict[int, tuple[float, float]] = {}
-    for axes, panel, _, last in placed:
-        row = axes.get_subplotspec().rowspan.start
-        above, high = rows.get(row, (0.0, 0.0))
-        rows[row] = max(above, heads[axes] + (20.0 if last else 8.0)), max(high, HIGH_WIDE if panel.wide else HIGH)
-    page.set_size_inches(page.get_figwidth(), sum(above / 72 + high for above, high in rows.values()) + 0.7)
-
-
-def _legend(page: Any) -> None:
-    """Say once, above all panels, which curves are the design's and which today's."""
+def _entitle(page: Any, title: str, below: str, both: bool) -> None:
+    """Write the title, what phi is, and once which curves are the design's and which today's, where there are both."""
     from matplotlib.lines import Line2D
 
-    lines = [Line2D([], [], color=COLOURS[0], linewidth=1.4), Line2D([], [], color=TODAY, linestyle=DASHED)]
-    page.legend(lines, ["design", "today, dashed"], loc="outside upper right", ncols=2, fontsize=SIZE, frameon=False)
+    high = page.get_figheight()
+    page.suptitle(plain(title), x=0.5, y=1 - EDGE / high, va="top", fontsize=11, parse_math=False)
+    page.supxlabel(below, x=0.5, y=EDGE / high, va="bottom", fontsize=9)
+    if both:
+        design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
+        lines, texts = [design, Line2D([], [], color=TODAY, linestyle=DASHED)], ["design", "today, dashed"]
+        place = 1 - EDGE / page.get_figwidth(), 1 - EDGE / high
+        page.legend(lines, texts, loc="upper right", bbox_to_anchor=place, borderaxespad=0.0, ncols=2, **LEGEND)
 
 
 def _bracketed(panel: Panel) -> str:
@@ -156,13 +144,13 @@ def _panel(axes: Any, panel: Panel, design: Turn, before: Turn | None) -> list[E
     for place, (values, label) in enumerate(zip(drawn, panel.labels, strict=True)):
         colour, style = COLOURS[place % len(COLOURS)], STYLES[place % len(STYLES)]
         (line,) = axes.plot(design.angles, values, color=colour, linewidth=1.4, linestyle=style, label=plain(label))
-        if len(drawn) > 1:
+        if label != panel.title:
             entries.append((line, label))
     for place, values in enumerate(old):
         colour = COLOURS[place % len(COLOURS)] if len(old) > 1 else TODAY
         label = f"{plain(panel.labels[place])}, today"
         assert before
-        axes.plot(before.angles, values, color=colour, linewidth=1.1, linestyle=DASHED, label=label, zorder=1.9)
+        axes.plot(before.angles, values, color=colour, linewidth=1.1, linestyle=DASHED, label=label, zorder=2.1)
     for turn, colour, said in ((design, COLOURS[0], ""), (before, TODAY, "today: ")):
         entries += _points(axes, panel, turn, colour, said) if turn else []
     _frame(axes, np.concatenate([*drawn, *old]), design.angles)

@@ -12,6 +12,9 @@ SIZE = 8.0
 GAP = 4.0
 """Between rows, pt."""
 COLOUR = "#374151"
+LEGEND: dict[str, Any] = {"fontsize": SIZE, "frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
+LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}
+"""What every legend looks like."""
 
 
 def head(axes: Any, title: str, entries: Sequence[Entry] = (), names: Sequence[tuple[float, str]] = ()) -> float:
@@ -45,13 +48,8 @@ def _legend(axes: Any, entries: Sequence[Entry], above: float) -> float:
             bbox_to_anchor=(0.0, 1.0),
             bbox_transform=place,
             ncols=count,
-            fontsize=SIZE,
-            frameon=False,
-            borderpad=0.0,
             borderaxespad=0.0,
-            labelspacing=0.25,
-            columnspacing=1.4,
-            handlelength=2.6,
+            **LEGEND,
         )
         for text in legend.get_texts():
             text.set_parse_math(False)

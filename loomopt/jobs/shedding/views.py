@@ -11,6 +11,7 @@ from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
 from loomopt.maths import FLOAT, Number
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
+from loomopt.program.curves import POWER
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 
@@ -88,12 +89,12 @@ class SheddingViews(JobViews):
         if "roller_radius" in values:
             levels["curvature [1/m]"] = {"undercut above 1/roller_radius =": (1 / values["roller_radius"],)}
         found = super().panels(scene, design, columns)
-        # The law's own acceleration has the frame's shape: it says more where it is limited only.
-        return tuple(
-            panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})})
-            for panel in found
-            if panel.columns[0] != "s_2 [1]" or panel.levels
-        )
+        # The law's own acceleration has the frame's shape: it says more only where it is limited. There is no torque in
+        # the dwells, and where forces are known in them alone, none is known.
+        partly = bool(registry.of(scene).model(scene).known_in)
+        left = {"s_2 [1]": "law_acceleration" not in scene.limits, "cam_torque [N*m]": partly, POWER: partly}
+        shown = [panel for panel in found if not left.get(panel.columns[0])]
+        return tuple(panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown)
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what there is to remark upon: forces that are known in the dwells only, an undercut cam."""
