@@ -11,7 +11,7 @@ from loomopt.cycle import Floats
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
 from loomopt.program import numbers
-from loomopt.program.curves import STEPS, Columns, curves
+from loomopt.program.curves import STEPS, Columns, curves, tops
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
@@ -106,8 +106,7 @@ class Job(abc.ABC):
     ) -> dict[str, Floats]:
         """Return the curves of a design over one turn, units in the column names; peaks that are figures are rows."""
         sampler = self.sampler(scene, design)
-        tops = [sampler.extremes(quantity) for quantity in self.peaks(sampler.model).values()]
-        peaks = [sampler.angle(found[0]) for found in tops if found]
+        peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
         return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, [*peaks, *also])

@@ -114,7 +114,9 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
     found = {}
     for effect in scene.active:
         if isinstance(effect, Load | State):
-            found[load_name(effect)] = Curve(panel=BY_EFFECT if effect.acts == "output" else DRIVE)
+            symbol = load_name(effect)
+            name = effect.name.replace("_", " ") if symbol != effect.name else ""
+            found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
         elif isinstance(effect, Check):
             found |= {name: Curve(peak=name) for name in effect.quantities}
     return found

@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,8 @@ from loomopt.units import SI_UNIT
 STEPS = 720
 ANGLE = "phi [rad]"
 POWER = "motor_power [W]"
+ALIKE = 1e-12
+"""Share of a quantity's largest magnitude by which two of its largest values are one: they mirror each other."""
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
 
 
@@ -70,6 +72,15 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     for name, unit in columns.checks.items():
         found[f"{name} [{unit}]"] = _column(sampler.model.formula(name), at, u)
     return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
+
+
+def tops(sampler: Sampler, quantities: Iterable[str]) -> list[float]:
+    """Return the crank angles, rad, at which quantities are largest, wherever they are alike."""
+    found = []
+    for extremes in map(sampler.extremes, quantities):
+        alike = ALIKE * max((abs(extreme.value) for extreme in extremes), default=0.0)
+        found += [sampler.angle(each) for each in extremes if each.height >= extremes[0].height - alike]
+    return found
 
 
 def _in_time(columns: Mapping[str, Floats], at: Instant) -> dict[str, Floats]:

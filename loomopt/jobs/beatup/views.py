@@ -49,7 +49,7 @@ class BeatupViews(JobViews):
 
     def words(self) -> "Mapping[str, Curve]":
         """Return what the curves are called."""
-        from loomopt.picture.panels import BY_EFFECT, Curve
+        from loomopt.picture.panels import Curve
 
         return {
             "psi": Curve("rocker angle"),
@@ -57,7 +57,6 @@ class BeatupViews(JobViews):
             "psi_2": Curve("rocker acceleration"),
             "psi_tt": Curve("rocker acceleration", at={FRONT: "alpha_fdc"}),
             "mu": Curve("transmission angle", least="mu_min"),
-            "M_R": Curve("resistance", BY_EFFECT),
             "M3": Curve("reed torque", at={FRONT: "M3_fdc"}),
             "Md": Curve("crank torque", peak="peak_torque"),
         }
