@@ -42,10 +42,10 @@ def drawn(name, kind):
     """Return the figure of a scene's curves: today's, or those of the reference design of its default target."""
     scene = scene_of(name, kind)
     target = scene.schema.default_target
-    design = {}
+    design: dict[str, float] = {}
     if kind not in ("today", "inch"):
         table = pd.read_csv(registry.results(lo.load(name)) / f"{name}.{target}.csv", comment="#")
-        design = {v: float(table[c].iloc[0]) for v in scene.schema.variables for c in table if c.startswith(f"{v} [")}
+        design = {v: float(table[c].iloc[0]) for v in scene.schema.variables for c in map(str, table) if c.startswith(f"{v} [")}
     return outputs.plotted(tables.curves(scene, design), scene, design, target)
 
 
@@ -139,7 +139,7 @@ def test_a_limit_on_the_heads_acceleration_per_radian_stands_at_that_in_metres_p
 @pytest.mark.parametrize("name", JOBS)
 def test_a_scene_in_inches_is_drawn_in_its_own_units_with_the_same_curves(name):
     scene = inch.scene(name)
-    design = {}
+    design: dict[str, float] = {}
     mine = outputs.plotted(tables.curves(scene, design), scene, design)
     plain = titled(drawn(name, "today"))
     by_name = {title.split(" [")[0]: (title, axes) for title, axes in plain.items()}
