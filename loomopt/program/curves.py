@@ -13,7 +13,7 @@ from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.frozen import Frozen
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
-from loomopt.tolerances import SAME_ROW
+from loomopt.tolerances import SAME_ANGLE, SAME_ROW
 from loomopt.units import SI_UNIT
 
 STEPS = 720
@@ -122,6 +122,7 @@ def _rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float])
     cycle = sampler.cycle
     even = np.linspace(0.0, TURN, steps, endpoint=False)
     phi = np.unique(np.concatenate([even, np.mod([*columns.also, *also], TURN)]))
+    phi = phi[np.diff(phi, prepend=-1.0) > SAME_ANGLE]
     names = [k for k, name in enumerate(cycle.names) if name in sampler.model.formula_switches]
     switches = cycle.switches[:, names]
     ends = np.flatnonzero(np.any(switches != np.roll(switches, -1, axis=0), axis=1))
@@ -135,5 +136,5 @@ def _rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float])
     pieces = np.concatenate([pieces, ends, (ends + 1) % cycle.pieces])
     u = np.concatenate([u, np.ones(len(ends)), np.zeros(len(ends))])
     phi = np.concatenate([phi, np.where(corners == 0.0, TURN, corners), corners])
-    order = np.lexsort((1 - u, np.round(phi, 12)))
+    order = np.lexsort((1 - u, np.round(phi / SAME_ANGLE)))
     return pieces[order], u[order], phi[order]

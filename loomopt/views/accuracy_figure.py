@@ -13,7 +13,7 @@ from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
 from loomopt.views import outputs
-from loomopt.views.figure import COLOURS, STYLES, _figure, _own_style, _save
+from loomopt.views.figure import COLOURS, STYLES, _figure, _own_style, save
 from loomopt.views.heads import Entry, head
 from loomopt.views.layout import Grid, joined
 
@@ -73,22 +73,27 @@ def write(study: Study, path: Path) -> None:
 
 
 def draw(study: Study, path: Path) -> None:
-    """Write the figure as PNG, PDF or SVG: a panel per quantity, error over time, or over the method's own setting."""
+    """Write the figure as PNG, PDF or SVG."""
+    save(drawn(study), path)
+
+
+def drawn(study: Study) -> Any:
+    """Return the figure: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
     with _own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
         page = _figure(9.0, 2.5 * high + 0.5)
         page.set_layout_engine("constrained")
         page.suptitle(f"{study.problem}: what accuracy costs", fontsize=11, parse_math=False)
-        drawn = []
+        placed = []
         for place, (quantity, ladders) in enumerate(panels.items()):
             axes = page.add_subplot(high, COLUMNS, place + 1)
-            drawn.append((axes, quantity, _panel(axes, study, quantity, ladders)))
+            placed.append((axes, quantity, _panel(axes, study, quantity, ladders)))
         page.get_layout_engine().execute(page)
-        heights = [head(axes, quantity, entries) for axes, quantity, entries in drawn]
+        heights = [head(axes, quantity, entries) for axes, quantity, entries in placed]
         rows = [max(heights[place : place + COLUMNS]) for place in range(0, len(heights), COLUMNS)]
         page.set_size_inches(page.get_figwidth(), 2.3 * high + sum(rows) / 72 + 0.5)
-        _save(page, path)
+    return page
 
 
 def _panels(study: Study) -> dict[str, list[list[Row]]]:
@@ -115,14 +120,15 @@ def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Ro
     thin = {"markersize": 4.0, "linewidth": 1.2}
     for place, rows in enumerate(ladders):
         method, colour, mark = rows[0].method, COLOURS[place % len(COLOURS)], MARKS[place % len(MARKS)]
+        style = STYLES[place % len(STYLES)]
         errors = [max(row.error or 0.0, LEAST) for row in rows]
         name = f"{quantity}, {method}"
         label = f"{method}, order {study.orders[name]:.2f}" if name in study.orders else method
         if alike and not _sized(rows):
-            entries.append((axes.axhline(errors[0], color=colour, linewidth=1.2, linestyle=(0, (4, 2))), label))
+            entries.append((axes.axhline(errors[0], color=colour, linestyle=style, linewidth=1.2), label))
             continue
         x = [row.setting if alike else row.seconds for row in rows]
-        line = STYLES[place % len(STYLES)] if _sized(rows) else ""
+        line = style if _sized(rows) else ""
         entries += [(each, label) for each in axes.plot(x, errors, linestyle=line, color=colour, marker=mark, **thin)]
     axes.set(xscale="log", yscale="log")
     axes.set_xlim(_decades(axes.get_xlim()))
