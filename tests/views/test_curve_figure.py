@@ -45,7 +45,12 @@ def drawn(name, kind):
     design: dict[str, float] = {}
     if kind not in ("today", "inch"):
         table = pd.read_csv(registry.results(lo.load(name)) / f"{name}.{target}.csv", comment="#")
-        design = {v: float(table[c].iloc[0]) for v in scene.schema.variables for c in map(str, table) if c.startswith(f"{v} [")}
+        design = {
+            v: float(table[c].iloc[0])
+            for v in scene.schema.variables
+            for c in map(str, table)
+            if c.startswith(f"{v} [")
+        }
     return outputs.plotted(tables.curves(scene, design), scene, design, target)
 
 
