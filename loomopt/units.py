@@ -29,6 +29,7 @@ class Unit(NamedTuple):
 _PI = Fraction("3.14159265358979323846264338327950288419716939937511")
 _INCH, _POUND, _GRAVITY = Fraction("0.0254"), Fraction("0.45359237"), Fraction("9.80665")
 _PSI = _POUND * _GRAVITY / _INCH**2
+_HORSEPOWER = 550 * 12 * _INCH * _POUND * _GRAVITY
 
 _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] = (
     ((1, 0, 0, 0), {"m": "1", "mm": "1e-3", "cm": "1e-2", "dm": "0.1", "km": "1000", "um": "1e-6"}),
@@ -39,6 +40,7 @@ _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] 
     ((0, 0, -1, 1), {"rpm": _PI / 30}),
     ((0, 0, -1, 0), {"Hz": "1"}),
     ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
+    ((2, 1, -3, 0), {"W": "1", "kW": "1000", "hp": _HORSEPOWER}),
     ((-1, 1, -2, 0), {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "bar": "1e5", "psi": _PSI}),
 )
 UNITS = {name: Unit(Fraction(factor), powers) for powers, names in _TABLE for name, factor in names.items()}
@@ -64,6 +66,10 @@ SI_UNIT: dict[str, str] = {
     "travel acceleration": "m/rad^2",
     "travel jerk": "m/rad^3",
     "curvature": "1/m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "jerk": "m/s^3",
+    "power": "W",
 }
 """Kind of quantity → the SI unit its numbers have inside the program."""
 

@@ -26,7 +26,7 @@ KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene",
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]
 FIGURES = ["M3_fdc", "peak_torque", "alpha_fdc", "swing", "theta", "beta", "mu_min", "J4", "r4", "pulse_rms"]
 TIMES = ["import_s", "build_s", "solve_s", "settle_s", "certify_s", "report_s", "total_s"]
-SI = {"m", "kg", "rad", "N", "N*m", "rad/s^2", "kg*m^2", "1"}
+SI = {"m", "kg", "rad", "N", "N*m", "rad/s^2", "kg*m^2", "W", "1"}
 
 
 @pytest.fixture

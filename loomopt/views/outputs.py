@@ -135,7 +135,8 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     else:
         from loomopt.views import figure
 
-        atomically(path, functools.partial(figure.save, _figure(frame, scene, flat(design))))
+        drawn = plotted(frame, scene, flat(design), target)
+        atomically(path, functools.partial(figure.save, drawn))
 
 
 def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
@@ -144,24 +145,28 @@ def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figur
 
     if path:
         suffix(path, PICTURES)
-    drawn = _figure(tables.curves(scene, design, target=target), scene, flat(design))
+    drawn = plotted(tables.curves(scene, design, target=target), scene, flat(design), target)
     if path:
         atomically(path, functools.partial(figure.save, drawn))
     return drawn
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float]) -> "Figure":
-    """Return curves drawn with what the job marks and groups; today's beside a design's where it asks for them."""
-    from loomopt.views import figure
+def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None) -> "Figure":
+    """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
+
+    design: SI; today's without one. target: what it was found for.
+    """
+    from loomopt.picture.panels import in_units
+    from loomopt.views import curve_figure
 
     job, view = registry.of(scene), registry.of(scene).views
-    panels = view.panels(scene, design, tuple(frame.columns))
-    today = None
-    if design and any(panel.today for panel in panels):
-        before = tables.curves(scene, {})
-        today = before, view.panels(scene, {}, tuple(before.columns))
-    marks = view.marks(scene, {**job.today(scene), **design})
-    drawn: Figure = figure.curves(frame, None, scene.title, marks, panels, today, view.angle)
+    now = job.today(scene)
+    own = {**now, **design}
+    panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
+    today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
+    subject = (f"design for {target}" if target else GIVEN) if design else TODAY
+    title = f"{scene.name}: {subject}, curves over the cycle"
+    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
     return drawn
 
 

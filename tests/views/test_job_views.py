@@ -102,7 +102,7 @@ def test_a_job_shows_every_column_with_a_unit_unless_it_says_otherwise():
     scene = lo.load("beatup")
     panels = registry.of(scene).views.panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
     assert [panel.columns for panel in panels] == [("psi [rad]",), ("M3 [N*m]",)]
-    assert [(panel.label, panel.unit) for panel in panels] == [("psi", "rad"), ("M3", "N*m")]
+    assert [(panel.title, panel.si) for panel in panels] == [("rocker angle psi", "rad"), ("reed torque M3", "N*m")]
 
 
 @pytest.mark.parametrize("effects", [(), ("bearing_friction",), ("gravity", "rod_inertia")])

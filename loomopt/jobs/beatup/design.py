@@ -64,8 +64,7 @@ def figures(
     static = sampled.figures
     found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
     found["mu_min"] = min(static["mu_near"], static["mu_far"])
-    for name in sampled.model.quantities:
-        found[name] = sampled.peak(name) if name != "peak_torque" or sampled.model.loads else None
+    found |= {name: sampled.peak(name) for name in sampled.model.quantities}
     weights = scene.table(RetrofitTarget).weights
     widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
     changes = [

@@ -13,6 +13,7 @@ from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, Torqu
 from loomopt.mechanisms import counterweight
 from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
 from loomopt.program import numbers as scene_numbers
+from loomopt.program.drive import TORQUE
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
@@ -86,7 +87,7 @@ class _Sizes:
         self.room = counterweight.room(known, limited, max(reed, counterweight.holding(reed, front, resistance)))
         self.most = self.room["m4e"][1] * self.room["r4e"][1] ** 2
         self.inertia = max(reed, self.most) or 1.0
-        self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
+        self.peak = (sampler.peak(TORQUE) if physics.loads else 0.0) or 1.0
         # What a design can change of the reed torque is its share beside the resistance.
         self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
         self.mean_square = self.torque * max(self.torque, resistance)
@@ -99,7 +100,7 @@ class _Sizes:
 
     def figure(self, name: str) -> float:
         """Return the size of a figure."""
-        if name == "peak_torque":
+        if name == TORQUE:
             return self.peak
         if self.sampler.model.has_quantity(name):
             return self.sampler.peak(name) or 1.0
@@ -246,7 +247,7 @@ def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds
 
 def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
     """Return the target's levels in order."""
-    peak = Objective("peak_torque", "peak_torque", "peak", sizes.peak)
+    peak = Objective(TORQUE, TORQUE, "peak", sizes.peak)
     return {
         "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", sizes.torque), peak),
         "torque": (peak,),

@@ -9,6 +9,7 @@ from loomopt.effects import found
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.mechanisms import crank_rocker_faults
+from loomopt.program import drive
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
@@ -63,7 +64,7 @@ FIGURES = {
     figure.name: figure
     for figure in (
         Figure("M3_fdc", "torque", "reed torque at front dead centre"),
-        Figure("peak_torque", "torque", "peak crank torque over the cycle", sides=("max",)),
+        *drive.FIGURES,
         Figure("alpha_fdc", "angular acceleration", "rocker acceleration at front dead centre"),
         Figure("swing", "angle", "swing of the rocker DC"),
         Figure("theta", "angle", "angle between the dead centres' crank lines"),

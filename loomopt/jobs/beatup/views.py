@@ -13,6 +13,7 @@ from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Curve
     from loomopt.picture.shapes import Drawing
 
 
@@ -46,6 +47,20 @@ class BeatupViews(JobViews):
             begins, ends = sampler.cycle.stretch(pulse.where)
             found |= {"pulse begins": begins, "pulse ends": ends}
         return found
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what the curves are called."""
+        from loomopt.picture.panels import Curve
+
+        return {
+            "psi": Curve("rocker angle"),
+            "psi_1": Curve("rocker speed"),
+            "psi_2": Curve("rocker acceleration"),
+            "psi_tt": Curve("rocker acceleration", at={FRONT: "alpha_fdc"}),
+            "mu": Curve("transmission angle", least="mu_min"),
+            "M3": Curve("reed torque", at={FRONT: "M3_fdc"}),
+            "Md": Curve("crank torque", peak="peak_torque"),
+        }
 
 
 def _numbers(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:

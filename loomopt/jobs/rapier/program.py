@@ -100,12 +100,15 @@ def _reads_effects(scene: Scene) -> bool:
 
 def _demand_figures(scene: Scene) -> None:
     """Raise BadInput for a limit on a figure that nothing in the scene gives."""
-    if set(LOADED) & set(scene.limits) and not model(scene).loads:
+    full = model(scene)
+    missing = [name for name in LOADED if name in scene.limits and not full.has_quantity(name)]
+    if missing:
         raise BadInput(
-            "no effect in the scene makes a tape force",
+            "peak_power needs the speed" if full.loads else "no effect in the scene makes a tape force",
             file=scene.origin,
             key="limits",
-            remedy="Put on head_inertia or tape_friction, or take the limit on tape_force or peak_torque out.",
+            remedy=f"{'Give operation.speed' if full.loads else 'Put on head_inertia or tape_friction'}, or take the "
+            f"limit on {missing[0]} out.",
         )
 
 

@@ -10,6 +10,7 @@ from loomopt.effects import found
 from loomopt.errors import BadInput
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.mechanisms import rapier_faults
+from loomopt.program import drive
 from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
@@ -90,7 +91,7 @@ FIGURES = {
         Figure("theta", "angle", "angle between the sley's dead centres' crank lines"),
         Figure("sley_mu_min", "angle", "least transmission angle of the sley four-bar, at B1", sides=("min",)),
         Figure("tape_force", "force", "peak tape force over the cycle", sides=("max",)),
-        Figure("peak_torque", "torque", "peak crank torque over the cycle", sides=("max",)),
+        *drive.FIGURES,
         Figure("match_rms", "length", "rms distance from the target's table", sides=()),
     )
 }

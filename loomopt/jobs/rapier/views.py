@@ -13,7 +13,10 @@ from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Curve
     from loomopt.picture.shapes import Drawing
+
+SWUNG = "of sley and driving link"
 
 
 class RapierViews(JobViews):
@@ -45,6 +48,23 @@ class RapierViews(JobViews):
         if "s_dwell" in scene.operation:
             found |= {"dwell begins": TURN - reading.dwell_before, "dwell ends": reading.dwell_after}
         return found
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what the curves are called."""
+        from loomopt.picture.panels import Curve
+
+        return {
+            "S": Curve("head travel"),
+            "S_1": Curve("head speed"),
+            "S_2": Curve("head acceleration", peak="peak_acceleration"),
+            "S_3": Curve("head jerk", peak="peak_jerk"),
+            "phi3": Curve("sley", SWUNG),
+            "phi6": Curve("driving link", SWUNG),
+            "phi63": Curve("link on the sley", SWUNG),
+            "mu": Curve("transmission angle", least="mu_min"),
+            "Q": Curve("tape force", peak="tape_force"),
+            "Md": Curve("crank torque", peak="peak_torque"),
+        }
 
 
 VIEWS = RapierViews()

@@ -18,6 +18,7 @@ from loomopt.maths import Number
 from loomopt.mechanisms import cam_limit
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import Spline, named_knots
+from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program, Variable
 from loomopt.program.sampling import Extreme, Sampler
@@ -33,6 +34,7 @@ CYCLE = {
     "pressure_angle_max": "pressure_angle",
     "curvature_min": "concavity",
     "curvature_max": "curvature",
+    **{figure.name: figure.name for figure in drive.FIGURES},
 }
 """Figures that are extremes over the cycle, with their quantities."""
 CLOSE = 1e-9

@@ -17,6 +17,7 @@ from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, c
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.owned import owned
+from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
@@ -110,11 +111,11 @@ class _Task:
         limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
         limits += self._checks() + (self._law(self.law) if self.law else [])
         starts, moves = self._starts(variables), self._moves(variables)
-        # Every force is linear in K1 and K1 X0, and in the speed's square [Qiu21, eq 6]. With a free law any stiffer
-        # spring keeps contact too, and the laws that do for one stiffness are convex.
+        # Every force is linear in K1 and K1 X0, and in the speed's square, but power is not [Qiu21, eq 6]. With a free
+        # law any stiffer spring keeps contact too, and the laws that do for one stiffness are convex.
         free = {v.name for v in variables if v.lower < v.upper} - set(self.law.names if self.law else ())
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
-        linear = not self.checks and (spring or free == {"speed"})
+        linear = not self.checks and (spring or (free == {"speed"} and drive.POWER not in self.scene.limits))
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
         today = (
             named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}

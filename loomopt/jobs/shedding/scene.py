@@ -12,6 +12,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
 from loomopt.mechanisms import cam_follower, cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.program import drive
 from loomopt.program.numbers import check_known
 from loomopt.quantities import (
     Angle,
@@ -111,6 +112,7 @@ FIGURES = {
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
         Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=()),
         Figure("speed", "angular speed", SAID["speed"], sides=()),
+        *drive.FIGURES,
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
         Figure("spring_stretch", "length", "largest elongation of the return spring", sides=("max",)),
         Figure("travel", "length", SAID["travel"], sides=()),

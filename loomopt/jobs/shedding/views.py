@@ -10,7 +10,8 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
 from loomopt.maths import FLOAT, Number
 from loomopt.picture.job_views import JobViews
-from loomopt.picture.panels import Mark, Panel, split
+from loomopt.picture.panels import BY_EFFECT, Curve, Panel
+from loomopt.program.curves import POWER
 from loomopt.program.sampling import Sampler
 from loomopt.program.stretches import near_zero
 from loomopt.scenes import Scene
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
     from loomopt.picture.shapes import Drawing
 
-FORCE = "N [N]"
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
 FLOATS, NARROW = 1e-3, math.radians(5.0)
@@ -69,29 +69,35 @@ class SheddingViews(JobViews):
         angle = job.figures(scene, design)["contact_angle"]
         return found | {"least cam force": math.nan if angle is None else angle}
 
-    def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
-        """Return cam force, forces by effect and travel; pressure angle and curvature where there is a follower."""
-        from loomopt.jobs.shedding.drawing import settled
+    def words(self) -> Mapping[str, Curve]:
+        """Return what the curves are called."""
+        return {
+            "X": Curve("frame travel"),
+            "X_1": Curve("frame speed"),
+            "X_2": Curve("frame acceleration"),
+            "X_3": Curve(shown=False),
+            "s_2": Curve("acceleration s'' of the cam law", peak="law_acceleration"),
+            "N": Curve("cam force", least="contact_min", most="contact_max", wide=True),
+            "return_spring": Curve(panel=BY_EFFECT),
+            "cam_torque": Curve(peak="peak_torque"),
+            "pressure_angle": Curve(peak="pressure_angle_max"),
+            "curvature": Curve("pitch", least="curvature_min", most="curvature_max"),
+            "profile_curvature": Curve(shown=False),
+        }
 
-        job = registry.of(scene)
-        figures, values = job.figures(scene, design), job.numbers_of(scene, design)
-        angle, force, least = figures["contact_angle"], figures["contact_min"], values["N_min"]
-        points: tuple[Mark, ...] = ()
-        if angle is not None and force is not None:
-            said = settled(force, figures["contact_max"] or 0.0)
-            points = (Mark(angle, force, f"least {said:.6g} N at {math.degrees(angle):.2f} deg"),)
-        level = {f"N_min = {least:.6g} N; below, contact is lost": least}
-        forces = tuple(name for name in columns if split(name)[1] == "N" and name != FORCE)
-        shown = [
-            Panel((FORCE,), "cam force N", level, points, wide=True, today=True),
-            Panel(forces, "forces"),
-            Panel(("X [m]",), "travel X"),
-        ]
-        if "pressure_angle [rad]" in columns:
-            sharpest = {"undercut above 1/roller_radius": 1 / values["roller_radius"]}
-            shown.append(Panel(("pressure_angle [rad]",), "pressure angle"))
-            shown.append(Panel(("curvature [1/m]",), "pitch curvature", sharpest))
-        return tuple(shown)
+    def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
+        """Return all panels, with what contact and the roller ask for."""
+        values = registry.of(scene).numbers_of(scene, design)
+        levels = {"N [N]": {"contact is lost below N_min =": (values["N_min"],)}}
+        if "roller_radius" in values:
+            levels["curvature [1/m]"] = {"undercut above 1/roller_radius =": (1 / values["roller_radius"],)}
+        found = super().panels(scene, design, columns)
+        # The law's own acceleration has the frame's shape: it says more only where it is limited. There is no torque in
+        # the dwells, and where forces are known in them alone, none is known.
+        partly = bool(registry.of(scene).model(scene).known_in)
+        left = {"s_2 [1]": "law_acceleration" not in scene.limits, "cam_torque [N*m]": partly, POWER: partly}
+        shown = [panel for panel in found if not left.get(panel.columns[0])]
+        return tuple(panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown)
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what there is to remark upon: forces known in the dwells only, a roller that floats, an undercut."""
