@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from loomopt.effects.kinds import Check, Load, State
 from loomopt.frozen import Frozen
-from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name, split
+from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name
+from loomopt.program.curves import split as split
 from loomopt.program.drive import POWER as PEAK_POWER
 from loomopt.scene_tables import Limit
 from loomopt.scenes import Scene

@@ -140,8 +140,8 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], ta
     own = {**now, **design}
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
-    subject = (target or "design") if design else "today"
-    title = f"{scene.name}, {subject}: curves over the cycle"
+    subject = (f"design for {target}" if target else "a given design") if design else "today's machine"
+    title = f"{scene.name}: {subject}, curves over the cycle"
     drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
     return drawn
 

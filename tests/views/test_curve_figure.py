@@ -97,8 +97,8 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
 @pytest.mark.parametrize("name", packaged.problem_names())
 def test_titles_are_alike_and_names_plain(name, kind):
     figure = drawn(name, kind)
-    subject = lo.load(name).schema.default_target if kind == "solved" else "today"
-    assert figure._suptitle.get_text() == f"{name}, {subject}: curves over the cycle"
+    subject = f"design for {lo.load(name).schema.default_target}" if kind == "solved" else "today's machine"
+    assert figure._suptitle.get_text() == f"{name}: {subject}, curves over the cycle"
     assert not {"M3 [N*m]", "Md [N*m]", "S [mm]", "mu [deg]", "N [N]", "X [mm]"} & set(titled(figure))
     assert all(" " in title.split(" [")[0] for title in titled(figure))
 
@@ -113,7 +113,7 @@ def test_today_itself_has_no_second_curve():
 
 
 def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
-    limits = {"peak_torque": "90 N*m", "peak_power": "5.5 kW", "M3_fdc": "20 N*m"}
+    limits = {"peak_torque": "90 N*m", "peak_power": "5500 W", "M3_fdc": "20 N*m"}
     scene = lo.load("beatup").update({f"limits.{name}.max": value for name, value in limits.items()})
     figures, panels = lo.evaluate(scene).figures, titled(outputs.plotted(tables.curves(scene, {}), scene, {}))
     assert said(panels["crank torque Md [N*m]"])[0].startswith(f"peak -{figures['peak_torque']:.6g} N*m at ")
