@@ -230,7 +230,7 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
         near = [value / size for value in values if low - room <= value / size <= high + room]
         for value in near:
             axes.axhline(value, **style)
-            low, high = min(low, value - room / 60), max(high, value + room / 60)
+            low, high = min(low, value - room / 20), max(high, value + room / 20)
         axes.set_ylim(low, high)
         far = "" if values[0] / size in near else ", beyond the scale"
         entries.append((Line2D([], [], **style), f"{text} {show(values[0], _unit(panel))}{far}"))
