@@ -42,7 +42,7 @@ def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, 
     assert isinstance(figure, Figure)
     assert isinstance(figure, ShownFigure)
     assert figure._repr_png_().startswith(PNG)
-    assert figure.get_suptitle() == found.scene.title
+    assert figure.get_suptitle() == f"{found.scene.name}: design for {found.target}, curves over the cycle"
     assert len(figure.axes) >= len(found.curves().columns) / 3
     assert ElementTree.parse(tmp_path / "curves.svg").getroot().tag.endswith("svg")
     with pytest.raises(lo.BadInput):
@@ -53,8 +53,8 @@ def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, 
 def test_a_plot_is_the_picture_of_the_command(answer, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer.plot("python.png")
-    Path("design.json").write_text(json.dumps(dict(answer.design)))
-    assert run(["simulate", "beatup-light", "--design", "design.json", "--out", "command.png"]) == 0
+    Path("answer.json").write_text(json.dumps(answer.as_dict()))
+    assert run(["simulate", "beatup-light", "--design", "answer.json", "--out", "command.png"]) == 0
     assert Path("python.png").read_bytes() == Path("command.png").read_bytes()
 
 

@@ -17,7 +17,8 @@ def test_a_head_is_what_the_whole_scene_says_and_its_targets_have_results(name):
     assert set(head.targets) == {target for problem, _, target in RESULTS if problem == name}
 
 
-def test_the_list_names_every_scene_with_its_targets_and_source(capsys):
+def test_the_list_names_every_scene_with_its_targets_and_source(capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
     assert run(["list"]) == 0
     out = capsys.readouterr().out
     for name, path in packaged.problems().items():
