@@ -62,7 +62,27 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
         shown = {column: None if number is None else number / size for column, number in numbers.items()}
         marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
         found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
+        found += _per_second(found[-1], words.kind(name), scene, solution.design.get("speed"))
     return _without_rounding(found)
+
+
+PER_SECOND = {"travel acceleration": ("acceleration", 2), "travel jerk": ("jerk", 3)}
+"""Kind of a motion per radian of the crank → its kind in time, and the power of the speed between them."""
+
+
+def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: Any) -> list[dict[str, Any]]:
+    """Return the row of a motion in time beside one per crank angle, where the speed is known; speed: a design's own."""
+    known = scene.operation.get("speed")
+    if kind not in PER_SECOND or known is None:
+        return []
+    real, power = PER_SECOND[kind]
+    unit = scene.shown_in(real)
+    size = factor(row["unit"]) / factor(unit)
+    speeds = {"today": known, "design": known if speed is None else speed}
+    shown = {column: None if row[column] is None else row[column] * size * at**power for column, at in speeds.items()}
+    return [
+        row | {"name": f"{row['name']}_t", "unit": unit, **shown, "min": None, "max": None, "binds": "", "ok": True}
+    ]
 
 
 def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:

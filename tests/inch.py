@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import loomopt as lo
+from loomopt import packaged
 from loomopt.quantities import QuantityError, exact, parse_unit, read
 from loomopt.units import SI_UNIT
 
@@ -24,7 +25,11 @@ UNITS = {
 
 def scene(name: str, **changes: str) -> lo.Scene:
     """Return a packaged scene in inches; changes: keys with "__" for the dot, such as operation__speed="350 rpm"."""
-    found = lo.scene(_converted(lo.load(name).document))
+    document = _converted(lo.load(name).document)
+    for own in document.get("targets", {}).values():
+        if "table" in own:  # a scene that is no file has no folder
+            own["table"] = str(packaged.problems()[name].parent / own["table"])
+    found = lo.scene(document)
     return found.update({key.replace("__", "."): value for key, value in changes.items()}) if changes else found
 
 

@@ -1,8 +1,10 @@
 """Tables: units in the column names, provenance with every table, digits that come back from CSV."""
 
 import io
+import math
 import re
 
+import inch
 import pandas as pd
 import pytest
 
@@ -70,6 +72,25 @@ def test_a_scene_in_inches_gives_a_table_in_inches():
     table = tables.answer(lo.evaluate(scene), scene)
     assert table.loc["l1", "unit"] == "in"
     assert table.loc["l1", "design"] == pytest.approx(1.25, rel=1e-14)
+
+
+@pytest.mark.parametrize(("units", "length"), [(lo.load, 1.0), (inch.scene, 0.0254)], ids=["mm", "in"])
+def test_a_motion_per_radian_stands_in_the_table_per_second_too(units, length):
+    """At 350 rpm, by the speed squared and cubed; without a speed there is no such row."""
+    scene, omega = units("rapier").set("operation.speed", "350 rpm"), 350 * math.pi / 30
+    table, figures = lo.evaluate(scene).table(), lo.evaluate(scene).figures
+    for name, power in (("peak_acceleration", 2), ("peak_jerk", 3), ("rms_jerk", 3)):
+        row = table.loc[f"{name}_t"]
+        assert row["unit"] == f"{'m' if length == 1.0 else 'in'}/s^{power}"
+        assert row["design"] * length == pytest.approx(figures[name] * omega**power, rel=1e-12)
+
+
+def test_without_a_speed_motion_stands_per_radian_only():
+    document = inch.scene("rapier").document
+    operation = {key: value for key, value in document["operation"].items() if key != "speed"}
+    table = lo.evaluate(lo.scene({**document, "operation": operation})).table()
+    assert "peak_acceleration" in table.index
+    assert not [name for name in table.index if name.endswith("_t")]
 
 
 def test_csv_reads_back_to_the_last_digit(answer):

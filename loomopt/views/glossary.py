@@ -1,7 +1,8 @@
 """Every symbol that a table shows, in words, and every figure that a source prints."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
 
 from loomopt.effects.kinds import Check, Load
 from loomopt.jobs import registry, sources
@@ -10,8 +11,9 @@ from loomopt.picture.panels import split
 from loomopt.picture.shapes import Text
 from loomopt.quantities import quantity_of
 from loomopt.scenes import Scene
-from loomopt.schema import Table
+from loomopt.schema import Figure, Table
 from loomopt.solving.words import Words
+from loomopt.tables import PER_SECOND
 from loomopt.units import SI_UNIT
 from loomopt.views.layout import Grid
 
@@ -58,8 +60,15 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
             each for effect in schema.effects.values() for each in _numbers(scene, effect.own, f"{effect.name}.")
         ],
         "Columns of the curves": list(columns(scene)),
-        "Figures": [Symbol(each.name, words.unit(each.name), each.text) for each in schema.figures.values()],
+        "Figures": [each for figure in schema.figures.values() for each in _figure(figure, scene, words)],
     }
+
+
+def _figure(figure: Figure, scene: Scene, words: Words) -> Iterator[Symbol]:
+    """Yield a figure and, with the speed known, what tables show of it in time."""
+    yield Symbol(figure.name, words.unit(figure.name), figure.text)
+    if figure.kind in PER_SECOND and "speed" in scene.operation:
+        yield Symbol(f"{figure.name}_t", scene.shown_in(PER_SECOND[figure.kind][0]), f"{figure.text}, in time")
 
 
 def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> Grid:
@@ -95,8 +104,7 @@ def columns(scene: Scene) -> Iterator[Symbol]:
 
 def _called(views: JobViews, name: str, unit: str) -> str:
     """Return what a job calls a column of its own; one of several of a kind by that kind too; "" where it does not."""
-    words: Mapping[str, Any] = getattr(views, "words", dict)()
-    curve = words.get(name)
+    curve = views.words().get(name)
     if not (curve and curve.name):
         return name.replace("_", " ") if len(name) > LONGEST_SYMBOL else ""
     return f"{KINDS[unit]} of {curve.name}" if curve.panel and unit in KINDS else str(curve.name)
@@ -118,7 +126,7 @@ def labels(scene: Scene) -> frozenset[str]:
     if views.missing(scene):
         return frozenset()
     texts = {part.text for part in views.linkage(scene, {}).primitives if isinstance(part, Text)}
-    named = {text.partition(" = ")[0] for text in texts if " = " in text}
+    named = {name for text in texts for name in re.findall(r"(\w+) = ", text)}
     return frozenset(named | {name for name, letter in GREEK.items() if letter in named})
 
 
