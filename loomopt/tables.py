@@ -71,7 +71,7 @@ PER_SECOND = {"travel acceleration": ("acceleration", 2), "travel jerk": ("jerk"
 
 
 def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: Any) -> list[dict[str, Any]]:
-    """Return the row of a motion in time beside one per crank angle, where the speed is known; speed: a design's own."""
+    """Return the row of a motion in time beside one per crank angle, where the speed is known; speed: the design's."""
     known = scene.operation.get("speed")
     if kind not in PER_SECOND or known is None:
         return []

@@ -9,7 +9,6 @@ import pytest
 import loomopt as lo
 from loomopt.cli import run
 from loomopt.jobs import registry, sources
-from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import split
 from loomopt.quantities import quantity_of
 from loomopt.views import glossary
