@@ -8,7 +8,7 @@ solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
 
 test: .venv/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadgroup --durations 10
+	$(BIN)/python -m pytest -n auto --dist loadfile --durations 10
 
 lint: .venv/installed-test
 	$(BIN)/ruff check .

@@ -128,7 +128,7 @@ def test_the_wheel_names_its_licence_and_command(wheel):
 
 @wheel_needed
 def test_the_installed_command_works_from_any_folder(installed, tmp_path):
-    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    environment = {**os.environ, "PYTHONPATH": str(installed), "COLUMNS": "300"}
 
     def run(*arguments):
         command = [str(installed / "bin" / "loomopt"), *arguments]

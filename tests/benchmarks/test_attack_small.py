@@ -13,7 +13,7 @@ from test_benchmarks_small import FOLDER
 
 import loomopt as lo
 
-COUNTS = {"rapier": 3, "beatup": 5, "shedding": 10}
+COUNTS = {"rapier": 2, "beatup": 3, "shedding": 10}
 NARROW = {
     "l4": "8 21 mm",
     "l5": "455 563 mm",

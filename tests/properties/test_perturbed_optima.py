@@ -18,7 +18,6 @@ from loomopt.jobs import registry
 from loomopt.nlp.point import sampler_at
 from loomopt.solving.certificate import certify
 
-pytestmark = pytest.mark.xdist_group("perturbed_optima")
 ACCURACY = 1e-8
 OPTIMA = {
     "beatup balance": ("beatup", "balance", {}),

@@ -18,7 +18,6 @@ from loomopt.solving.forward import Forward
 from loomopt.solving.rows import active_set
 from loomopt.tolerances import JET_ERROR
 
-pytestmark = pytest.mark.xdist_group("forward")
 OPTIMA = [
     ("beatup", "balance"),
     ("beatup", "pulse"),

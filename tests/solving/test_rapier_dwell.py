@@ -8,7 +8,6 @@ from rapier_by_hand import Drive
 
 import loomopt as lo
 
-pytestmark = pytest.mark.xdist_group("rapier_dwell")
 TABLE = range(25, 46, 2)
 
 

@@ -6,8 +6,6 @@ import pytest
 
 import loomopt as lo
 
-pytestmark = pytest.mark.xdist_group("rapier_starts")
-
 STARTS = 30
 
 

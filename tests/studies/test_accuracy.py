@@ -16,7 +16,6 @@ from loomopt.tolerances import NO_ORDER
 from loomopt.views import accuracy_figure
 from tests.views import overlaps
 
-pytestmark = pytest.mark.xdist_group("accuracy")
 SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))
 LINEAR_PROGRAMMES = {
     8: 75219.70679752559,
