@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: solve test lint types benchmark clean
+.PHONY: solve test lint types docs benchmark clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
@@ -16,6 +16,9 @@ lint: .venv/installed-test
 
 types: .venv/installed-test
 	$(BIN)/mypy
+
+docs: .venv/installed
+	$(BIN)/python docs/write.py
 
 benchmark: .venv/installed-test
 	$(BIN)/pip install -q -e '.[bench]'

@@ -6,17 +6,18 @@
 
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
-    from loomopt.api import Answer, evaluate, load, prove, scene, simulate, solve
+    from loomopt.api import Answer, Evaluation, evaluate, load, prove, scene, simulate, solve
     from loomopt.errors import BadInput
     from loomopt.scenes import Scene
-    from loomopt.solving.solution import Evaluation
+    from loomopt.solving.proof import Proofs
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Answer": "loomopt.api",
     "BadInput": "loomopt.errors",
-    "Evaluation": "loomopt.solving.solution",
+    "Evaluation": "loomopt.api",
+    "Proofs": "loomopt.solving.proof",
     "Scene": "loomopt.scenes",
     "evaluate": "loomopt.api",
     "load": "loomopt.api",
@@ -26,7 +27,19 @@ _HOMES = {
     "solve": "loomopt.api",
 }
 
-__all__ = ["Answer", "BadInput", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
+__all__ = [
+    "Answer",
+    "BadInput",
+    "Evaluation",
+    "Proofs",
+    "Scene",
+    "evaluate",
+    "load",
+    "prove",
+    "scene",
+    "simulate",
+    "solve",
+]
 
 
 def __getattr__(name: str) -> object:

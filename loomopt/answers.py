@@ -79,10 +79,10 @@ def _text(value: object) -> str:
 
 
 def _values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
-    """Yield what decides an answer by dotted key; values of effects under one key, whether they are on or off."""
+    """Yield what decides an answer, and how it is shown, by dotted key; values of effects that are on or off alike."""
     if (name := looked_up(document, ("problem", "name"))) is not None:
         yield "problem.name", name
-    for table in ("operation", "mechanism", "available", "effects", "bounds", "limits", "targets"):
+    for table in ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets"):
         whole = "effects" if table == "available" else table
         for parts, value in _leaves(document.get(table, {})):
             if table != "targets" or "expected" not in parts:

@@ -1,18 +1,16 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
-import dataclasses
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from loomopt import designs
+from loomopt import designs, results
 from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
+from loomopt.results import Answer, Evaluation
 from loomopt.scenes import Scene
-from loomopt.solving import engine
+from loomopt.solving import engine, solution
 from loomopt.solving.asked import ACCURACY, GAP, SECONDS, Everywhere, check_numbers, target_name
-from loomopt.solving.solution import Evaluation, Solution
 from loomopt.tolerances import SLACK
 
 if TYPE_CHECKING:
@@ -23,41 +21,7 @@ if TYPE_CHECKING:
 Given = Scene | str | os.PathLike[str]
 """A scene, or what `load` takes: a packaged name or a path."""
 
-__all__ = ["Answer", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
-
-
-@dataclass(frozen=True)
-class Answer(Solution):
-    """A solved target that shows itself: as tables, as curves, and in Jupyter."""
-
-    scene: Scene = field(kw_only=True, repr=False)
-
-    def table(self) -> "pd.DataFrame":
-        """Return the design and its figures beside today's machine and the limits, in the scene's own units."""
-        from loomopt import tables
-
-        return tables.answer(self, self.scene)
-
-    def curves(self) -> "pd.DataFrame":
-        """Return the curves of the design over the cycle, SI, units in the column names."""
-        return self.simulate()
-
-    def evaluate(self) -> Evaluation:
-        """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
-        return evaluate(self.scene, self.design, self.target)
-
-    def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
-        """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`."""
-        return simulate(self.scene, self.design, self.target, accuracy=accuracy)
-
-    def prove(self, *, slack: float = SLACK) -> "Proofs":
-        """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`."""
-        return prove(self.scene, self.design, self.target, slack=slack)
-
-    def _repr_html_(self) -> str:
-        from loomopt.views import notebook
-
-        return notebook.answer(self, self.scene)
+__all__ = ["Answer", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
 
 
 def solve(
@@ -67,7 +31,7 @@ def solve(
     accuracy: float = ACCURACY,
     starts: int | None = None,
     seed: int = 0,
-    near: Solution | None = None,
+    near: solution.Solution | None = None,
     prove: bool = False,
     everywhere: bool = False,
     gap: float = GAP,
@@ -99,22 +63,21 @@ def solve(
         on_start=on_start,
         on_step=on_step,
     )
-    fields = {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(Solution)}
-    return Answer(**fields | {"scene": own})
+    return results.solved(found, own)
 
 
-def evaluate(scene: Given, design: Design | Evaluation | None = None, target: str | None = None) -> Evaluation:
+def evaluate(scene: Given, design: Design | solution.Evaluation | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
 
     design: a mapping, or an answer, of which the design alone is taken: `answer.evaluate()` takes its scene and target
     too. target: whose limits, the job's default without one.
     """
     own = _scene(scene)
-    return engine.evaluate(own, _design(design, own), target)
+    return results.evaluated(own, _design(design, own), target)
 
 
 def prove(
-    scene: Given, design: Design | Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
+    scene: Given, design: Design | solution.Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
 ) -> "Proofs":
     """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
@@ -130,7 +93,7 @@ def prove(
 
 def simulate(
     scene: Given,
-    design: Design | Evaluation | None = None,
+    design: Design | solution.Evaluation | None = None,
     target: str | None = None,
     *,
     accuracy: float | None = None,
@@ -155,9 +118,9 @@ def _scene(given: Given) -> Scene:
     return given if isinstance(given, Scene) else load(given)
 
 
-def _design(given: Design | Evaluation | None, scene: Scene) -> dict[str, float]:
+def _design(given: Design | solution.Evaluation | None, scene: Scene) -> dict[str, float]:
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
-    if isinstance(given, Evaluation):
+    if isinstance(given, solution.Evaluation):
         if given.scene:
             from loomopt import answers
 

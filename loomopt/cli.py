@@ -20,7 +20,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import typer  # noqa: E402
 
-from loomopt import __version__, commands, interrupts  # noqa: E402
+from loomopt import commands, interrupts  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark, worded  # noqa: E402
@@ -34,11 +34,14 @@ CommandLineError: type[Any] = typer.BadParameter.__mro__[2]
 
 
 def start(
-    context: typer.Context, version: Annotated[bool, typer.Option("--version", help="Show the version.")] = False
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the versions: its own, CasADi's, IPOPT's.")] = False,
 ) -> None:
     """Show the version, or what there is to do."""
     if version:
-        print(f"loomopt {__version__}")
+        from loomopt import versions
+
+        print(versions.line())
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())

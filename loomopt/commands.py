@@ -47,16 +47,18 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt.jobs import registry
-    from loomopt.views import layout, scene_view
+    from loomopt import entry_points, packaged
+    from loomopt.views import layout, listing
 
-    scenes, faults = [], list(registry.brought()[1])
-    for name in registry.problems():
-        try:
-            scenes.append(registry.load(name))
-        except BadInput as error:
-            faults.append(error)
-    layout.show(scene_view.listing(scenes))
+    heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
+    silent = [head.name for head in heads if not head.targets]
+    if silent or entry_points.of("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
+        from loomopt.jobs import registry
+
+        others, wrong = registry.brought()
+        read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
+        heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
+    layout.show(listing.grid(sorted(heads)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
@@ -81,25 +83,38 @@ def _write(place: Path, text: str) -> None:
     place.write_text(text, encoding="utf-8")
 
 
+def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")]) -> None:
+    """Print the JSON Schema of a scene, for editors."""
+    import json
+
+    from loomopt.jobs import registry
+    from loomopt.views import json_schema
+
+    print(json.dumps(json_schema.scene(registry.declared(job)), indent=1, ensure_ascii=False))
+
+
 def show(
     problem: Problem,
     equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
+    symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
+    sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
     figure: Annotated[Path | None, typer.Option(metavar="F", help="Draw the mechanism: .png, .svg or .pdf.")] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
 ) -> None:
-    """Show a scene as it was read; its equations; a drawing."""
-    from loomopt.views import layout, outputs, scene_view
+    """Show a scene: as read, its equations, symbols, sources; draw it."""
+    from loomopt.views import glossary, layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)
     if figure:
         outputs.picture(figure, scene, {})
         remark(f"Wrote {figure}")
-    if equations:
-        layout.show(*scene_view.equations(scene))
-    elif not figure:
-        layout.show(*scene_view.parts(scene))
+    shown: list[str | layout.Grid] = [*scene_view.equations(scene)] if equations else []
+    shown += glossary.parts(scene) if symbols else []
+    shown += glossary.printed(scene) if sources else []
+    if shown or not figure:
+        layout.show(*(shown or scene_view.parts(scene)))
 
 
 def evaluate(
@@ -190,15 +205,17 @@ def export(
     off: Without = None,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
+    from loomopt import api
     from loomopt.views import outputs
 
-    scene, given, _ = read_asked(problem, design, target, sets, on, off)
-    outputs.linkage(out, scene, given)
+    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    said = outputs.what(api.evaluate(scene, given, name)) if given else ""
+    outputs.linkage(out, scene, given, said)
     remark(f"Wrote {out}")
     remarked(scene, given)
 
 
-FIRST: dict[str, Callable[..., None]] = {"list": list_problems, "new": new, "show": show}
+FIRST: dict[str, Callable[..., None]] = {"list": list_problems, "new": new, "schema": schema, "show": show}
 OF_A_DESIGN: dict[str, Callable[..., None]] = {
     "evaluate": evaluate,
     "prove": prove,

@@ -122,7 +122,7 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
         if places != list(range(len(places))):
             remedy = f"Give all from {of}_0 on, or {of} as a list"
             raise refusal(f"numbers of {of} are missing", origin, f"design.{of}", remedy=remedy)
-    fault = scene.schema.fault({**scene.mechanism, **design})
+    fault = scene.schema.fault({**scene.mechanism, **design}, scene.show)
     if fault:
         remedy = "Correct its lengths; numbers without a unit are metres and radians"
         raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy=remedy)
@@ -157,7 +157,7 @@ def _largest(scene: Scene, name: str, kind: str) -> float:
 
 def _meant(scene: Scene, name: str, kind: str, value: float, origin: str) -> BadInput:
     """Return the error for a bare number that is too large for its unit in SI."""
-    unit = scene.unit(name, kind)
+    unit = scene.shown_in(kind)
     unit = DISPLAY_UNIT[kind] if unit == SI_UNIT[kind] else unit
     problem = f"a number without a unit is SI, and this is far beyond the machine: {MEANT[kind]}?"
     remedy = f'Write "{value:.6g} {unit}", or "{show(value, SI_UNIT[kind])}" where {MEANT[kind]} are meant'

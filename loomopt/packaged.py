@@ -4,8 +4,10 @@ import difflib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from loomopt.errors import BadInput
+from loomopt.scene_document import looked_up, read_document
 from loomopt.scene_errors import clean, shown
 
 
@@ -22,6 +24,24 @@ def scenes(folder: Path) -> dict[str, Path]:
 def problems() -> dict[str, Path]:
     """Return the files of the packaged scenes by name, in alphabetical order."""
     return scenes(_folder("problems"))
+
+
+class Head(NamedTuple):
+    """What `loomopt list` tells of a scene; targets: those it has a table for."""
+
+    name: str
+    title: str
+    job: str
+    targets: tuple[str, ...]
+    source: str
+
+
+def head(path: Path) -> Head:
+    """Return the head of a packaged scene, nothing else of which is looked at. Raises BadInput."""
+    document = read_document(path)
+    title, job, source = (str(looked_up(document, ("problem", key)) or "") for key in ("title", "job", "source"))
+    targets = looked_up(document, ("targets",))
+    return Head(path.stem, title, job, tuple(targets) if isinstance(targets, dict) else (), source)
 
 
 def problem_names() -> list[str]:

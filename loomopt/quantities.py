@@ -11,15 +11,18 @@ from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, GetCoreSchemaHandler
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from loomopt.quantity_patterns import NUMBER as _NUMBER
+from loomopt.quantity_patterns import schema
 from loomopt.tolerances import NARROWEST
 from loomopt.units import DISPLAY_UNIT as DISPLAY_UNIT
 from loomopt.units import SI_UNIT as SI_UNIT
 from loomopt.units import UNITS as UNITS
 from loomopt.units import QuantityError as QuantityError
 from loomopt.units import Unit
+from loomopt.units import ascii_unit as ascii_unit
 from loomopt.units import factor as factor
 from loomopt.units import fits as fits
 from loomopt.units import parse_unit as parse_unit
@@ -29,7 +32,6 @@ _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque"
 _LONGEST_TEXT = 100
 _MOST_DIGITS, _MOST_ZEROS = 20, 16
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _PLAIN = re.compile(_NUMBER)
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
 _RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
@@ -145,9 +147,14 @@ def _check_dimension(unit: Unit, unit_text: str, number: str, kind: str) -> None
             "an angular speed in rpm, turn/min, deg/s or rad/s",
             f'If turns are meant, write "{turns:g} rpm"',
         )
+    raise _refusal(kind, misfit(unit_text, kind), f"Write it in {DISPLAY_UNIT[kind]}")
+
+
+def misfit(unit_text: str, kind: str) -> str:
+    """Return what a unit is of that is none of a kind of quantity, in words."""
     others = [other for other in SI_UNIT if other != "number" and fits(unit_text, other)]
     what = f"a unit of {others[0]}, not of {kind}" if others else f"not a unit of {kind}"
-    raise _refusal(kind, f'"{unit_text}" is {what}', f"Write it in {DISPLAY_UNIT[kind]}")
+    return f'"{unit_text}" is {what}'
 
 
 def _refusal(kind: str, problem: str, remedy: str = "") -> QuantityError:
@@ -219,6 +226,12 @@ class Quantity(NamedTuple):
         """Let pydantic read a field of this type by `validate`."""
         return core_schema.no_info_plain_validator_function(self.validate)
 
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return what an editor may check of it."""
+        kind, least, above, below = self
+        said = f"{described(kind)}, {self.range}" if self.range else described(kind)
+        return schema(kind, least, above, below, said)
+
 
 class NumberList(NamedTuple):
     """A list of pure numbers, as in TOML or as JSON text; at most `longest` of them."""
@@ -237,6 +250,10 @@ class NumberList(NamedTuple):
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Let pydantic read a field of this type by `validate`."""
         return core_schema.no_info_plain_validator_function(self.validate)
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return what an editor may check of it."""
+        return {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": self.longest}
 
 
 def _parsed(text: str) -> object:

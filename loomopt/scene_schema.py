@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.effects.kinds import Effect
 from loomopt.schema import Figure, Table, Target
+from loomopt.units import Shown
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene
@@ -19,7 +20,8 @@ class SceneSchema:
     effects: by name, in the order of the job. variables: design variables → kind of quantity, in the order shown.
     figures: the job's own; those of its effects come with them (`all_figures`).
     check(scene): raises BadInput when today's machine is not one this job can work on.
-    fault(design): why a design, SI, cannot work as this mechanism; "" when it can.
+    fault(design, shown): why a design, SI, cannot work as this mechanism, its numbers as `shown` tells them; "" when
+    it can.
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
     groups: name → bounds that --free frees together.
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
@@ -36,7 +38,7 @@ class SceneSchema:
     targets: Mapping[str, Target]
     default_target: str
     check: "Callable[[Scene], None]"
-    fault: Callable[[Mapping[str, float]], str]
+    fault: Callable[[Mapping[str, float], Shown], str]
     needs: tuple[str, ...] = ()
     own_margins: Mapping[str, str] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

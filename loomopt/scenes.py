@@ -4,22 +4,24 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
+from loomopt import scene_display
 from loomopt import scene_tables as read
 from loomopt.effects.kinds import Effect
 from loomopt.frozen import freeze
+from loomopt.lazy import lazy
 from loomopt.owned import label, owned
-from loomopt.quantities import unit_of
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
 from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Table
-from loomopt.units import DISPLAY_UNIT, fits
+from loomopt.showing import Shown
+from loomopt.units import show
 
 _Own = TypeVar("_Own", bound=Table)
 
-TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "targets")
+TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
 
 
 class Jobs(Protocol):
@@ -35,8 +37,8 @@ class Jobs(Protocol):
         """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(Shown):
     """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
 
     document: the raw tables, never to be changed; origin: the file they came from; schema: what its job declares.
@@ -46,22 +48,22 @@ class Scene:
     paths: where the files lie that it names.
     """
 
-    document: Mapping[str, Any] = field(repr=False)
+    document: Mapping[str, Any]
     origin: str
-    schema: SceneSchema = field(repr=False)
-    jobs: Jobs = field(repr=False, compare=False)
+    schema: SceneSchema
+    jobs: Jobs = field(compare=False)
     name: str
     title: str
-    source: str = field(repr=False)
+    source: str
     operation: Mapping[str, float]
     mechanism: Mapping[str, float]
-    tables: Mapping[str, Table] = field(repr=False)
+    tables: Mapping[str, Table]
     effects: Mapping[str, Table]
-    active: tuple[Effect, ...] = field(repr=False)
+    active: tuple[Effect, ...]
     bounds: Mapping[str, Bound]
     limits: Mapping[str, Limit]
-    targets: Mapping[str, Table] = field(repr=False)
-    paths: Paths = field(repr=False, compare=False)
+    targets: Mapping[str, Table]
+    paths: Paths = field(compare=False)
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -70,6 +72,10 @@ class Scene:
     def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths]]:
         """Return how to make it again: from its tables, for formulas do not pickle."""
         return build, (self.document, self.jobs, self.origin, self.paths)
+
+    def __repr__(self) -> str:
+        on = ", ".join(self.effects) or "none"
+        return f"<Scene {self.name}: {self.title} (job {self.job}; effects {on})>"
 
     @property
     def job(self) -> str:
@@ -98,26 +104,22 @@ class Scene:
             return None
         return value if isinstance(value, str) else shown(value)
 
-    def unit(self, name: str, kind: str) -> str:
-        """Return the unit in which a variable or figure is shown: as the scene writes it, else its kind's."""
-        places: list[tuple[str, ...]] = [("mechanism", name), ("operation", name)]
-        keys = [(effect, key) for effect in self.active for key in effect.own.model_fields]
-        places += [("effects", *effect.path, key) for effect, key in keys if name in (key, label(effect, key))]
-        texts = [looked_up(self.document, place) for place in places]
-        units = [unit_of(text) for text in texts if isinstance(text, str)]
-        units += [table[name].unit for table in (self.bounds, self.limits) if name in table]
-        return next((unit for unit in units if fits(unit, kind)), DISPLAY_UNIT[kind])
+    @lazy
+    def units(self) -> Mapping[str, str]:
+        """Kind of quantity → the unit in which a person sees it: of [display], else as written, else composed."""
+        return scene_display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
 
     def shown_in(self, kind: str) -> str:
-        """Return the unit in which a person sees quantities of a kind: the first one the scene writes, else ours."""
-        named: list[tuple[tuple[str, ...], type[Table]]] = [
-            (("mechanism",), self.schema.mechanism),
-            (("operation",), self.schema.operation),
-        ]
-        named += [(("effects", *effect.path), effect.own) for effect in self.active]
-        texts = [looked_up(self.document, (*path, key)) for path, own in named for key in own.model_fields]
-        units = [unit_of(text) for text in texts if isinstance(text, str) and text[:1] in "+-.0123456789"]
-        return next((unit for unit in units if fits(unit, kind)), DISPLAY_UNIT[kind])
+        """Return the unit in which a person sees quantities of a kind."""
+        return self.units[kind]
+
+    def unit_for(self, si: str) -> str:
+        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        return scene_display.unit_for(si, self.units)
+
+    def show(self, value: float, kind: str, digits: int = 6) -> str:
+        """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
+        return show(value, self.units[kind], digits)
 
     def set(self, key: str, value: object) -> "Scene":
         """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
@@ -254,6 +256,7 @@ def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | N
     places = list(read.places(schema, tables, active, available))
     own_targets = {name: {} for name in schema.targets} | dict(read.table(raw["targets"], origin, "targets"))
     targets = {name: target.own for name, target in schema.targets.items()}
+    scene_display.read(raw["display"], origin)
     scene = Scene(
         document=original,
         origin=clean(origin),

@@ -17,11 +17,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+REACHED = {None: "", True: "yes", False: "no"}
+
+
 def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
-    """Return one row per design variable and figure: today, design, limits and unit, in the scene's own units."""
+    """Return one row per design variable and figure: today, design, limits and unit, in the scene's display units.
+
+    binds: the side, min or max, on which a solved design's limit binds; reached: yes or no
+    where the target asks what may be out of reach.
+    """
     from loomopt.table_frame import TableFrame
 
-    frame = TableFrame(rows(solution, scene))
+    found = rows(solution, scene)
+    left_out = {"reached"} if not solution.reached else set()
+    if not isinstance(solution, Solution):
+        left_out.add("binds")
+    frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in found])
     more = {}
     if isinstance(solution, Solution):
         more = {"target": solution.target, "accuracy": solution.solver["accuracy"]}
@@ -37,6 +48,8 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
     words = Words(scene)
     before = before or (solution.before if isinstance(solution, Solution) else None)
     limits = {limit.name: limit for limit in solution.limits}
+    prices = solution.binding if isinstance(solution, Solution) else ()
+    binding = {price.limit: price.side for price in prices}
     found = []
     for name, value in {**solution.design, **solution.figures}.items():
         if value is None or name == "change" or name in scene.schema.lists:
@@ -47,7 +60,8 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
         low, high = (limit.min, limit.max) if limit else (None, None)
         numbers = {"today": old, "design": value, "min": low, "max": high}
         shown = {column: None if number is None else number / size for column, number in numbers.items()}
-        found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True})
+        marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
+        found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
     return _without_rounding(found)
 
 
@@ -61,6 +75,25 @@ def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if row[column] is not None and abs(row[column]) <= SHOWN_AS_ZERO * sizes[row["unit"]]:
                 row[column] = 0.0
     return found
+
+
+def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
+    """Return design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
+
+    A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.
+    """
+    from loomopt.table_frame import TableFrame
+
+    words, shown = Words(scene), {} if si else {each["name"]: each["design"] for each in rows(solution, scene)}
+    cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
+    for name, value in {**solution.design, **solution.figures}.items():
+        listed = name in scene.schema.lists
+        unit = words.si(name) if si or listed else words.unit(name)
+        if value is not None:
+            cells[f"{name} [{unit}]"] = shown[name] if name in shown else value if listed else value / factor(unit)
+    frame = TableFrame([cells])
+    frame.attrs.update(provenance(scene, target=target))
+    return frame
 
 
 def curves(

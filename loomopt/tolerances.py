@@ -342,9 +342,9 @@ REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 """Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
 which moves more than its objective does."""
 
-CURVE_CLOSE, CURVE_NARROW = 5e-7, 1e-8
-"""How far, m, a traced curve may lie from the true one: half of the micrometre that is promised; the same as a share of
-the machine where that is more, for a machine of a kilometre."""
+CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED = 5e-7, 1e-8, 2.0
+"""How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a huge
+machine; and the chord tolerance that is promised over what is measured."""
 
 SHOWN_AS_ZERO = 1e-8
 """Share of the largest number of its kind below which one is shown as 0: the accuracy asked by default."""

@@ -8,7 +8,7 @@ import functools
 import math
 import re
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 
 class QuantityError(ValueError):
@@ -29,6 +29,7 @@ class Unit(NamedTuple):
 _PI = Fraction("3.14159265358979323846264338327950288419716939937511")
 _INCH, _POUND, _GRAVITY = Fraction("0.0254"), Fraction("0.45359237"), Fraction("9.80665")
 _PSI = _POUND * _GRAVITY / _INCH**2
+_HORSEPOWER = 550 * 12 * _INCH * _POUND * _GRAVITY
 
 _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] = (
     ((1, 0, 0, 0), {"m": "1", "mm": "1e-3", "cm": "1e-2", "dm": "0.1", "km": "1000", "um": "1e-6"}),
@@ -39,6 +40,7 @@ _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] 
     ((0, 0, -1, 1), {"rpm": _PI / 30}),
     ((0, 0, -1, 0), {"Hz": "1"}),
     ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
+    ((2, 1, -3, 0), {"W": "1", "kW": "1000", "hp": _HORSEPOWER}),
     ((-1, 1, -2, 0), {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "bar": "1e5", "psi": _PSI}),
 )
 UNITS = {name: Unit(Fraction(factor), powers) for powers, names in _TABLE for name, factor in names.items()}
@@ -64,11 +66,23 @@ SI_UNIT: dict[str, str] = {
     "travel acceleration": "m/rad^2",
     "travel jerk": "m/rad^3",
     "curvature": "1/m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "jerk": "m/s^3",
+    "power": "W",
 }
 """Kind of quantity → the SI unit its numbers have inside the program."""
 
 DISPLAY_UNIT = SI_UNIT | {"length": "mm", "angle": "deg", "angular speed": "rpm", "pressure": "MPa"}
 """Kind of quantity → the unit it is shown in where a scene writes none."""
+
+
+class Shown(Protocol):
+    """shown(value, kind, digits): an SI value as text in the unit in which a person sees its kind of quantity."""
+
+    def __call__(self, value: float, kind: str, digits: int = 6, /) -> str:
+        """Return the text; digits: significant ones."""
+
 
 _LARGEST_EXPONENT = 4
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
@@ -89,6 +103,11 @@ def show(value: float, unit_text: str, digits: int = 6) -> str:
     return number if unit_text == "1" else f"{number} {unit_text}"
 
 
+def usual(value: float, kind: str, digits: int = 6) -> str:
+    """Return an SI value as text in the unit of its kind where no scene says another."""
+    return show(value, DISPLAY_UNIT[kind], digits)
+
+
 def fits(unit_text: str, kind: str) -> bool:
     """Say whether a unit is one of a kind of quantity. Raises QuantityError for an unknown unit."""
     *mechanical, angle = parse_unit(unit_text).powers
@@ -104,8 +123,7 @@ def parse_unit(text: str) -> Unit:
     """
     if text == "1":
         return Unit(Fraction(1), (0, 0, 0, 0))
-    plain = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
-    tokens = _TOKEN.findall(plain)
+    tokens = _TOKEN.findall(ascii_unit(text))
     reciprocal = tokens[:2] == ["1", "/"]
     if reciprocal:
         tokens[:2] = []
@@ -113,6 +131,11 @@ def parse_unit(text: str) -> Unit:
     if tokens:
         raise _unit_error(text)
     return _times(parse_unit("1"), unit, -1) if reciprocal else unit
+
+
+def ascii_unit(text: str) -> str:
+    """Return a unit's text in ASCII: N·m² as N*m^2, ° as deg."""
+    return re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPT), text).translate(_LOOKALIKE)
 
 
 def _product(tokens: list[str], text: str) -> Unit:

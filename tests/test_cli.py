@@ -22,11 +22,11 @@ from loomopt.quantities import read
 from loomopt.solving import search
 from loomopt.solving.certificate import certify
 
-KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
-KEYS += ["binding", "certificate", "solver", "global", "time"]
+KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
+KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]
 FIGURES = ["M3_fdc", "peak_torque", "alpha_fdc", "swing", "theta", "beta", "mu_min", "J4", "r4", "pulse_rms"]
 TIMES = ["import_s", "build_s", "solve_s", "settle_s", "certify_s", "report_s", "total_s"]
-SI = {"m", "kg", "rad", "N", "N*m", "rad/s^2", "kg*m^2", "1"}
+SI = {"m", "kg", "rad", "N", "N*m", "rad/s^2", "kg*m^2", "W", "1"}
 
 
 @pytest.fixture
@@ -151,9 +151,9 @@ def test_a_person_sees_a_short_table(cli):
     assert lines[0] == "beatup-light, balance: optimal"
     assert max(map(len, lines)) <= 80
     assert len(lines) < 45
-    assert re.search(r"^ +today +design +unit +limits$", out, re.MULTILINE)
-    assert re.search(r"^l1 +31 +30 +mm +30 \.\.\. 35$", out, re.MULTILINE)
-    assert re.search(r"^M3_fdc +-134\.985 +-76\.9811 +N\*m$", out, re.MULTILINE)
+    assert re.search(r"^ +today +design +unit +limits +binds +reached$", out, re.MULTILINE)
+    assert re.search(r"^l1 +31 +30 +mm +30 \.\.\. 35 +min$", out, re.MULTILINE)
+    assert re.search(r"^M3_fdc +-134\.985 +-76\.9811 +N\*m +no$", out, re.MULTILINE)
     assert re.search(r"^l1 >= 30 mm +M3_fdc +27\.5 N\*m per mm$", out, re.MULTILINE)
     assert len([line for line in lines if line.startswith("Certificate passed")]) == 1
     assert re.fullmatch(r"Time: \d+\.\d{3} s \(import .*, build .*, solve .*, certify .*\)", lines[-1])

@@ -8,8 +8,8 @@ import pytest
 
 from loomopt.cli import run
 
-KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
-KEYS += ["binding", "certificate", "solver", "global", "time"]
+KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
+KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]
 DESIGN = ["l4", "l5", "l6", "l3p", "alpha", "C0x", "C0y", "phi40"]
 SLEY = ["l1", "l2", "l3", "l71"]
 FIGURES = ["stroke", "dwell_after", "dwell_before", "peak_acceleration", "peak_jerk", "mu_min", "phi_stroke"]

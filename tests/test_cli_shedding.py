@@ -14,8 +14,8 @@ with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
     plain = importlib.import_module("plain_shedding")
 
-KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "design", "figures", "units", "limits"]
-KEYS += ["binding", "certificate", "solver", "global", "time"]
+KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
+KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]
 FIGURES = ["K1", "X0", "contact_min", "contact_max", "spring_force_max", "travel", "contact_speed", "law_acceleration"]
 FIGURES += ["pressure_angle_max", "curvature_min"]
 UNITS = {"K1": "N/m", "X0": "m", "contact_min": "N", "contact_max": "N", "spring_force_max": "N", "travel": "m"}
@@ -42,7 +42,8 @@ def cli(capsys, monkeypatch):
 def answered(cli, *arguments, status=0):
     """Return the one JSON object a command prints."""
     code, out, err = cli(*arguments, "--json")
-    assert (code, err) == (status, "")
+    assert code == status
+    assert err == "" or err.startswith("Remark: N_min is 0")
     return json.loads(out, parse_constant=pytest.fail)
 
 
@@ -94,7 +95,7 @@ def test_statics_has_no_contact_speed(cli):
         (
             "shedding-printed-travel",
             plain.PRINTED,
-            "would lift off: the cam force would be -2643.65 N at 89.7180 deg",
+            "would lift off: the cam force would be -2643.65 N at 89.718 deg",
             227.451665133468,
         ),
     ],
@@ -104,7 +105,7 @@ def test_solve_says_in_one_sentence_that_the_papers_spring_would_lift_off(cli, p
     """Where and by how much: the least cam force of 8029.14 N/m by the plain reference."""
     lost, stretch, u = plain.largest(reference, lambda m, *at: -plain.force(m, *at, plain.number(m, 8029.14)))
     angle = float(plain.cam_angle(reference, stretch, u))
-    assert said.endswith(f"{-float(lost):.6g} N at {angle:.4f} deg")
+    assert said.endswith(f"{-float(lost):.6g} N at {angle:.6g} deg")
     status, out, _ = cli("solve", problem)
     assert status == 0
     assert said in " ".join(out.split())

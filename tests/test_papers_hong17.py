@@ -5,22 +5,20 @@ doi 10.19333/j.mfkj.2017050120304. Its linkages are constructed by drawing: what
 misprint contradicts a number of the paper's own.
 """
 
-import csv
 import dataclasses
 import math
-from pathlib import Path
 
 import pytest
 
 import loomopt as lo
 from loomopt import maths
 from loomopt.cycle import Node
-from loomopt.jobs import registry
+from loomopt.jobs import registry, sources
 from loomopt.jobs.rapier.model import HeadPose
 from loomopt.mechanisms import crank_rocker_synthesis, rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 
-ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "hong17.csv").open())}
+ROWS = {row.key: row._asdict() for row in sources.read("rapier").figures}
 RAPIER = lo.load("rapier")
 JOB = registry.of(RAPIER)
 DRAWN = 3e-3

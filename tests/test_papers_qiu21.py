@@ -4,16 +4,15 @@ Qiu H., Dang B., Simulation design of negative cam shedding based on spring retu
 doi 10.3969/j.issn.1001-4551.2021.01.019. Its K1 are of one of two springs; the program's are of both.
 """
 
-import csv
 import math
-from pathlib import Path
 
 import pytest
 
 import loomopt as lo
 from loomopt.effects.shedding import inertia, warp_tension, weight
+from loomopt.jobs import sources
 
-ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "qiu21.csv").open())}
+ROWS = {row.key: row._asdict() for row in sources.read("shedding").figures}
 STATIC, MOVING, SHORT = (lo.load(name) for name in ("shedding-static", "shedding", "shedding-printed-travel"))
 SPRINGS, RESERVE = 2, 1.3
 READ_OFF = 1e-3

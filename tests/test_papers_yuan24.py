@@ -5,12 +5,10 @@ space, J. Tiangong Univ. 43(4), 2024, doi 10.3969/j.issn.1671-024x.2024.04.013. 
 a figure that follows from them is known within the spread of half a millimetre; its angles are printed to 0.01 deg.
 """
 
-import csv
 import functools
 import itertools
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +16,10 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
-from loomopt.jobs import registry
+from loomopt.jobs import registry, sources
 from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 
-ROWS = {row["key"]: row for row in csv.DictReader((Path(__file__).parent / "data" / "yuan24.csv").open())}
+ROWS = {row.key: row._asdict() for row in sources.read("beatup").figures}
 BEATUP = lo.load("beatup")
 HALF = 0.0005
 REFERENCE, LIGHTER, HEAVIER = (0.031, 0.065, 0.155, 0.167), (0.030, 0.084, 0.151, 0.167), (0.032, 0.062, 0.158, 0.167)

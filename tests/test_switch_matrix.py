@@ -19,10 +19,12 @@ from loomopt.program.reading import DATUM
 
 DESIGNS = {"beatup": {"l1": 0.0305, "l2": 0.083, "l3": 0.15, "l4": 0.166, "m4e": 3.0, "r4e": 0.07}}
 MOTION = {
-    "beatup": "psi [rad], psi_1 [1], psi_2 [1]",
+    "beatup": "psi [rad], psi_1 [1], psi_2 [1], mu [rad]",
     "rapier": "S [m], S_1 [m/rad], S_2 [m/rad^2], S_3 [m/rad^3], phi3 [rad], phi6 [rad], phi63 [rad], mu [rad]",
     "shedding": "X [m], X_1 [m/rad], X_2 [m/rad^2], X_3 [m/rad^3], s_2 [1]",
 }
+IN_TIME = {"beatup": "psi_t [rad/s], psi_tt [rad/s^2]"}
+IN_TIME |= {job: f"{s}_t [m/s], {s}_tt [m/s^2], {s}_ttt [m/s^3]" for job, s in (("rapier", "S"), ("shedding", "X"))}
 FORCE = {"beatup": ("M3", "N*m"), "rapier": ("Q", "N"), "shedding": ("N", "N")}
 TORQUE = {"beatup": "Md [N*m]", "rapier": "Md [N*m]", "shedding": "cam_torque [N*m]"}
 AFTER = {"shedding": "pressure_angle [rad], curvature [1/m], profile_curvature [1/m]"}
@@ -156,9 +158,12 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
     force, unit = FORCE[job]
     names = [*ALWAYS.get(job, []), *(COLUMN.get(load.name, load.name) for load in loads)]
     output = ALWAYS.get(job) or any(load.acts == "output" for load in loads)
-    expected = ["phi [rad]", *MOTION[job].split(", "), *(f"{name} [{unit}]" for name in names)]
+    expected = ["phi [rad]", *MOTION[job].split(", ")]
+    known = "speed" in scene_of(combination).operation
+    expected += IN_TIME[job].split(", ") if known else []
+    expected += [f"{name} [{unit}]" for name in names]
     expected += [f"{force} [{unit}]"] if output else []
-    expected += [TORQUE[job]] if names else []
+    expected += ([TORQUE[job], "motor_power [W]"] if known else [TORQUE[job]]) if names else []
     expected += [column for effect in effects_of(combination) for column in CHECKED.get(effect.name, [])]
     assert list(table_of(combination)) == expected + (AFTER[job].split(", ") if job in AFTER else [])
 

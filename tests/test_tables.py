@@ -54,7 +54,7 @@ def test_the_hash_tells_scenes_apart_by_what_decides_the_answer():
 
 def test_the_table_of_an_answer_is_in_the_scenes_own_units(answer):
     table = answer.table()
-    assert list(table.columns) == ["unit", "today", "design", "min", "max", "ok"]
+    assert list(table.columns) == ["unit", "today", "design", "min", "max", "ok", "binds", "reached"]
     assert table.loc["l1", "unit"] == "mm"
     assert table.loc["l1", "today"] == 31
     for name, value in {**answer.design, **answer.figures}.items():

@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from loomopt.maths import Maths, Number
 from loomopt.schema import Figure, Table, Values
+from loomopt.units import Shown
 
 
 class Motion:
@@ -142,7 +143,7 @@ def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
 
 
 def nothing_explained(
-    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Any, clash: Iterable[str]
+    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Any, clash: Iterable[str], shown: Shown
 ) -> str:
     """Return nothing: physics has nothing general to say."""
     return ""
@@ -156,7 +157,7 @@ class Check(Effect, Generic[Pose]):
     rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
     on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
-    explain(known, bounds, own, clash): what physics says of why the limits `clash` do.
+    explain(known, bounds, own, clash, shown): what physics says of why the limits `clash` do, in the reader's units.
     """
 
     quantities: Mapping[str, Reading[Pose]] = field(default_factory=dict)
@@ -165,7 +166,7 @@ class Check(Effect, Generic[Pose]):
     least: str = ""
     axes: tuple[Axis, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
-    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str]], str] = (
+    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str], Shown], str] = (
         nothing_explained
     )
 

@@ -11,7 +11,7 @@ from loomopt.cycle import Floats
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
 from loomopt.program import numbers
-from loomopt.program.curves import STEPS, Columns, curves
+from loomopt.program.curves import STEPS, Columns, curves, tops
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
@@ -104,11 +104,12 @@ class Job(abc.ABC):
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
     ) -> dict[str, Floats]:
-        """Return the curves of a design over one turn, units in the column names; figures of checks stand last."""
+        """Return the curves of a design over one turn, units in the column names; peaks that are figures are rows."""
         sampler = self.sampler(scene, design)
+        peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
         checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
-        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, also)
+        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, [*peaks, *also])
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""

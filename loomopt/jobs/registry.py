@@ -7,12 +7,12 @@ not of this package, and where all are listed. What this package brings itself w
 import functools
 import importlib
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import packaged
+from loomopt import entry_points, packaged
 from loomopt.effects.kinds import Effect, ranked
 from loomopt.errors import BadInput
 from loomopt.jobs.base import Job
@@ -36,12 +36,7 @@ def own_names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in HERE.glob("*/job.py")))
 
 
-@functools.cache
-def _points(group: str) -> "tuple[EntryPoint, ...]":
-    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
-    from importlib.metadata import entry_points
-
-    return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
+_points = entry_points.of
 
 
 def _distribution(point: "EntryPoint") -> str:
@@ -158,6 +153,19 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     return found, tuple(faults)
 
 
+def heads(names: Iterable[str]) -> tuple[list[packaged.Head], list[BadInput]]:
+    """Return what `loomopt list` tells of scenes that are read whole, and what is wrong with any of them."""
+    found, faults = [], []
+    for name in names:
+        try:
+            scene = load(name)
+        except BadInput as error:
+            faults.append(error)
+        else:
+            found.append(packaged.Head(name, scene.title, scene.job, tuple(scene.schema.targets), scene.source))
+    return found, faults
+
+
 def problems() -> dict[str, Path]:
     """Return the files of all packaged scenes by name, those of other distributions too; loomopt's own win."""
     return dict(sorted((brought()[0] | packaged.problems()).items()))
@@ -171,6 +179,12 @@ def results(scene: Scene) -> Path:
 def _folder(job: str, name: str) -> Path:
     """Return a folder of what a job brings. Raises BadInput where the job cannot be imported."""
     return Path(str(find(job).resources / name))
+
+
+def declared(name: str) -> SceneSchema:
+    """Return what scenes of a job may hold, effects of other distributions too. Raises BadInput for an unknown job."""
+    others = [point.name.removeprefix(f"{name}.") for point in _points(EFFECTS) if point.name.startswith(f"{name}.")]
+    return REGISTERED.schema(name, {}, others)
 
 
 def template(name: str) -> str:
@@ -200,6 +214,6 @@ def _read(path: Path, origin: str) -> Scene:
     return build(read_document(path), REGISTERED, origin, Paths(path.parent.absolute()))
 
 
-def scene(document: Mapping[str, Any]) -> Scene:
+def scene(document: Mapping[str, object]) -> Scene:
     """Return the scene that nested tables describe, as a TOML file would. Raises BadInput."""
     return build(document, REGISTERED, "<dict>")

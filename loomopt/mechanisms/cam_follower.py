@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from loomopt.lazy import lazy
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
+from loomopt.units import Shown, usual
 
 if TYPE_CHECKING:
     import numpy as np
@@ -157,8 +158,15 @@ def _points(points: Vector) -> "Floats":
     return np.column_stack((points.x, points.y))
 
 
-def fault(follower: Follower) -> str:
-    """Say why a follower of floats (m, rad) cannot work, with its numbers in mm and degrees; "" when it can."""
+def fault(follower: Follower, shown: Shown = usual) -> str:
+    """Say why a follower of floats (m, rad) cannot work; "" when it can.
+
+    shown(value, kind): a value as text in the reader's unit.
+    """
+
+    def told(length: float) -> str:
+        return shown(length, "length")
+
     a, arm, r0 = follower.centre_distance, follower.arm, follower.base_radius
     named = {"arm": arm, "centre_distance": a, "base_radius": r0, "roller_radius": follower.roller_radius}
     for name, value in {**named, "arm_swing": follower.arm_swing}.items():
@@ -166,27 +174,24 @@ def fault(follower: Follower) -> str:
             return f"{name} must be greater than 0 and finite"
     if not r0 > abs(a - arm):
         return (
-            f"base_radius {_mm(r0)} must be greater than the difference {_mm(abs(a - arm))} of centre_distance "
-            f"{_mm(a)} and arm {_mm(arm)}: the roller cannot come so near to the cam's axis"
+            f"base_radius {told(r0)} must be greater than the difference {told(abs(a - arm))} of centre_distance "
+            f"{told(a)} and arm {told(arm)}: the roller cannot come so near to the cam's axis"
         )
     if not r0 < a + arm:
         return (
-            f"base_radius {_mm(r0)} must be less than centre_distance {_mm(a)} plus arm {_mm(arm)}, {_mm(a + arm)}: "
-            f"the roller cannot reach so far from the cam's axis"
+            f"base_radius {told(r0)} must be less than centre_distance {told(a)} plus arm {told(arm)}, "
+            f"{told(a + arm)}: the roller cannot reach so far from the cam's axis"
         )
     if not follower.roller_radius < r0:
         return (
-            f"roller_radius {_mm(follower.roller_radius)} must be less than base_radius {_mm(r0)} (of the roller's "
+            f"roller_radius {told(follower.roller_radius)} must be less than base_radius {told(r0)} (of the roller's "
             f"centre): nothing is left for the cam"
         )
     start = follower.start_angle(FLOAT)
     if not start + follower.arm_swing < math.pi:
         return (
-            f"the arm starts {math.degrees(start):.6g} deg from the centre line and swings "
-            f"{math.degrees(follower.arm_swing):.6g} deg: it must stay below 180 deg in all, where it is stretched"
+            f"the arm starts {shown(start, 'angle')} from the centre line and swings "
+            f"{shown(follower.arm_swing, 'angle')}: it must stay below {shown(math.pi, 'angle')} in all, where it is "
+            f"stretched"
         )
     return ""
-
-
-def _mm(length: float) -> str:
-    return f"{length * 1e3:.6g} mm"

@@ -3,13 +3,17 @@
 import math
 
 from loomopt.mechanisms.crank_rocker import Lengths, assembly_margins
+from loomopt.units import Shown, usual
 
 TELLING = 1e-15
 """Share of the links' sum below which a margin cannot be told from rounding: the linkage is at its change point."""
 
 
-def fault(l1: float, l2: float, l3: float, l4: float) -> str:
-    """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one."""
+def fault(l1: float, l2: float, l3: float, l4: float, *, shown: Shown = usual) -> str:
+    """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one.
+
+    shown(value, kind): a value as text in the reader's unit.
+    """
     if min(l1, l2, l3, l4) <= 0:
         return "every length must be greater than 0"
     least = TELLING * (l1 + l2 + l3 + l4)
@@ -22,20 +26,20 @@ def fault(l1: float, l2: float, l3: float, l4: float) -> str:
         return math.fsum(sides[name.strip()] for name in side.split("+"))
 
     left, right = failed[0].split("<")
-    reason = f"{failed[0]} fails ({total(left) * 1e3:.6g} mm against {total(right) * 1e3:.6g} mm)"
-    return f"{reason}; {_where_it_stops(l1, l2, l3, l4)}"
+    reason = f"{failed[0]} fails ({shown(total(left), 'length')} against {shown(total(right), 'length')})"
+    return f"{reason}; {_where_it_stops(l1, l2, l3, l4, shown)}"
 
 
-def _where_it_stops(l1: float, l2: float, l3: float, l4: float) -> str:
+def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: Shown) -> str:
     """Say over which crank angles the dyad does not close, for lengths in m."""
     reach, fold = l2 + l3, abs(l2 - l3)
     if l1 + l4 < fold or abs(l4 - l1) > reach:
         return "it assembles at no crank angle"
     stops = []
     if l1 + l4 >= reach:
-        stops.append(f"beyond crank angle {math.degrees(_angle_at(l1, l4, reach)):.6g} deg")
+        stops.append(f"beyond crank angle {shown(_angle_at(l1, l4, reach), 'angle')}")
     if abs(l4 - l1) <= fold:
-        stops.append(f"within {math.degrees(_angle_at(l1, l4, fold)):.6g} deg of crank angle 0")
+        stops.append(f"within {shown(_angle_at(l1, l4, fold), 'angle')} of crank angle 0")
     if stops:
         return f"it does not assemble {' and '.join(stops)}"
     return "it assembles all round, but the rocker turns through: the crank is not the shortest link"

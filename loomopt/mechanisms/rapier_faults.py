@@ -11,17 +11,21 @@ from loomopt import maths
 from loomopt.mechanisms import crank_rocker_faults
 from loomopt.mechanisms.dyad import dot
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.units import Shown, usual
 
 SAMPLES = 3600
 Floats = NDArray[np.float64]
 
 
-def fault(dimensions: Dimensions) -> str:
-    """Say why a drive (m, rad) does not turn all round, and at which crank angles from FDC; "" when it does."""
+def fault(dimensions: Dimensions, shown: Shown = usual) -> str:
+    """Say why a drive (m, rad) does not turn all round, and at which crank angles from FDC; "" when it does.
+
+    shown(value, kind): a value as text in the reader's unit.
+    """
     d = dimensions
     if min(d.l1, d.l2, d.l3, d.l71, d.l3p, d.l4, d.l5, d.l6, d.i1, d.i2, d.wheel) <= 0:
         return "every length and ratio must be greater than 0"
-    four_bar = crank_rocker_faults.fault(d.l1, d.l2, d.l3, d.l71)
+    four_bar = crank_rocker_faults.fault(d.l1, d.l2, d.l3, d.l71, shown=shown)
     if four_bar:
         return f"the sley four-bar is no crank-rocker: {four_bar.replace('l4', 'l71')}"
     phi1 = _angles(d)
@@ -34,7 +38,7 @@ def fault(dimensions: Dimensions) -> str:
         if open_at.all():
             return f"the five-bar closes at no crank angle: {text}"
         if open_at.any():
-            locks.append(f"{text} {_stretches(np.degrees(phi1), open_at)}")
+            locks.append(f"{text} {_stretches(phi1, open_at, shown)}")
     return f"the five-bar locks: {'; '.join(locks)}" if locks else ""
 
 
@@ -60,8 +64,8 @@ def _angles(d: Dimensions) -> Floats:
     return np.unique(np.concatenate([even, np.mod(found, 2 * math.pi)]))
 
 
-def _stretches(degrees: Floats, open_at: NDArray[np.bool_]) -> str:
-    """Return the stretches of crank angle where something holds, as words; one across FDC ends beyond 360 deg."""
+def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: Shown) -> str:
+    """Return the stretches of crank angle, rad, where something holds, as words; one across FDC ends past a turn."""
     inside = [int(k) for k in np.flatnonzero(open_at)]
     runs: list[list[int]] = []
     for k in inside:
@@ -69,15 +73,15 @@ def _stretches(degrees: Floats, open_at: NDArray[np.bool_]) -> str:
             runs[-1].append(k)
         else:
             runs.append([k])
-    spans = [(float(degrees[run[0]]), float(degrees[run[-1]])) for run in runs]
+    spans = [(float(angles[run[0]]), float(angles[run[-1]])) for run in runs]
     if len(runs) > 1 and open_at[0] and open_at[-1]:
-        spans = [*spans[1:-1], (spans[-1][0], spans[0][1] + 360.0)]
-    return " and ".join(f"from {begin:.1f} to {end:.1f} deg" for begin, end in spans)
+        spans = [*spans[1:-1], (spans[-1][0], spans[0][1] + 2 * math.pi)]
+    return " and ".join(f"from {shown(begin, 'angle', 4)} to {shown(end, 'angle', 4)}" for begin, end in spans)
 
 
-def named(design: Mapping[str, float]) -> str:
+def named(design: Mapping[str, float], shown: Shown = usual) -> str:
     """Return `fault` of numbers by name, SI; "" where some of them are not named."""
     names = Dimensions.__dataclass_fields__
     if not all(name in design for name in names):
         return ""
-    return fault(Dimensions(**{name: design[name] for name in names}))
+    return fault(Dimensions(**{name: design[name] for name in names}), shown)

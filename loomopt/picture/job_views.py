@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
-    from loomopt.picture.panels import Panel
+    from loomopt.picture.panels import Curve, Panel
     from loomopt.picture.shapes import Drawing
     from loomopt.scenes import Scene
 
@@ -26,7 +26,7 @@ class JobViews:
         raise NotImplementedError
 
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
-        """Return what `linkage` draws as CSV for the workshop, mm: joints, or a profile. Raises BadInput."""
+        """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
         raise NotImplementedError
 
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":
@@ -38,10 +38,14 @@ class JobViews:
         raise NotImplementedError
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
-        """Return what a figure of the curves shows: a panel for every column, unless a job knows better."""
-        from loomopt.picture.panels import each
+        """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""
+        from loomopt.picture.panels import arranged
 
-        return each(columns)
+        return arranged(scene, design, columns, self.words())
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what is known of the columns of the curves, by name."""
+        return {}
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
         """Return what to know beside the numbers, each a sentence without its full stop."""

@@ -1,55 +1,146 @@
-"""What stands in the panels of a figure of curves: which columns together, which levels and points beside them."""
+"""What stands in the panels of a figure of curves: which columns together, in which words, what is marked, limits."""
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from loomopt.effects.kinds import Check, Load, State
 from loomopt.frozen import Frozen
+from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name
+from loomopt.program.curves import split as split
+from loomopt.program.drive import POWER as PEAK_POWER
+from loomopt.scene_tables import Limit
+from loomopt.scenes import Scene
+from loomopt.units import SI_UNIT
 
-COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
-ANGLE = "phi [rad]"
-"""The column all others are drawn over."""
+EXTREMES = ("peak", "most", "least")
+"""What of a curve may be marked: its largest magnitude, its largest and its least value."""
+BY_EFFECT, DRIVE = "by effect", "on the crank, by effect"
+"""Panels that the loads' terms share."""
+ORDERS = 3
+"""Derivatives of a motion that have columns."""
+_KIND = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"}
+"""SI unit → kind of quantity; what swings is shown in rad/s, whatever the shafts' unit."""
 
 
-class Mark(NamedTuple):
-    """A point of a curve that is named: crank angle, rad, and value, SI."""
+class Curve(NamedTuple):
+    """What a person calls a column, and what of it is a figure.
 
-    phi: float
-    value: float
-    text: str
+    panel: what comes behind "torques" or "angles" where several share a panel, one of its own without it. peak, most,
+    least: figures that are its largest magnitude, its largest and its least value. at: mark → the figure that is its
+    value there. wide: see `Panel`. shown: whether it is.
+    """
+
+    name: str = ""
+    panel: str = ""
+    peak: str = ""
+    most: str = ""
+    least: str = ""
+    at: Mapping[str, str] = Frozen()
+    wide: bool = False
+    shown: bool = True
 
 
 class Panel(NamedTuple):
-    """One panel: columns of one unit, such as "N [N]", in order; a single one gives the panel its name.
+    """One panel: columns of one unit, such as "N [N]", in order, and their names.
 
-    levels: what a horizontal line says → where, SI; points: named points of the curves.
-    wide: across the whole figure, above the others; today: today's curve stands beside a design's.
+    marked: of EXTREMES, or marks of the figure at which the value is. levels: what a horizontal line says → where
+    it stands, SI. wide: across the whole figure, above the others. unit: in which it is shown, SI without one.
     """
 
     columns: tuple[str, ...]
     name: str = ""
-    levels: Mapping[str, float] = Frozen()
-    points: tuple[Mark, ...] = ()
+    names: tuple[str, ...] = ()
+    marked: tuple[str, ...] = ()
+    levels: Mapping[str, tuple[float, ...]] = Frozen()
     wide: bool = False
-    today: bool = False
+    unit: str = ""
 
     @property
-    def unit(self) -> str:
+    def si(self) -> str:
         """The columns' unit, SI."""
         return split(self.columns[0])[1]
 
     @property
-    def label(self) -> str:
+    def labels(self) -> tuple[str, ...]:
+        """What each column is called."""
+        return self.names or tuple(_called(column, Curve()) for column in self.columns)
+
+    @property
+    def title(self) -> str:
         """The panel's name; that of its only column where it has none."""
-        return self.name or split(self.columns[0])[0]
+        return self.name or self.labels[0]
 
 
-def split(column: str) -> tuple[str, str]:
-    """Return a column's name and unit."""
-    match = COLUMN.fullmatch(column)
-    return (match["name"], match["unit"]) if match else (column, "1")
+def in_units(scene: Scene, panel: Panel) -> Panel:
+    """Return a panel shown in the unit in which the scene's reader sees its kind of quantity."""
+    kind = _KIND.get(panel.si)
+    return panel._replace(unit=scene.shown_in(kind) if kind else panel.si)
 
 
-def each(columns: Iterable[str]) -> tuple[Panel, ...]:
+def arranged(
+    scene: Scene, design: Mapping[str, float], columns: Sequence[str], words: Mapping[str, Curve]
+) -> tuple[Panel, ...]:
+    """Return the panels of all columns, limits as levels; effects share theirs, and a motion is shown per second.
+
+    words: what is known of columns, by name; of name_1, name_2 it holds for name_t, name_tt too.
+    """
+    known = {split(column)[0]: column for column in columns if COLUMN.fullmatch(column) and column != ANGLE}
+    speed = design.get("speed", scene.operation.get("speed", 1.0))
+    said = {split(POWER)[0]: Curve(peak=PEAK_POWER)} | _of_effects(scene) | dict(words)
+    found: dict[str, Panel] = {}
+    for name, (shown, scale) in _timed(known, float(speed)).items():
+        curve = said.get(shown, said.get(name, Curve()))
+        if curve.shown:
+            levels = dict(_levels(curve, scene.limits, 1.0 if shown in said else scale))
+            marked = (*(extreme for extreme in EXTREMES if getattr(curve, extreme)), *curve.at)
+            called, kind = _called(known[shown], curve), _KIND.get(split(known[shown])[1], "curve")
+            title = f"{kind}s {curve.panel}" if curve.panel else called
+            alone = Panel((known[shown],), title, (called,), marked, Frozen(levels), curve.wide)
+            found[title] = _joined(found[title], alone) if title in found else alone
+    return tuple(found.values())
+
+
+def _called(column: str, curve: Curve) -> str:
+    """Return a column's name in words with its symbol: "crank torque Md"; in its own words without any."""
+    symbol = split(column)[0]
+    return f"{curve.name} {symbol}" if curve.name else symbol.replace("_", " ")
+
+
+def _joined(panel: Panel, other: Panel) -> Panel:
+    return panel._replace(columns=(*panel.columns, *other.columns), names=(*panel.names, *other.names))
+
+
+def _of_effects(scene: Scene) -> dict[str, Curve]:
+    """Return what is known of the columns of effects that are on."""
+    found = {}
+    for effect in scene.active:
+        if isinstance(effect, Load | State):
+            symbol = load_name(effect)
+            name = effect.name.replace("_", " ") if symbol != effect.name else ""
+            found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
+        elif isinstance(effect, Check):
+            found |= {name: Curve(peak=name) for name in effect.quantities}
+    return found
+
+
+def _timed(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]:
+    """Return name → (name of what is shown for it, its size over the first's): where there is one, the one by time."""
+    orders = {f"{name}_{k}": (f"{name}_{'t' * k}", speed**k) for name in known for k in range(1, ORDERS + 1)}
+    instead = {name: later for name, later in orders.items() if later[0] in known}
+    shown = {later for later, _ in instead.values()}
+    return {name: instead.get(name, (name, 1.0)) for name in known if name not in shown}
+
+
+def _levels(curve: Curve, limits: Mapping[str, Limit], scale: float) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the limits on a curve's figures as levels; scale: of the curve to its figures."""
+    for figure in (curve.peak, curve.most, curve.least, *curve.at.values()):
+        limit = limits.get(figure)
+        if limit and limit.max is not None:
+            yield f"{figure} <=", (scale * limit.max, *([-scale * limit.max] if figure == curve.peak else []))
+        if limit and limit.min is not None:
+            yield f"{figure} >=", (scale * limit.min,)
+
+
+def each(columns: Sequence[str]) -> tuple[Panel, ...]:
     """Return a panel for every column that has a unit."""
     return tuple(Panel((name,)) for name in columns if COLUMN.fullmatch(name) and name != ANGLE)

@@ -1,24 +1,26 @@
-"""Drawings as plain data: lines, circles, arcs and texts on named layers, in mm; renderers write them."""
+"""Drawings as plain data: lines, circles, arcs and texts on named layers, in metres; renderers write them."""
 
 import itertools
 import math
+import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from loomopt.picture.placing import Box, Floats
+from loomopt.picture.placing import STEP, Box, Floats
+from loomopt.picture.units import Unit
 
 
 class Point(NamedTuple):
-    """x and y, mm, y up."""
+    """x and y, m, y up."""
 
     x: float
     y: float
 
     def towards(self, angle: float, distance: float) -> "Point":
-        """Return the point at a distance, mm, in the direction of an angle, rad."""
+        """Return the point at a distance, m, in the direction of an angle, rad."""
         return Point(self.x + distance * math.cos(angle), self.y + distance * math.sin(angle))
 
     def part(self, other: "Point", share: float = 0.5) -> "Point":
@@ -28,7 +30,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Layer:
-    """How a layer looks: colour on white; aci: AutoCAD colour; width: of lines, mm at 3.5 mm text."""
+    """How a layer looks: colour on white; aci: AutoCAD colour; width: of lines, mm where text is 3.5 mm high."""
 
     colour: str
     aci: int
@@ -47,7 +49,10 @@ LAYERS: Mapping[str, Layer] = {
     "far dwell": Layer("#7c3aed", 200, 0.35),
     "near dwell": Layer("#1d4ed8", 150, 0.35),
     "least cam force": Layer("#c2410c", 30, 0.35),
+    "schematic": Layer("#475569", 8, 0.25),
+    "masses": Layer("#9d174d", 220, 0.35),
     "joints": Layer("#1f2937", 7, 0.35),
+    "leaders": Layer("#6b7280", 8, 0.13),
     "dimensions": Layer("#047857", 92, 0.18),
     "notes": Layer("#111827", 7, 0.25),
 }
@@ -59,16 +64,16 @@ POSITIONS = tuple(LAYERS[name] for name in ("front dead centre", "rear dead cent
 NOMINAL_HEIGHT = 3.5
 """Text height, mm, that the layers' widths and the dashes are meant for."""
 DASH, GAP = 3.0, 2.0
-"""Lengths in a dashed line, mm."""
+"""Lengths in a dashed line, mm where text is 3.5 mm high."""
 CAPITAL = 0.72
 """Height of capitals, which CAD calls text height, in font sizes."""
-CHARACTER = 0.88
-"""Width to reserve for one character, in text heights."""
+CHARACTER, CAPITAL_LETTER, WIDE = 0.88, 1.16, 1.45
+"""Width to reserve for one character, in text heights; for a capital or a sign; for the widest."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """Straight strokes through points, mm."""
+    """Straight strokes through points, m."""
 
     layer: str
     points: tuple[Point, ...]
@@ -77,7 +82,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Circle:
-    """A full circle; radius in mm."""
+    """A full circle; radius in m."""
 
     layer: str
     centre: Point
@@ -86,7 +91,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class Arc:
-    """A circular arc, counter-clockwise from begin to end, rad; radius in mm."""
+    """A circular arc, counter-clockwise from begin to end, rad; radius in m."""
 
     layer: str
     centre: Point
@@ -112,12 +117,16 @@ Primitive = Trace | Text
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing at full scale; height: of its capitals, mm, which line widths and dashes follow."""
+    """A mechanism at full scale in m; height: of its capitals, m, which line widths and dashes follow.
+
+    legend: lines of (layer, text) below it. unit: in which its lengths are told, and which a workshop reads it in.
+    """
 
     title: str
     height: float
     primitives: tuple[Primitive, ...]
-    unit: Literal["mm"] = "mm"
+    legend: tuple[tuple[str, str], ...] = ()
+    unit: Unit = "mm"
 
     @property
     def layers(self) -> dict[str, Layer]:
@@ -134,16 +143,41 @@ def plain(text: str) -> str:
     return "".join(character if character.isprintable() else " " for character in text)
 
 
+def scaled(drawing: Drawing, size: float) -> Drawing:
+    """Return a drawing with every length times a size, such as 1000 for one whose unit is 1 mm."""
+
+    def of(point: Point) -> Point:
+        return Point(size * point.x, size * point.y)
+
+    def larger(primitive: Primitive) -> Primitive:
+        match primitive:
+            case Line(_, points):
+                return replace(primitive, points=tuple(map(of, points)))
+            case Circle(_, centre, radius) | Arc(_, centre, radius):
+                return replace(primitive, centre=of(centre), radius=size * radius)
+            case Text(_, at):
+                return replace(primitive, at=of(at))
+
+    return replace(drawing, height=size * drawing.height, primitives=tuple(map(larger, drawing.primitives)))
+
+
 def text_box(text: Text, height: float) -> Box:
-    """Return the room a text takes, mm, by a generous estimate of its width."""
+    """Return the room a text takes, by a generous estimate of its width; height: text height, in the same unit."""
     tall = height * text.size
-    wide = CHARACTER * tall * len(text.text)
+    wide = tall * sum(map(_width, text.text))
     left = text.at.x - (wide / 2 if text.anchor == "centre" else 0.0)
     return Box(left, text.at.y - 0.75 * tall, left + wide, text.at.y + 0.75 * tall)
 
 
+def _width(character: str) -> float:
+    """Return the width to reserve for a character, in text heights."""
+    if character in "mwMW@%…—" or unicodedata.east_asian_width(character) in "WF":
+        return WIDE
+    return CAPITAL_LETTER if character.isupper() or character in "=+−<>~" else CHARACTER
+
+
 def extent(drawing: Drawing, margin: float = 2.0) -> Box:
-    """Return what the drawing covers, mm, with a margin in text heights."""
+    """Return what the drawing covers with a margin in text heights."""
     points = np.concatenate([marks(primitive, drawing.height) for primitive in drawing.primitives])
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     room = margin * drawing.height
@@ -151,15 +185,16 @@ def extent(drawing: Drawing, margin: float = 2.0) -> Box:
 
 
 def marks(primitive: Primitive, height: float) -> Floats:
-    """Return points close together along a primitive, or the corners of a text, (n, 2) mm."""
+    """Return points along a primitive, no farther apart than STEP text heights, or two corners of a text, (n, 2)."""
     if isinstance(primitive, Text):
         box = text_box(primitive, height)
         return np.array([[box.left, box.bottom], [box.right, box.top]])
     if isinstance(primitive, Line):
-        ends = (*primitive.points, primitive.points[0]) if primitive.closed else primitive.points
-        steps = [(a, b, 2 + int(math.dist(a, b) / (0.2 * height))) for a, b in itertools.pairwise(ends)]
-        return np.concatenate([np.linspace(*step) for step in steps])
+        ends = np.array((*primitive.points, primitive.points[0]) if primitive.closed else primitive.points)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ends, axis=0).T))])
+        at = np.linspace(0.0, way[-1], 2 + int(way[-1] / (STEP * height)))
+        return np.column_stack([np.interp(at, way, ends[:, 0]), np.interp(at, way, ends[:, 1])])
     begin, end = (primitive.begin, primitive.end) if isinstance(primitive, Arc) else (0.0, 2 * math.pi)
-    angles = np.linspace(begin, end, 33 + int((end - begin) * primitive.radius / (0.2 * height)))
+    angles = np.linspace(begin, end, 5 + int((end - begin) * primitive.radius / (STEP * height)))
     around = np.column_stack([np.cos(angles), np.sin(angles)])
     return np.asarray(primitive.centre) + primitive.radius * around

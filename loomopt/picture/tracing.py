@@ -37,6 +37,12 @@ def nodes(
         pieces, left, right = _divided(pieces, left, right, parts)
 
 
+def deviation(curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, u: Floats) -> float:
+    """Return how far the curves lie from straight lines from node to node; a piece's last may begin the next."""
+    begins = np.where(np.diff(pieces) == 0, u[:-1], 0.0)
+    return float(np.max(_deviation(curves, pieces[1:], begins, u[1:])))
+
+
 def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_]) -> tuple[Pieces, Floats, Floats]:
     """Return intervals [left, right] of pieces, each divided into so many equal parts."""
     which = np.repeat(np.arange(len(parts)), parts)

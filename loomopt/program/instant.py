@@ -50,6 +50,11 @@ class Instant:
         """The torque on the crank, N·m."""
         return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
 
+    @property
+    def power(self) -> Number:
+        """The motor's power, W: the torque on the crank times its speed; negative where the mechanism drives."""
+        return self.crank_torque * self.pose.omega
+
     def terms(self) -> dict[str, Number]:
         """Return each load's term by its name, N or N·m."""
         found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)

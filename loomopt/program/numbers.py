@@ -190,5 +190,5 @@ def explained(scene: Scene, known: Mapping[str, float], clash: Sequence[str]) ->
     """Return what the effects that are on say of why limits (phrases) clash; "" where they say nothing."""
     limited = bounds(scene, known)
     on = zip(scene.active, scene.effects.values(), strict=True)
-    told = [effect.explain(known, limited, own, clash) for effect, own in on if isinstance(effect, Check)]
+    told = [effect.explain(known, limited, own, clash, scene.show) for effect, own in on if isinstance(effect, Check)]
     return " ".join(text for text in told if text)

@@ -4,7 +4,8 @@ A program knows no grid and no solver. Its structure (what is in it) is apart fr
 serves every scene of the same structure.
 """
 
-from collections.abc import Callable, Hashable, Mapping
+import math
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -13,6 +14,7 @@ from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
+from loomopt.tolerances import FEASIBLE
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,35 @@ class Limit:
         """Return how far the limit is exceeded, SI; for an equality the signed difference."""
         bound = limit * values[self.weight] if self.weight else limit
         return bound - values[self.row] if self.sign < 0 else values[self.row] - bound
+
+
+class Goal(NamedTuple):
+    """What a target asks of a figure: from `low` to `high`, SI, met to `slack` times |another figure|, or SI."""
+
+    figure: str
+    low: float
+    high: float
+    slack: float
+    beside: str = ""
+
+    def reached(self, figures: Mapping[str, float | None]) -> bool:
+        """Say whether a design's figures, SI, meet it."""
+        value, size = figures.get(self.figure), figures.get(self.beside, 1.0)
+        slack = self.slack * abs(size or 0.0)
+        return value is not None and self.low - slack <= value <= self.high + slack
+
+
+def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
+    """Return limits that a target asks for by itself as goals of the figures they are named after, as closely held."""
+    sides: dict[str, list[Limit]] = {}
+    for limit in limits:
+        sides.setdefault(limit.name, []).append(limit)
+    found = []
+    for name, each in sides.items():
+        low = max((limit.value for limit in each if limit.sign <= 0), default=-math.inf)
+        high = min((limit.value for limit in each if limit.sign >= 0), default=math.inf)
+        found.append(Goal(name, low, high, FEASIBLE * max(limit.scale for limit in each)))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -162,6 +193,8 @@ class Program:
     """Today's values, SI, of variables that are no numbers of the scene."""
     single: str = ""
     """Why every local optimum is the best there is, where that is so."""
+    goals: tuple[Goal, ...] = ()
+    """What the target asks of figures, and may find out of reach."""
 
     @lazy
     def structure(self) -> Hashable:

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from loomopt.quantities import show
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
+from loomopt.solving.words import Words
 from loomopt.tolerances import FARTHEST_SIZE, SAME_SIZE
 
 Solve = Callable[[Scene], Solution]
@@ -21,13 +21,12 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
     value = ideal.design[name]
     if any(abs(value - size) <= SAME_SIZE * size for size in sizes):
         return ideal
-    unit = scene.unit(name, "length")
     found, tried = [], []
     for side in (reversed([size for size in sizes if size < value]), (size for size in sizes if size > value)):
         for size, answer in _until_admissible(scene, name, side, solve):
-            tried.append(show(size, unit))
+            tried.append(scene.show(size, "length"))
             found += [answer] if answer.status == "optimal" else []
-    said = f"Any size would have {name} {show(value, unit)}"
+    said = f"Any size would have {name} {scene.show(value, 'length')}"
     if not found:
         message = f"No {name} that is sold gives an admissible design (tried {', '.join(tried) or 'none in bounds'}). "
         return replace(ideal, status="infeasible", message=f"{message}{said}.", certificate=None, binding=())
@@ -35,8 +34,9 @@ def fitted(scene: Scene, ideal: Solution, name: str, sizes: Sequence[float], sol
     for answer in found[1:]:
         best = answer if _better(answer, best) else best
     first = next(iter(best.certificate.levels)).objective if best.certificate else ""
-    figure = f" and {first} {ideal.figures[first]:.9g}" if first and ideal.figures.get(first) is not None else ""
-    explanation = f"{said}{figure} (SI); of those sold, tried {', '.join(tried)}."
+    reached = ideal.figures.get(first)
+    figure = f" and {first} {scene.show(reached, Words(scene).kind(first), 9)}" if reached is not None else ""
+    explanation = f"{said}{figure}; of those sold, tried {', '.join(tried)}."
     return replace(best, message=f"{best.message} {explanation}", explanation=explanation)
 
 

@@ -6,7 +6,7 @@ touches its limit, so it is proven up to a slack: a share of the quantity's larg
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from loomopt.jobs.base import Job
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
+from loomopt.showing import Shown
 from loomopt.solving.asked import target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
@@ -56,18 +57,28 @@ class Proof:
         return {name: value for name, value in vars(self).items() if name != "kind"}
 
 
-@dataclass(frozen=True)
-class Proofs:
-    """All proofs of one design."""
+@dataclass(frozen=True, repr=False)
+class Proofs(Shown):
+    """All proofs of one design; in Jupyter they show themselves as a table."""
 
     problem: str
     target: str
     proofs: tuple[Proof, ...]
+    scene: Scene = field(compare=False)
 
     @property
     def passed(self) -> bool:
         """Whether everything is proven."""
         return all(proof.status == "proven" for proof in self.proofs)
+
+    @property
+    def said(self) -> str:
+        """What came of them, in one sentence."""
+        missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
+        return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
+
+    def __repr__(self) -> str:
+        return f"<Proofs {self.problem}, {self.target}: {self.said}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `prove --json` prints."""
@@ -89,7 +100,8 @@ def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, 
     own, asked = job.adopted(scene, full, name)
     program = job.program(own, asked)
     reads = _readings(own, job, program, full, slack)
-    return Proofs(scene.name, name, tuple(_merged(list(_proofs(program, job, Words(own), *reads)))))
+    found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
+    return Proofs(scene.name, name, found, scene)
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:

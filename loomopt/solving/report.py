@@ -32,6 +32,7 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         figures=figures,
         units={name: words.si(name) for name in (*shown, *figures)},
         limits=_findings(program, figures, named, job.sampler(scene, design)),
+        reached={goal.figure: goal.reached(figures) for goal in program.goals},
         scene=scene,
     )
 

@@ -46,7 +46,7 @@ def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
     """
     words, labels = Words(scene), numbers.labels(scene)
     known = {name: words.kind(labels.get(name, name)) for name in design if _single(scene, name)}
-    sizes = {name: (1.0, factor(scene.unit(labels.get(name, name), kind))) for name, kind in known.items()}
+    sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in known.items()}
     given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in known if design[name]}
     most = max((count for count, _ in given.values()), default=0)
     if most > MOST_DIGITS:

@@ -105,12 +105,14 @@ class Evaluation:
     figures: Mapping[str, float | None]
     units: Mapping[str, str]
     limits: tuple[Finding, ...]
+    reached: Mapping[str, bool] = field(default_factory=dict, kw_only=True)
+    """Of each figure of which the target asks what may be out of reach, whether the design reaches it."""
     scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
     """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
-        freeze(self, "design", "figures", "units")
+        freeze(self, "design", "figures", "units", "reached")
 
     @property
     def admissible(self) -> bool:
@@ -126,6 +128,7 @@ class Evaluation:
             "figures": {name: _finite(value) for name, value in self.figures.items()},
             "units": dict(self.units),
             "limits": [limit.as_dict() for limit in self.limits],
+            "reached": dict(self.reached),
         }
 
 
@@ -158,7 +161,7 @@ class Solution(Evaluation):
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
-        freeze(self, "design", "figures", "units", "solver", "time")
+        freeze(self, "design", "figures", "units", "reached", "solver", "time")
 
     @lazy
     def before(self) -> Evaluation | None:
@@ -177,6 +180,7 @@ class Solution(Evaluation):
         }
         if self.scene:
             head["scene"] = _scene_dict(self.scene)
+        head["reached"] = base["reached"]
         tail: dict[str, Any] = {
             "binding": [
                 {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}

@@ -52,7 +52,7 @@ class Words:
 
     def unit(self, name: str) -> str:
         """Return the unit a designer reads it in."""
-        return self.scene.unit(name, self.kind(name))
+        return self.scene.shown_in(self.kind(name))
 
     def si(self, name: str) -> str:
         """Return its SI unit."""

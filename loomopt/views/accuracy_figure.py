@@ -13,7 +13,8 @@ from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
 from loomopt.views import outputs
-from loomopt.views.figure import _COLOURS, _figure, _own_style, _save
+from loomopt.views.figure import COLOURS, STYLES, _figure, _own_style, save
+from loomopt.views.heads import Entry, head
 from loomopt.views.layout import Grid, joined
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
@@ -72,16 +73,27 @@ def write(study: Study, path: Path) -> None:
 
 
 def draw(study: Study, path: Path) -> None:
-    """Write the figure as PNG, PDF or SVG: a panel per quantity, error over time, or over the method's own setting."""
+    """Write the figure as PNG, PDF or SVG."""
+    save(drawn(study), path)
+
+
+def drawn(study: Study) -> Any:
+    """Return the figure: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
     with _own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
         page = _figure(9.0, 2.5 * high + 0.5)
         page.set_layout_engine("constrained")
         page.suptitle(f"{study.problem}: what accuracy costs", fontsize=11, parse_math=False)
+        placed = []
         for place, (quantity, ladders) in enumerate(panels.items()):
-            _panel(page.add_subplot(high, COLUMNS, place + 1), study, quantity, ladders)
-        _save(page, path)
+            axes = page.add_subplot(high, COLUMNS, place + 1)
+            placed.append((axes, quantity, _panel(axes, study, quantity, ladders)))
+        page.get_layout_engine().execute(page)
+        heights = [head(axes, quantity, entries) for axes, quantity, entries in placed]
+        rows = [max(heights[place : place + COLUMNS]) for place in range(0, len(heights), COLUMNS)]
+        page.set_size_inches(page.get_figwidth(), 2.3 * high + sum(rows) / 72 + 0.5)
+    return page
 
 
 def _panels(study: Study) -> dict[str, list[list[Row]]]:
@@ -98,31 +110,34 @@ def _sized(rows: Sequence[Row]) -> bool:
     return len(rows) > 1 and not isinstance(rows[0].setting, str)
 
 
-def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Row]]) -> None:
-    """Draw one quantity's methods; where all settings of one cost alike, over the setting."""
+def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Row]]) -> list[Entry]:
+    """Draw one quantity's methods, over the setting where all of one cost alike; return what its legend says."""
     from matplotlib.ticker import NullFormatter
 
     alike = any(_sized(rows) and len({row.evaluations for row in rows}) == 1 for rows in ladders)
     ladders = [rows for rows in ladders if rows[0].method != NUMBERS]
+    entries: list[Entry] = []
+    thin = {"markersize": 4.0, "linewidth": 1.2}
     for place, rows in enumerate(ladders):
-        method, colour, mark = rows[0].method, _COLOURS[place % len(_COLOURS)], MARKS[place % len(MARKS)]
+        method, colour, mark = rows[0].method, COLOURS[place % len(COLOURS)], MARKS[place % len(MARKS)]
+        style = STYLES[place % len(STYLES)]
         errors = [max(row.error or 0.0, LEAST) for row in rows]
         name = f"{quantity}, {method}"
         label = f"{method}, order {study.orders[name]:.2f}" if name in study.orders else method
         if alike and not _sized(rows):
-            axes.axhline(errors[0], color=colour, linewidth=1.2, linestyle=(0, (4, 2)), label=label)
+            entries.append((axes.axhline(errors[0], color=colour, linestyle=style, linewidth=1.2), label))
             continue
         x = [row.setting if alike else row.seconds for row in rows]
-        line = "-" if _sized(rows) else ""
-        axes.plot(x, errors, color=colour, marker=mark, markersize=4, linewidth=1.2, linestyle=line, label=label)
-    axes.set(xscale="log", yscale="log", title=quantity)
+        line = style if _sized(rows) else ""
+        entries += [(each, label) for each in axes.plot(x, errors, linestyle=line, color=colour, marker=mark, **thin)]
+    axes.set(xscale="log", yscale="log")
     axes.set_xlim(_decades(axes.get_xlim()))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("step [rad]" if alike else "time of one run [s]")
     axes.set_ylabel("relative error")
     axes.grid(color="#e5e7eb", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=7, edgecolor="none", framealpha=0.8)
+    return entries
 
 
 def _decades(ends: tuple[float, float]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Drawings as DXF for the workshop: R2010, mm, full scale, one coloured layer for each of the drawing's."""
+"""Drawings as DXF for the workshop: R2010, mm or inches, full scale, one coloured layer for each of the drawing's."""
 
 import importlib
 import math
@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     DASH,
     GAP,
@@ -19,7 +20,9 @@ from loomopt.picture.shapes import (
     Text,
     extent,
     plain,
+    scaled,
 )
+from loomopt.units import factor
 
 _TEXT_STYLE, _DASHES = "LABELS", "DASHES"
 
@@ -47,7 +50,9 @@ def _document(drawing: Drawing) -> Any:
     ezdxf: Any = importlib.import_module("ezdxf")
 
     document = ezdxf.new("R2010")
-    document.units = ezdxf.units.MM
+    inches, drawing = drawing.unit == "in", scaled(sheet(drawing), 1 / factor(drawing.unit))
+    document.units = ezdxf.units.IN if inches else ezdxf.units.MM
+    document.header["$MEASUREMENT"] = 0 if inches else 1
     document.header["$LTSCALE"] = drawing.height / NOMINAL_HEIGHT
     document.linetypes.add(_DASHES, [DASH + GAP, DASH, -GAP], description="__ __ __ __")
     document.styles.add(_TEXT_STYLE, font="arial.ttf")

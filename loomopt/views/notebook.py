@@ -1,23 +1,74 @@
-"""How an answer shows itself in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
+"""How things show themselves in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 
-from loomopt.designs import flat
+from loomopt.designs import Design
 from loomopt.jobs import registry
+from loomopt.picture.shapes import Drawing
 from loomopt.scenes import Scene
-from loomopt.solving.solution import Solution
-from loomopt.views import svg, terminal
+from loomopt.solving.proof import Proofs
+from loomopt.solving.solution import Evaluation, Solution
+from loomopt.views import outputs, scene_view, svg, terminal
 from loomopt.views.layout import Grid, spaced
 
 
-def answer(solution: Solution, scene: Scene) -> str:
-    """Return an answer as HTML: what was found, design beside today, what binds, certificate, and the mechanism
-    where the scene gives what a drawing needs."""
-    shown = terminal.solution(solution, scene)
-    parts = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in shown)
-    view = registry.of(scene).views
-    drawn = "" if view.missing(scene) else svg.render(view.linkage(scene, flat(solution.design)))
-    return f"<div>{''.join(parts)}{drawn}</div>"
+@dataclass(frozen=True)
+class Sketch:
+    """A mechanism drawn at full scale; in Jupyter it shows itself.
+
+    drawing: its lines, circles and texts; svg: the same as SVG text.
+    """
+
+    drawing: Drawing
+
+    @property
+    def svg(self) -> str:
+        """The drawing as SVG text."""
+        return svg.render(self.drawing)
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def __repr__(self) -> str:
+        return f"<Sketch {self.drawing.title}>"
+
+
+def sketch(scene: Scene, design: Design, said: str = "") -> Sketch:
+    """Return a design's mechanism in the positions that matter; said: what the design is, for the title.
+
+    Raises BadInput where the scene cannot be drawn.
+    """
+    return Sketch(outputs.drawing(scene, design, said))
+
+
+def html(thing: object) -> str:
+    """Return a scene, a design's evaluation, an answer or proofs as HTML: what the terminal shows, and the mechanism.
+
+    The mechanism is drawn where the scene gives what a drawing needs. Raises TypeError for anything else.
+    """
+    match thing:
+        case Scene():
+            return _page(scene_view.parts(thing), _drawn(thing, {}))
+        case Solution(scene=Scene() as scene):
+            return _page(terminal.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
+        case Evaluation(scene=Scene() as scene):
+            return _page(terminal.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
+        case Proofs():
+            return _page(terminal.proofs(thing))
+    raise TypeError(f"a {type(thing).__name__} is not shown")
+
+
+def _drawn(scene: Scene, design: Design, said: str = "") -> str:
+    """Return the mechanism as SVG where the scene gives what a drawing needs, else ""."""
+    return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said).svg
+
+
+def _page(parts: Sequence[str | Grid], drawn: str = "") -> str:
+    """Return paragraphs and tables, then a drawing."""
+    told = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in parts)
+    return f"<div>{''.join(told)}{drawn}</div>"
 
 
 def table(grid: Grid) -> str:

@@ -5,6 +5,7 @@ import functools
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,12 +19,24 @@ from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
+
+    from loomopt.picture.shapes import Drawing
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
 DRAWINGS = (".svg", ".dxf", ".csv")
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
+TODAY, GIVEN = "today's machine", "a given design"
+FOUND = {
+    "optimal": "best design for {}",
+    "infeasible": "nearest design for {}",
+    "uncertified": "uncertified design for {}",
+    "failed": "no design for {} found, where the search ended",
+    "interrupted": "best design for {} so far, interrupted",
+}
+"""What an answer's design is, by its status and target."""
 
 
 def document(found: Evaluation) -> str:
@@ -68,7 +81,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     }
     view = registry.of(scene).views
     if not view.missing(scene):
-        contents["linkage.svg"] = svg.render(view.linkage(scene, flat(solution.design)))
+        contents["linkage.svg"] = svg.render(drawing(scene, solution.design, what(solution)))
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         _make(folder, made)
@@ -120,39 +133,74 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     elif ending == ".parquet":
         atomically(path, frame.to_parquet)
     else:
-        atomically(path, functools.partial(_figure, frame, scene, flat(design)))
+        from loomopt.views import figure
+
+        drawn = plotted(frame, scene, flat(design), target)
+        atomically(path, functools.partial(figure.save, drawn))
 
 
-def _figure(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], place: Path) -> None:
-    """Draw curves with what the job marks and groups; today's beside a design's where it asks for them."""
+def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
+    """Return a design's curves as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.views import figure
 
+    if path:
+        suffix(path, PICTURES)
+    drawn = plotted(tables.curves(scene, design, target=target), scene, flat(design), target)
+    if path:
+        atomically(path, functools.partial(figure.save, drawn))
+    return drawn
+
+
+def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None) -> "Figure":
+    """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
+
+    design: SI; today's without one. target: what it was found for.
+    """
+    from loomopt.picture.panels import in_units
+    from loomopt.views import curve_figure
+
     job, view = registry.of(scene), registry.of(scene).views
-    panels = view.panels(scene, design, tuple(frame.columns))
-    today = None
-    if design and any(panel.today for panel in panels):
-        before = tables.curves(scene, {})
-        today = before, view.panels(scene, {}, tuple(before.columns))
-    marks = view.marks(scene, {**job.today(scene), **design})
-    figure.curves(frame, place, scene.title, marks, panels, today, view.angle)
+    now = job.today(scene)
+    own = {**now, **design}
+    panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
+    today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
+    subject = (f"design for {target}" if target else GIVEN) if design else TODAY
+    title = f"{scene.name}: {subject}, curves over the cycle"
+    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
+    return drawn
 
 
-def linkage(path: Path, scene: Scene, design: Design) -> None:
+def what(found: Evaluation) -> str:
+    """Say in a few words what the design of an evaluation or of an answer is."""
+    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
+    said = f"; limits not held: {broken}" if broken else ""
+    if not isinstance(found, Solution):
+        return GIVEN + said
+    return FOUND[found.status].format(found.target) + said
+
+
+def drawing(scene: Scene, design: Design, said: str = "") -> "Drawing":
+    """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
+    found = registry.of(scene).views.linkage(scene, flat(design))
+    return replace(found, title=f"{scene.name}: {said or (GIVEN if design else TODAY)}")
+
+
+def linkage(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
     from loomopt.views import dxf, svg
 
-    ending, view, given = suffix(path, DRAWINGS), registry.of(scene).views, flat(design)
+    ending = suffix(path, DRAWINGS)
     if ending == ".csv":
-        text(path, view.joints_csv(scene, given))
+        text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
     elif ending == ".svg":
-        text(path, svg.render(view.linkage(scene, given)))
+        text(path, svg.render(drawing(scene, design, said)))
     else:
-        atomically(path, functools.partial(dxf.write, view.linkage(scene, given)))
+        atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
 
 
-def picture(path: Path, scene: Scene, design: Design) -> None:
+def picture(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.views import figure
 
     suffix(path, PICTURES)
-    atomically(path, functools.partial(figure.draw, registry.of(scene).views.linkage(scene, flat(design))))
+    atomically(path, functools.partial(figure.draw, drawing(scene, design, said)))

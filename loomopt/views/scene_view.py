@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -12,22 +12,11 @@ from loomopt.jobs import registry
 from loomopt.owned import label, owned
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
+from loomopt.units import factor
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""
-
-
-def listing(scenes: Iterable[Scene]) -> Grid:
-    """Return the packaged scenes: title, targets, source."""
-    lines: list[tuple[str, str]] = []
-    for scene in scenes:
-        lines += [
-            (scene.name, scene.title),
-            ("", f"job {scene.job}; targets {', '.join(scene.schema.targets)}"),
-            ("", f"source: {scene.source or 'not given'}"),
-        ]
-    return Grid("", ("problem", "what it is"), tuple(lines))
 
 
 def parts(scene: Scene) -> list[str | Grid]:
@@ -46,12 +35,19 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"{scene.name}: {scene.title}",
         f"Job: {scene.job}, {scene.schema.title}",
         f"Source: {scene.source or 'not given'}",
+        f"Tables show {', '.join(f'{kind} in {scene.shown_in(kind)}' for kind in _kinds(scene))}",
         Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
         Grid("Effects that are on", ("effect", "what it is"), effects),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         Grid("Figures", ("figure", "what it is"), figures),
     ]
+
+
+def _kinds(scene: Scene) -> list[str]:
+    """Return the kinds of quantity, those with units, of a scene's design variables and figures."""
+    kinds = [*scene.schema.variables.values(), *(figure.kind for figure in scene.schema.figures.values())]
+    return [kind for kind in dict.fromkeys(kinds) if scene.shown_in(kind) != "1"]
 
 
 def _targets(scene: Scene) -> list[tuple[str, str, str]]:
@@ -97,7 +93,10 @@ def equations(scene: Scene) -> list[str]:
 
 
 def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
-    """Return the curves every 15 degrees and at the marks, both sides of a jump; more tables where too wide."""
+    """Return the curves every 15 degrees and at the marks, both sides of a jump, in the scene's display units.
+
+    More tables where one is too wide.
+    """
     job = registry.of(scene)
     full = {**job.today(scene), **flat(design)}
     columns = dict(job.curves(scene, full))
@@ -109,10 +108,12 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
         if abs(a / STEP - round(a / STEP)) < 1e-9
         or any(abs(math.remainder(a - place, 360)) < 1e-9 for place in places.values())
     ]
-    marks = ", ".join(f"{name} at {place:.3f} deg" for name, place in places.items())
-    first = ("phi\n[deg]", [f"{degrees:.3f}" for degrees in angle])
+    unit = scene.shown_in("angle")
+    size = math.radians(1.0) / factor(unit)
+    marks = ", ".join(f"{name} at {size * place:.3f} {unit}" for name, place in places.items())
+    first = (f"phi\n[{unit}]", [f"{size * degrees:.3f}" for degrees in angle])
     groups: list[list[tuple[str, list[str]]]] = [[]]
-    for curve in (_curve(name, values) for name, values in columns.items()):
+    for curve in (_curve(scene, name, values) for name, values in columns.items()):
         if width and groups[-1] and sum(map(_width, (first, *groups[-1], curve))) > width + len(GAP):
             groups.append([])
         groups[-1].append(curve)
@@ -140,12 +141,13 @@ def _width(curve: tuple[str, list[str]]) -> int:
     return max(len(text) for text in (*head.split("\n"), *texts)) + len(GAP)
 
 
-def _curve(name: str, values: Floats) -> tuple[str, list[str]]:
-    """Return a curve's heading and its cells, four digits of the largest, angles in degrees; empty where undefined."""
-    symbol, _, unit = name.removesuffix("]").partition(" [")
-    numbers = np.degrees(values) if unit == "rad" else np.asarray(values, dtype=float)
+def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
+    """Return a curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
+    symbol, _, si = name.removesuffix("]").partition(" [")
+    unit = scene.unit_for(si)
+    numbers = np.asarray(values, dtype=float) * (1.0 if unit == si else factor(si) / factor(unit))
     known = numbers[np.isfinite(numbers)]
     largest = float(np.max(np.abs(known), initial=0.0))
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
     texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
-    return f"{symbol}\n[{'deg' if unit == 'rad' else unit}]", texts
+    return f"{symbol}\n[{unit}]", texts

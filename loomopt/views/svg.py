@@ -3,6 +3,7 @@
 import math
 from xml.etree import ElementTree
 
+from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     CAPITAL,
     DASH,
@@ -18,32 +19,36 @@ from loomopt.picture.shapes import (
     Text,
     extent,
     plain,
+    scaled,
 )
+from loomopt.units import factor
 
 
 def render(drawing: Drawing) -> str:
-    """Return the drawing as an SVG document: one user unit is 1 mm, y turned up."""
+    """Return the drawing as an SVG document: one user unit is 1 mm, its size in the drawing's own unit, y turned up."""
+    size, unit = factor("mm") / factor(drawing.unit), drawing.unit
+    drawing = scaled(sheet(drawing), 1 / factor("mm"))
     box = extent(drawing)
     width, height = box.right - box.left, box.top - box.bottom
     root = ElementTree.Element(
         "svg",
         {
             "xmlns": "http://www.w3.org/2000/svg",
-            "width": f"{_number(width)}mm",
-            "height": f"{_number(height)}mm",
+            "width": f"{_number(size * width)}{unit}",
+            "height": f"{_number(size * height)}{unit}",
             "viewBox": f"{_pair(Point(box.left, box.top))} {_pair(Point(width, -height))}",
             "role": "img",
             "font-family": "Helvetica, Arial, sans-serif",
         },
     )
     ElementTree.SubElement(root, "title").text = plain(drawing.title)
-    sheet = {
+    paper = {
         "x": _number(box.left),
         "y": _number(-box.top),
         "width": _number(width),
         "height": _number(height),
     }
-    ElementTree.SubElement(root, "rect", sheet | {"fill": "#ffffff"})
+    ElementTree.SubElement(root, "rect", paper | {"fill": "#ffffff"})
     for name, layer in drawing.layers.items():
         group = ElementTree.SubElement(root, "g", _style(name, layer, drawing.height))
         for primitive in drawing.primitives:

@@ -60,23 +60,24 @@ def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> li
 
 
 def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, heading: str) -> Grid:
-    """Return design and figures beside today's machine and the limits."""
+    """Return design and figures beside today's machine and the limits; what binds and what is reached is marked."""
     table = rows(found, scene, before)
+    marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
     missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in found.limits}
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
         limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
         unit = "" if row["unit"] == "1" else row["unit"]
-        lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit))
+        lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
     shown = {row["name"] for row in table}
     lines += [
-        (limit.name, *([""] if before else []), "", "", joined(f"<- {missed[limit.name]}"))
+        (limit.name, *([""] if before else []), "", "", joined(f"<- {missed[limit.name]}"), *([""] * len(marked)))
         for limit in found.limits
         if limit.name not in shown and not limit.ok
     ]
     first = ("", "today") if before else ("",)
-    return Grid("", (*first, heading, "unit", "limits"), tuple(lines), right=tuple(range(1, len(first) + 1)))
+    return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right=tuple(range(1, len(first) + 1)))
 
 
 def lists(found: Evaluation, scene: Scene) -> list[str]:
@@ -168,11 +169,7 @@ def _starts(answer: Solution, scene: Scene) -> str:
         return f"Starts: {solver['starts']}, none reached an admissible design"
     text = f"Starts: {solver['starts_at_best']} of {solver['starts']} reached the best"
     others = [
-        ", ".join(
-            f"{name} {value / factor(words.unit(name)):.6g} {words.unit(name)}"
-            for name, value in figures.items()
-            if value is not None
-        )
+        ", ".join(f"{name} {words.shown(name, value)}" for name, value in figures.items() if value is not None)
         + f" ({count})"
         for figures, count in answer.optima[1:]
     ]
@@ -195,18 +192,12 @@ def proven(found: "Proofs") -> list[str]:
 
 def proofs(found: "Proofs") -> list[str | Grid]:
     """Return the parts of a proof: a sentence, and what was shown of each limit."""
-    missed = dict.fromkeys(proof.limit for proof in found.proofs if proof.status != "proven")
-    said = f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
-    lines = tuple(
-        (
-            joined(proof.text),
-            proof.status,
-            f"{proof.margin:.3g}",
-            f"{proof.slack:.1g}",
-            str(proof.boxes),
-            "" if proof.angle is None else f"{math.degrees(proof.angle):.4f}",
-        )
-        for proof in found.proofs
-    )
-    head = ("limit", "status", "margin [SI]", "up to [SI]", "boxes", "fails at [deg]")
-    return [f"{found.problem}, {found.target}: {said}", Grid("", head, lines, right=(2, 3, 4, 5))]
+    words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
+    for proof in found.proofs:
+        unit = words.unit(proof.limit.removeprefix("peak "))
+        sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
+        place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
+        shown = "" if unit == "1" else unit
+        lines.append((joined(proof.text), proof.status, *sizes, shown, str(proof.boxes), place))
+    head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
+    return [f"{found.problem}, {found.target}: {found.said}", Grid("", head, tuple(lines), right=(2, 3, 5, 6))]

@@ -49,7 +49,7 @@ def test_the_referees_layout_follows_from_the_papers_construction(plain):
 
 
 def test_the_referee_finds_the_figures_of_the_papers_layout(plain):
-    """[Hong17], recomputed from its printed dimensions: `tests/data/hong17.csv`."""
+    """[Hong17], recomputed from its printed dimensions: `loomopt show rapier --sources`."""
     stroke, at = plain.stroke(plain.TODAY)
     assert stroke == pytest.approx(0.849231, abs=1e-6)
     assert math.degrees(at) == pytest.approx(182.528, abs=1e-3)

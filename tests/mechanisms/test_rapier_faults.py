@@ -19,7 +19,7 @@ MECHANISM = lo.load("rapier").mechanism
 NAMES = tuple(entry.name for entry in dataclasses.fields(Dimensions))
 TODAY = Dimensions(*(MECHANISM[name] for name in NAMES))
 ANGLES, PLACES = ("phi30", "alpha", "phi40"), ("C0x", "C0y")
-STRETCH = re.compile(r"from (\S+) to (\S+) deg")
+STRETCH = re.compile(r"from (\S+) deg to (\S+) deg")
 STEP = 0.1
 """deg, between the crank angles a message knows of; it is printed to half as much."""
 FINE = np.arange(0.0, 360.0, 0.01)

@@ -43,7 +43,7 @@ def test_the_table_names_pivots_once_and_moving_joints_with_a_prime_at_each_furt
     rows = [line.split(",") for line in PRESS.csv().splitlines()]
     assert rows[0] == ["joint", "position", "x [mm]", "y [mm]"]
     assert [row[0] for row in rows[1:]] == ["O", "G", "A", "B", "A'", "B'"]
-    assert rows[-1] == ["B'", IN, "3.0", "0.0"]
+    assert rows[-1] == ["B'", IN, "3000.0", "0.0"]
     assert PRESS.at(IN)["B"] == (3, 0)
 
 

@@ -4,10 +4,12 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+import loomopt as lo
 from loomopt.solving.catalogue import fitted
 from loomopt.solving.solution import Solution
 from loomopt.solving.verdict import Certificate, Level
 from loomopt.tolerances import FARTHEST_SIZE
+from loomopt.units import DISPLAY_UNIT, show
 
 MM = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 SIZES = tuple(float(f"{size:g}e-3") for size in MM)
@@ -26,9 +28,10 @@ class Scene:
 
     bounds: dict = field(default_factory=dict)
 
-    def unit(self, name, kind):
-        assert kind == "length"
-        return "mm"
+    schema = lo.load("shedding").schema
+
+    def show(self, value, kind, digits=6):
+        return show(value, DISPLAY_UNIT[kind], digits)
 
     def set(self, key, text):
         table, name = key.split(".")
@@ -200,6 +203,6 @@ def test_of_two_sizes_equally_good_in_everything_the_smaller_is_kept():
 
 def test_the_message_says_what_any_size_would_have_and_what_was_tried():
     found, _ = fit(5.4, {5.0: objectives(103), 6.0: objectives(102)})
-    said = "Any size would have wire 5.4 mm and K1 100 (SI); of those sold, tried 5 mm, 6 mm."
+    said = "Any size would have wire 5.4 mm and K1 100 N/m; of those sold, tried 5 mm, 6 mm."
     assert found.message == f"Solved at 0.006. {said}"
     assert found.explanation == said

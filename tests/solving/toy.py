@@ -186,7 +186,7 @@ class ToyJob(Job):
             targets={"least": Target("least", "least of all", Nothing)},
             default_target="least",
             check=lambda scene: None,
-            fault=lambda design: "",
+            fault=lambda design, shown: "",
         )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:

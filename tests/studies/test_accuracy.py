@@ -13,6 +13,8 @@ from loomopt.studies import accuracy, digits, optima, readings
 from loomopt.studies.ladders import Ladder, Outcome, Reference, Row, climbed, grouped, knee, order
 from loomopt.studies.subject import Target
 from loomopt.tolerances import NO_ORDER
+from loomopt.views import accuracy_figure
+from tests.views import overlaps
 
 pytestmark = pytest.mark.xdist_group("accuracy")
 SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))
@@ -47,6 +49,13 @@ def studies():
 def ladders(studies):
     """Return each job's rows by "quantity, method"."""
     return {name: grouped(study.rows) for name, study in studies.items()}
+
+
+def test_no_text_of_the_figure_runs_into_anything(studies):
+    for study in studies.values():
+        figure = accuracy_figure.drawn(study)
+        assert figure.axes
+        assert overlaps.found(figure) == []
 
 
 def errors(rows):

@@ -69,17 +69,26 @@ def test_circle_and_arc_are_the_paths_of_the_joints(document):
     assert arc.end_point.distance(rod.dxf.end) < 1e-9
 
 
+def test_the_counterweight_is_on_its_layer_at_its_radius_with_its_mass(tmp_path):
+    dxf.write(crank_rocker_drawing.linkage(PAPER | {"m4e": 3.0, "r4e": 0.05}, "t"), tmp_path / "a.dxf")
+    space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
+    for circle in (found := space.query('CIRCLE[layer=="masses"]')):
+        assert circle.dxf.center.distance((167, 0)) == pytest.approx(50, abs=1e-9)
+    assert len(found) == 2, "in both dead centres"
+    assert "E  m4e = 3 kg, r4e = 50" in [text.dxf.text for text in space.query("TEXT")]
+
+
 def test_labels_are_read_back(document):
     shown = [text.dxf.text for text in document.modelspace().query("TEXT")]
     assert {"l1 = 31", "l4 = 167", "swing = 23.09°", "Reed β"} <= set(shown)
 
 
 def test_a_stroke_through_many_points_is_one_polyline(tmp_path):
-    points = tuple(Point(math.cos(k), math.sin(k)) for k in range(6))
-    dxf.write(Drawing("", 1.0, (Line("notes", points, closed=True),)), tmp_path / "a.dxf")
+    points = tuple(Point(math.cos(k) / 1e3, math.sin(k) / 1e3) for k in range(6))
+    dxf.write(Drawing("", 0.001, (Line("notes", points, closed=True),)), tmp_path / "a.dxf")
     (polyline,) = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
     assert polyline.closed
-    assert [point[:2] for point in polyline.get_points()] == [pytest.approx(point) for point in points]
+    assert [point[:2] for point in polyline.get_points()] == [pytest.approx((1e3 * x, 1e3 * y)) for x, y in points]
 
 
 def test_the_same_drawing_gives_the_same_bytes_in_any_process(tmp_path):

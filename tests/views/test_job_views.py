@@ -15,6 +15,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import LAYERS
+from loomopt.units import DISPLAY_UNIT
 from loomopt.views import scene_view
 from loomopt.views.layout import Grid
 
@@ -50,7 +51,7 @@ def shown(monkeypatch, marks):
     columns = {"phi [rad]": angles, "S [m]": np.sin(angles)}
     job = SimpleNamespace(today=lambda scene: {}, curves=lambda scene, design: columns, views=views)
     monkeypatch.setattr(registry, "of", lambda scene: job)
-    drive: Any = SimpleNamespace(title="Drive")
+    drive: Any = SimpleNamespace(title="Drive", shown_in=DISPLAY_UNIT.__getitem__, unit_for=lambda si: si)
     head, table = scene_view.curves(drive, {}, None)
     assert isinstance(table, Grid)
     return head, [float(line[0]) for line in table.lines]
@@ -101,7 +102,7 @@ def test_a_job_shows_every_column_with_a_unit_unless_it_says_otherwise():
     scene = lo.load("beatup")
     panels = registry.of(scene).views.panels(scene, {}, ("phi [rad]", "psi [rad]", "piece", "M3 [N*m]"))
     assert [panel.columns for panel in panels] == [("psi [rad]",), ("M3 [N*m]",)]
-    assert [(panel.label, panel.unit) for panel in panels] == [("psi", "rad"), ("M3", "N*m")]
+    assert [(panel.title, panel.si) for panel in panels] == [("rocker angle psi", "rad"), ("reed torque M3", "N*m")]
 
 
 @pytest.mark.parametrize("effects", [(), ("bearing_friction",), ("gravity", "rod_inertia")])

@@ -25,9 +25,11 @@ def test_an_answer_shows_sentence_table_prices_certificate_and_drawing(answer):
     found = tree(answer._repr_html_())
     words = "".join(found.itertext())
     tables = found.findall("table")
-    assert [cell.text for cell in tables[0].iter("th")] == [None, "today", "design", "unit", "limits"]
+    heads = [None, "today", "design", "unit", "limits", "binds", "reached"]
+    assert [cell.text for cell in tables[0].iter("th")] == heads
     cells = [[cell.text for cell in line] for line in tables[0].iter("tr")]
-    assert ["l1", "31", "30", "mm", "30 ... 35"] in [[(c or "").replace("\xa0", " ") for c in line] for line in cells]
+    lines = [[(cell or "").replace("\xa0", " ") for cell in line] for line in cells]
+    assert ["l1", "31", "30", "mm", "30 ... 35", "min", ""] in lines
     assert tables[1].find("caption").text == "What binds, and what loosening it is worth"
     assert all(price.reading in words for price in answer.binding)
     assert "Certificate passed" in words

@@ -74,7 +74,7 @@ def test_an_answer_evaluates_to_the_figures_it_claims(here, capsys, content):
     solved = json.loads(loom(capsys, "solve", "beatup", "--json"))
     (here / "design.json").write_text(json.dumps(solved["design"] if content == "design" else solved))
     found = json.loads(loom(capsys, "evaluate", "beatup", "--design", "design.json", "--json"))
-    assert list(found) == ["loomopt", "problem", "effects", "design", "figures", "units", "limits"]
+    assert list(found) == ["loomopt", "problem", "effects", "design", "figures", "units", "limits", "reached"]
     assert all(found[key] == solved[key] for key in found if key not in ("limits", "figures"))
     assert {limit["name"] for limit in found["limits"]} == {limit["name"] for limit in solved["limits"]}
     for name, value in solved["figures"].items():

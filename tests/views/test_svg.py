@@ -41,9 +41,9 @@ def test_links_have_their_lengths_and_y_points_up(root):
 
 
 def test_arcs_turn_the_right_way():
-    quarter = Arc("paths", Point(0, 0), 2.0, 0.0, math.pi / 2)
-    most = Arc("paths", Point(0, 0), 2.0, 0.0, 1.5 * math.pi)
-    root = ElementTree.fromstring(svg.render(Drawing("", 1.0, (quarter, most))))
+    quarter = Arc("paths", Point(0, 0), 0.002, 0.0, math.pi / 2)
+    most = Arc("paths", Point(0, 0), 0.002, 0.0, 1.5 * math.pi)
+    root = ElementTree.fromstring(svg.render(Drawing("", 0.001, (quarter, most))))
     short, long = (numbers(path.get("d")) for path in layer(root, "paths"))
     assert short == pytest.approx([2, 0, 2, 2, 0, 0, 0, 0, -2], abs=1e-11)
     assert long == pytest.approx([2, 0, 2, 2, 0, 1, 0, 0, 2], abs=1e-11)
@@ -52,7 +52,7 @@ def test_arcs_turn_the_right_way():
 def test_every_primitive_is_written_once_on_its_layer():
     shapes = (
         Line("notes", (Point(0, 0), Point(1, 0), Point(1, 1)), closed=True),
-        Circle("frame", Point(1, 2), 3.0),
+        Circle("frame", Point(0.001, 0.002), 0.003),
         Text("notes", Point(4, 5), "β", anchor="left"),
     )
     root = ElementTree.fromstring(svg.render(Drawing("", 1.0, shapes)))

@@ -97,7 +97,8 @@ def test_the_width_is_the_terminals_and_none_in_a_pipe(monkeypatch, capsys):
 
 def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
     shown = text(*terminal.solution(answer, SCENE))
-    assert row(shown, "l1") == ["l1", "31", "30", "mm", "30", "...", "35"]
+    assert row(shown, "l1") == ["l1", "31", "30", "mm", "30", "...", "35", "min"]
+    assert row(shown, "M3_fdc")[-1] == "no", "balance is out of reach"
     assert row(shown, "mu_min") == ["mu_min", "57.0694", "63.8961", "deg", ">=", "56.5"]
     for price in answer.binding:
         assert price.text in shown

@@ -4,6 +4,8 @@ Output term T_c sgn q˙ + c q˙. The Coulomb torque jumps at both dead centres; 
 and both one-sided values are shown. The crank turns forward, so sgn q˙ depends on the crank angle alone.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -12,10 +14,10 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """coulomb: T_c ≥ 0, N·m; viscous: c ≥ 0, N·m·s/rad."""
+    """Values of the friction."""
 
-    coulomb: Torque
-    viscous: RotaryDamping
+    coulomb: Torque = Field(description="constant friction torque of the rocking shaft, T_c")
+    viscous: RotaryDamping = Field(description="friction torque per angular speed, c")
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

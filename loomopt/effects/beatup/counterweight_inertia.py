@@ -3,6 +3,8 @@
 Output term JS q¨, the J_s,4e of [Yuan24, eq 10]; it does not change with the counterweight's mass.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -11,9 +13,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """JS: moment of inertia of the counterweight about its own centre of mass, kg·m²."""
+    """Values of the counterweight."""
 
-    JS: PositiveInertia
+    JS: PositiveInertia = Field(description="inertia of the counterweight about its own centre of mass")
 
 
 def moved(given: Values, own: Values) -> Number:

@@ -4,6 +4,8 @@ Output term ∂U/∂q, U = g (m4 r4 − m4e r4e) sin(ψ + χ + tilt): the reed's
 shaft, the counterweight opposite; tilt is the angle of A→D from the horizontal. The rod's weight is left out.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -15,10 +17,10 @@ STANDARD_GRAVITY = 9.80665
 
 
 class Own(Table):
-    """tilt: angle of A→D from the horizontal, rad; offset: χ, angle of the reed's centre from the rocker, rad."""
+    """Where the weight acts."""
 
-    tilt: Angle
-    offset: Angle
+    tilt: Angle = Field(description="angle of the line from A to D from the horizontal; negative where D lies below A")
+    offset: Angle = Field(description="angle of the reed's centre of mass from the rocker's line, χ")
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:

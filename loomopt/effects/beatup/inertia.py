@@ -3,6 +3,8 @@
 Output term J4 q¨ with J4 = J4⁰ + m4e r4e² [Yuan24, eq 2 and 10]; rigid reed, fixed axis.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -11,9 +13,11 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """J4: moment of inertia of today's reed system about the rocking shaft, without counterweight, kg·m²."""
+    """Values of the reed system."""
 
-    J4: PositiveInertia
+    J4: PositiveInertia = Field(
+        description="inertia of the reed system about the rocking shaft D, without counterweight"
+    )
 
 
 def moved(given: Values, own: Values) -> Number:

@@ -3,6 +3,8 @@
 Output term M_R = M0 cos(π(φ−β)/δ) for |φ−β| ≤ δ/2, else 0 [Yuan24, eq 3-4]; the corners move with the design.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -11,9 +13,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """pulse: crank angle δ through which the cloth resists, rad."""
+    """Values of the cloth."""
 
-    pulse: PulseAngle
+    pulse: PulseAngle = Field(description="crank angle δ through which the cloth resists, about front dead centre")
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

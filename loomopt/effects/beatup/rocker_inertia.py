@@ -3,6 +3,8 @@
 Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis.
 """
 
+from pydantic import Field
+
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
@@ -11,9 +13,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """J3: moment of inertia of the rocker about the rocking shaft, kg·m²."""
+    """Values of the rocker."""
 
-    J3: PositiveInertia
+    J3: PositiveInertia = Field(description="inertia of the rocker about the rocking shaft D")
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:

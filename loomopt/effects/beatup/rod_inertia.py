@@ -7,7 +7,7 @@ exact: ½ Je' ω² + Je ω̇ with Je = (m2 v_S2² + JS2 ω2²)/ω². The ratio s
 from collections.abc import Callable
 from typing import Literal
 
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
@@ -17,12 +17,12 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """m2: mass, kg; s2: centre of mass from B, m; JS2: inertia about it, kg·m² (exact only)."""
+    """Values of the rod."""
 
-    m2: PositiveMass
-    s2: Length
-    JS2: PositiveInertia | None = None
-    model: Literal["lumped", "exact"] = "lumped"
+    m2: PositiveMass = Field(description="mass of the connecting rod BC")
+    s2: Length = Field(description="centre of mass of the rod from the crank pin B")
+    JS2: PositiveInertia | None = Field(None, description="inertia of the rod about its centre of mass; exact only")
+    model: Literal["lumped", "exact"] = Field("lumped", description="two point masses, or the rigid rod itself")
 
     @field_validator("model")
     @classmethod

@@ -3,6 +3,8 @@
 Output term m S¨: the force the tape must carry; times S' it reaches the main shaft. Rigid tape.
 """
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PositiveMass
@@ -10,9 +12,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """mass: head and the tape that moves with it, kg."""
+    """Values of the head."""
 
-    mass: PositiveMass
+    mass: PositiveMass = Field(description="mass of the head and of the tape that moves with it")
 
 
 def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:

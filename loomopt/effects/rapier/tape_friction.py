@@ -5,6 +5,8 @@ Output term F sgn S˙: against the motion, so the drive must supply it. It chang
 
 import math
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.quantities import Force
@@ -12,9 +14,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """force: friction of tape and head in their guides, N."""
+    """Values of the guides."""
 
-    force: Force
+    force: Force = Field(description="friction of tape and head in their guides")
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

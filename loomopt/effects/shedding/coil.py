@@ -8,11 +8,14 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Axis, Check, Demand
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
 from loomopt.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
 from loomopt.schema import Figure, Table, Values
+from loomopt.units import Shown, usual
 
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""
@@ -25,30 +28,24 @@ OPENED = "coils are drawn open at the top"
 
 
 class Own(Table):
-    """springs: how many share K1; wire, diameter (mean), m, turns (active), initial_tension (N): one of them.
+    """The coils of one return spring, their steel, and what they must keep."""
 
-    shear_modulus, elasticity, Pa, density, kg/m³: its steel; strength: of 1 mm wire, Pa, falls as d^−strength_exponent.
-    shear_share, bending_share: shares of the strength that body and hooks may carry; spring_length: space inside the
-    hooks with the shed fully open, m; surge_ratio: least surge frequency over the cam's; hook_factor: bend radius of
-    the hooks over half the coil diameter; sizes: whether a free wire is one of the preferred sizes, or any.
-    """
-
-    springs: PositiveNumber = 2.0
-    wire: PositiveLength
-    diameter: PositiveLength
-    turns: PositiveNumber
-    initial_tension: Force
-    shear_modulus: PositivePressure
-    elasticity: PositivePressure
-    density: PositiveDensity
-    strength: PositivePressure
-    strength_exponent: PureNumber
-    shear_share: PositiveNumber
-    bending_share: PositiveNumber
-    spring_length: PositiveLength
-    surge_ratio: PositiveNumber = 13.0
-    hook_factor: PositiveNumber = 1.0
-    sizes: Literal["preferred", "any"] = "preferred"
+    springs: PositiveNumber = Field(2.0, description="how many springs share K1")
+    wire: PositiveLength = Field(description="diameter of the wire")
+    diameter: PositiveLength = Field(description="mean diameter of the coil")
+    turns: PositiveNumber = Field(description="active turns")
+    initial_tension: Force = Field(description="force at which the turns begin to part")
+    shear_modulus: PositivePressure = Field(description="shear modulus of the steel")
+    elasticity: PositivePressure = Field(description="modulus of elasticity of the steel")
+    density: PositiveDensity = Field(description="density of the steel")
+    strength: PositivePressure = Field(description="tensile strength of wire of 1 mm")
+    strength_exponent: PureNumber = Field(description="exponent with which the strength falls as the wire grows")
+    shear_share: PositiveNumber = Field(description="share of the strength that shear in the body may take")
+    bending_share: PositiveNumber = Field(description="share of the strength that bending of the hooks may take")
+    spring_length: PositiveLength = Field(description="space inside the hooks with the shed fully open")
+    surge_ratio: PositiveNumber = Field(13.0, description="least surge frequency over that of the cam")
+    hook_factor: PositiveNumber = Field(1.0, description="bend radius of the hooks over half the coil's diameter")
+    sizes: Literal["preferred", "any"] = Field("preferred", description="a free wire's: those that are sold, or any")
 
 
 def coil(own: Values) -> Coil:
@@ -115,10 +112,15 @@ def sold(own: Own) -> Mapping[str, Sequence[float]]:
 
 
 def explain(
-    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Own, clash: Iterable[str]
+    known: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    own: Own,
+    clash: Iterable[str],
+    shown: Shown = usual,
 ) -> str:
     """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
 
+    shown(value, kind, digits): a value as text in the reader's unit.
     tau >= 2 K_W (X0 + travel) f sqrt(2 G rho) follows from rate, surge frequency and shear stress [Shigley, ch. 10].
     """
     named = {limit.split()[0] for limit in clash}
@@ -134,8 +136,8 @@ def explain(
         return ""
     return (
         f"Coils that surge at {own.surge_ratio:g} times the cam's speed and stretch by X0 + travel = "
-        f"{1e3 * stretch:.4g} mm carry at least {1e-6 * least:.4g} MPa of shear, whatever their size "
-        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {1e-6 * most:.4g} MPa at most. "
+        f"{shown(stretch, 'length', 4)} carry at least {shown(least, 'pressure', 4)} of shear, whatever their size "
+        f"(tau >= 2 K_W (X0 + travel) f sqrt(2 G rho)); the wire allows {shown(most, 'pressure', 4)} at most. "
         "Less preload asks for a stiffer spring. A lower speed, less travel or a softer cam law (target law) helps."
     )
 
@@ -173,8 +175,8 @@ EFFECT: Check[object] = Check(
             "turns": "8",
             "initial_tension": "100 N",
             "springs": "2",
-            "shear_modulus": "77.2 GPa",
-            "elasticity": "203.4 GPa",
+            "shear_modulus": "77200 MPa",
+            "elasticity": "203400 MPa",
             "density": "7850 kg/m^3",
             "strength": "1974 MPa",
             "strength_exponent": "0.108",

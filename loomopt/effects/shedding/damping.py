@@ -1,5 +1,7 @@
 """Viscous damping of the heald frame in its guides: output term C X˙ [Qiu21, eq 4]."""
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
@@ -8,9 +10,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """C: damping, N·s/m."""
+    """Values of the guides."""
 
-    C: Damping
+    C: Damping = Field(description="viscous damping of the frame in its guides")
 
 
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:

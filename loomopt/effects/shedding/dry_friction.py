@@ -4,6 +4,8 @@ It jumps where the frame starts and stops. In a dwell it is any value in [−F, 
 −1 for the least cam force, by which contact is judged, +1 for the largest.
 """
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
@@ -12,9 +14,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """F: friction, N."""
+    """Values of the guides."""
 
-    F: Force
+    F: Force = Field(description="Coulomb friction of the frame in its guides")
 
 
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:

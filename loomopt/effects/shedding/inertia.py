@@ -1,5 +1,7 @@
 """Inertia of the heald frame and what moves with it: output term M X¨ [Qiu21, eq 4]."""
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
@@ -8,9 +10,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """M: moving mass, kg."""
+    """Values of the frame."""
 
-    M: Mass
+    M: Mass = Field(description="mass of the frame and of what moves with it")
 
 
 def moved(given: Values, own: Values) -> Number:

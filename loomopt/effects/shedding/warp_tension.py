@@ -10,6 +10,8 @@ T is T1 with the shed open upward (X = 0) and −T2 with it open downward. Betwe
 from collections.abc import Callable, Mapping
 from typing import Literal
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load, Place
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
@@ -20,11 +22,11 @@ TURN = 6.283185307179586
 
 
 class Own(Table):
-    """T1, T2: pull with the shed open upward and downward, N; shape: how the one becomes the other."""
+    """Values of the warp."""
 
-    T1: Force
-    T2: Force
-    shape: Literal["levels", "linear", "step"] = "linear"
+    T1: Force = Field(description="pull of the warp with the shed open upward")
+    T2: Force = Field(description="pull of the warp with the shed open downward")
+    shape: Literal["levels", "linear", "step"] = Field("linear", description="how the one pull becomes the other")
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:

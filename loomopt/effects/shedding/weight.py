@@ -3,6 +3,8 @@
 A frame whose weight presses the roller on the cam instead has a negative G.
 """
 
+from pydantic import Field
+
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
@@ -11,9 +13,9 @@ from loomopt.schema import Table, Values
 
 
 class Own(Table):
-    """G: weight in the direction of the cam's push, N."""
+    """Values of the frame."""
 
-    G: SignedForce
+    G: SignedForce = Field(description="weight in the direction of the cam's push")
 
 
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:

@@ -6,10 +6,13 @@ from loomopt.jobs.base import Figures
 from loomopt.jobs.beatup.model import FRONT
 from loomopt.jobs.beatup.scene import VARIABLES, RetrofitTarget
 from loomopt.program.numbers import Bounds
-from loomopt.program.program import Numbers, Program
+from loomopt.program.program import Goal, Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 from loomopt.tolerances import BALANCED, NO_MASS
+
+BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
+"""What target balance asks, and may find out of reach."""
 
 
 def design(program: Program, x: Numbers) -> dict[str, float]:
@@ -61,8 +64,7 @@ def figures(
     static = sampled.figures
     found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
     found["mu_min"] = min(static["mu_near"], static["mu_far"])
-    for name in sampled.model.quantities:
-        found[name] = sampled.peak(name) if name != "peak_torque" or sampled.model.loads else None
+    found |= {name: sampled.peak(name) for name in sampled.model.quantities}
     weights = scene.table(RetrofitTarget).weights
     widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
     changes = [
@@ -76,19 +78,18 @@ def figures(
 
 def say(scene: Scene, target: str, figures: Figures) -> str:
     """Say in one sentence what an optimum of the target reached; figures in SI."""
-    front, peak, rms = figures["M3_fdc"] or 0.0, figures["peak_torque"] or 0.0, figures["pulse_rms"] or 0.0
+    front, peak, rms = (scene.show(figures[name] or 0.0, "torque") for name in ("M3_fdc", "peak_torque", "pulse_rms"))
     jumps = any(FRONT in effect.reads for effect in scene.active)
     where = "just before front dead centre" if jumps else "at front dead centre"
-    peak_text = f"the least peak crank torque over the whole cycle is {peak:.6g} N*m"
-    if target == "balance" and abs(front) <= BALANCED * peak:
+    peak_text = f"the least peak crank torque over the whole cycle is {peak}"
+    if target == "balance" and BALANCE.reached(figures):
         return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
     if target == "balance":
         return (
-            f"Balance is out of reach: the reed torque nearest to zero found {where} is {front:.6g} N*m, "
-            f"and then {peak_text}."
+            f"Balance is out of reach: the reed torque nearest to zero found {where} is {front}, and then {peak_text}."
         )
     return {
-        "pulse": f"The least reed torque over the pulse is {rms:.6g} N*m rms ({front:.6g} N*m {where}).",
-        "torque": f"With the reed torque at {front:.6g} N*m {where}, {peak_text}.",
+        "pulse": f"The least reed torque over the pulse is {rms} rms ({front} {where}).",
+        "torque": f"With the reed torque at {front} {where}, {peak_text}.",
         "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
     }[target]

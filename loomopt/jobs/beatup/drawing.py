@@ -1,5 +1,6 @@
-"""The crank-rocker drawn at full scale in mm, in both dead centres."""
+"""The crank-rocker drawn at full scale in both dead centres, with the centres of mass that swing with its rocker."""
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,30 +9,46 @@ from loomopt.errors import BadInput
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import crank_rocker, crank_rocker_faults
-from loomopt.picture.drawing import POINTER, Label, angle_between, captioned, place, pointer
+from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.shapes import Arc, Drawing, Point, Primitive
-from loomopt.picture.skeleton import Skeleton
+from loomopt.picture.skeleton import Mass, Skeleton
+from loomopt.picture.symbols import POINTER, angle_between, pointer
+from loomopt.picture.units import METRIC, Units
+from loomopt.units import show
+
+REED, COUNTERWEIGHT = "G", "E"
+MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
+"""Centres of mass by their joints: names of mass and radius; the counterweight's lies opposite the reed's."""
 
 
 @dataclass(frozen=True)
 class Linkage:
-    """The crank-rocker in both dead centres: lengths in mm, angles in rad."""
+    """The crank-rocker in both dead centres: lengths in m, angles in rad.
+
+    masses: by joint; offset: of the reed's centre of mass from the rocker's line, rad.
+    """
 
     lengths: crank_rocker.Lengths
     centres: crank_rocker.DeadCentres
+    masses: Mapping[str, Mass]
+    offset: float
 
-    @property
+    @functools.cached_property
     def skeleton(self) -> Skeleton:
         """Its joints and links; crank and rod begin at B, so that folded their dashes coincide."""
-        sides, at, a = self.lengths, self.centres, Point(0.0, 0.0)
-        pivots = {"A": a, "D": Point(sides.l4, 0.0)}
+        sides, at, a, d = self.lengths, self.centres, Point(0.0, 0.0), Point(self.lengths.l4, 0.0)
         joints = {
             FRONT: {"B": a.towards(at.beta, sides.l1), "C": a.towards(at.beta, sides.l1 + sides.l2)},
             REAR: {"B": a.towards(at.beta_r, -sides.l1), "C": a.towards(at.beta_r, sides.l2 - sides.l1)},
         }
-        path = Arc("paths", pivots["D"], sides.l3, at.psi_front, at.psi_rear)
-        links = (("A", "D"), ("B", "A"), ("B", "C"), ("D", "C"))
-        return Skeleton(pivots, joints, links, (("A", sides.l1),), (path,))
+        for event, psi in ((FRONT, at.psi_front), (REAR, at.psi_rear)):
+            for name, own in self.masses.items():
+                side = -own.radius if name == COUNTERWEIGHT else own.radius
+                joints[event][name] = d.towards(psi + self.offset, side)
+        apart = [at for at, own in self.masses.items() if at != REED or self.offset or not 0 < own.radius < sides.l3]
+        path = Arc("paths", d, sides.l3, at.psi_front, at.psi_rear)
+        links = (("A", "D"), ("B", "A"), ("B", "C"), ("D", "C"), *(("D", name) for name in apart))
+        return Skeleton({"A": a, "D": d}, joints, links, (("A", sides.l1),), (path,), masses=self.masses)
 
     @property
     def toward_fell(self) -> float:
@@ -40,42 +57,46 @@ class Linkage:
 
     @property
     def radii(self) -> tuple[float, float]:
-        """The radii, mm, at which β and the swing are drawn, the first beside the crank's circle."""
+        """The radii, m, at which β and the swing are drawn, the first beside the crank's circle."""
         return self.lengths.l1 + 2.5 * self.height, 0.5 * self.lengths.l3
 
     @property
     def height(self) -> float:
-        """Text height, mm."""
+        """Text height, m."""
         return 0.02 * float(self.lengths.l4 + self.lengths.l1)
 
 
 def of(design: Mapping[str, float]) -> Linkage:
-    """Return the crank-rocker l1, l2, l3, l4 (m; other keys are ignored). Raises BadInput when it is none."""
+    """Return the crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
+
+    Raises BadInput when it is none.
+    """
     metres = [design[name] for name in LENGTHS]
     fault = crank_rocker_faults.fault(*metres)
     if fault:
         raise BadInput(f"the linkage cannot be drawn: {fault}", key=", ".join(LENGTHS), remedy="Correct them")
-    lengths = crank_rocker.Lengths(*(1000 * length for length in metres))
-    return Linkage(lengths, crank_rocker.DeadCentres(FLOAT, lengths))
+    lengths = crank_rocker.Lengths(*metres)
+    masses = {at: Mass(*(design.get(name, 0.0) for name in names)) for at, names in MASSES.items()}
+    there = {at: own for at, own in masses.items() if own.mass and own.radius}
+    return Linkage(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
 
 
-def linkage(design: Mapping[str, float], title: str) -> Drawing:
+def linkage(design: Mapping[str, float], title: str, units: Units = METRIC) -> Drawing:
     """Return the crank-rocker of a design in both dead centres, at full scale. Raises BadInput."""
     found = of(design)
-    skeleton, h = found.skeleton, found.height
-    strokes = [*skeleton.strokes(h), *_angles(found, skeleton)]
-    texts = place(_labels(found, skeleton), strokes, h)
-    return captioned(Drawing(title, h, (*strokes, *texts)), _legend(found.centres))
+    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
+    texts = place(_labels(found, units), strokes, found.height)
+    return Drawing(title, found.height, (*strokes, *texts), _legend(found, units), units.length)
 
 
-def joints_csv(design: Mapping[str, float]) -> str:
-    """Return the joints that `linkage` draws as CSV, mm; digits round-trip. Raises BadInput."""
-    return of(design).skeleton.csv()
+def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
+    """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
+    return of(design).skeleton.csv(units)
 
 
-def _angles(found: Linkage, skeleton: Skeleton) -> list[Primitive]:
+def _angles(found: Linkage) -> list[Primitive]:
     """Draw β at A, the swing at D, and the arrow toward the fell."""
-    centres, h, (beta, swing) = found.centres, found.height, found.radii
+    skeleton, centres, h, (beta, swing) = found.skeleton, found.centres, found.height, found.radii
     return [
         *angle_between(skeleton.pivots["A"], beta, 0.0, centres.beta, h),
         *angle_between(skeleton.pivots["D"], swing, centres.psi_rear, centres.psi_front, h, both=True),
@@ -83,12 +104,13 @@ def _angles(found: Linkage, skeleton: Skeleton) -> list[Primitive]:
     ]
 
 
-def _labels(found: Linkage, skeleton: Skeleton) -> list[Label]:
-    """Name joints, links with lengths in mm, angles in degrees; joints first: they must stand closest."""
+def _labels(found: Linkage, units: Units) -> list[Label]:
+    """Name joints, links with lengths, angles in degrees, masses; joints first: they must stand closest."""
     sides, centres, (beta, swing) = found.lengths, found.centres, found.radii
-    at, line, quarter, fell = skeleton.at(FRONT), centres.beta, math.pi / 2, found.toward_fell
+    at, line, quarter, fell = found.skeleton.at(FRONT), centres.beta, math.pi / 2, found.toward_fell
     a, b, c, d = (at[name] for name in "ABCD")
-    rear, middle = skeleton.joints[REAR], (centres.psi_front + centres.psi_rear) / 2
+    rear, turns = found.skeleton.joints[REAR], (centres.psi_front, centres.psi_rear)
+    names = {name: f"{name} = {units.size(getattr(sides, name))}" for name in LENGTHS}
     return [
         Label("frame", a, math.pi, "A"),
         Label("frame", d, 0.0, "D"),
@@ -96,21 +118,33 @@ def _labels(found: Linkage, skeleton: Skeleton) -> list[Label]:
         Label(FRONT, c, line + quarter, "C"),
         Label(REAR, rear["B"], line + math.pi, "B'"),
         Label(REAR, rear["C"], line - quarter, "C'"),
+        *(Label("masses", at[name], 0.0, f"{name}  {_told(name, own, units)}") for name, own in found.masses.items()),
+        *(Label("masses", rear[name], -quarter, f"{name}'") for name in found.masses),
         Label("notes", c.towards(fell, POINTER * found.height), fell, "fell"),
-        Label("dimensions", d.towards(middle, swing), middle, f"swing = {math.degrees(centres.swing):.2f}°"),
-        Label("dimensions", a.towards(line / 2, beta), line / 2, f"β = {math.degrees(line):.2f}°"),
-        Label(FRONT, a.towards(line, sides.l1 / 2), line + quarter, f"l1 = {sides.l1:.6g}"),
-        Label(FRONT, b.towards(line, sides.l2 / 2), line + quarter, f"l2 = {sides.l2:.6g}"),
-        Label(FRONT, d.towards(centres.psi_front, 0.75 * sides.l3), math.pi / 4, f"l3 = {sides.l3:.6g}"),
-        Label("frame", a.part(d), -quarter, f"l4 = {sides.l4:.6g}"),
+        around("dimensions", d, swing, *turns, f"swing = {math.degrees(centres.swing):.2f}°"),
+        around("dimensions", a, beta, 0.0, line, f"β = {math.degrees(line):.2f}°"),
+        along(FRONT, a, b, line + quarter, names["l1"]),
+        along(FRONT, b, c, line + quarter, names["l2"]),
+        along(FRONT, c, d, math.pi / 4, names["l3"]),
+        along("frame", a, d, -quarter, names["l4"]),
     ]
 
 
-def _legend(centres: crank_rocker.DeadCentres) -> tuple[tuple[str, str], ...]:
+def _told(name: str, own: Mass, units: Units) -> str:
+    """Say a centre's mass and radius."""
+    mass, radius = MASSES[name]
+    return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"
+
+
+def _legend(found: Linkage, units: Units) -> tuple[tuple[str, str], ...]:
     """Return the lines below a drawing, each with its layer."""
+    centres = found.centres
     theta, rear = math.degrees(centres.theta), 180 + math.degrees(centres.beta_r)
+    said = {REED: "G  centre of mass of the reed system", COUNTERWEIGHT: "E  counterweight, opposite the reed"}
+    masses = "; ".join(said[name] for name in found.masses)
     return (
         (FRONT, f"A B C  {FRONT}, crank at {math.degrees(centres.beta):.2f}°"),
         (REAR, f"A B' C'  {REAR}, crank at {rear:.2f}°"),
-        ("notes", f"θ = β − βr = {theta:.2f}°; lengths in mm"),
+        *((("masses", masses),) if masses else ()),
+        ("notes", f"θ = β − βr = {theta:.2f}°; {units.said}"),
     )

@@ -70,10 +70,15 @@ class Beatup(Job):
         return designs.say(scene, target, figures)
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return ψ, ψ', ψ'', the terms, M3 and Md."""
+        """Return ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""
         values = sampler.given.values
         return Columns(
-            {"psi [rad]": lambda i: -i.pose.q, "psi_1 [1]": lambda i: -i.pose.q1, "psi_2 [1]": lambda i: -i.pose.q2},
+            {
+                "psi [rad]": lambda at: -at.pose.q,
+                "psi_1 [1]": lambda at: -at.pose.q1,
+                "psi_2 [1]": lambda at: -at.pose.q2,
+                "mu [rad]": lambda at: np.pi / 2 - abs(at.pose.joints.obliquity),
+            },
             "N*m",
             ("M3 [N*m]", lambda at: at.force),
             ("Md [N*m]", lambda at: at.crank_torque),

@@ -16,6 +16,7 @@ from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
+from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
 from loomopt.schema import Values
@@ -185,5 +186,5 @@ def model(
     square = {"M3_square": Quantity(lambda at: at.force**2, figure=False)}
     resisted = any(effect.name == pulse[0] for effect in effects)
     means = (Integral("pulse_mean_square", "pulse_rms", "M3_square", pulse),) if resisted else ()
-    peak = {"peak_torque": Quantity(lambda at: at.crank_torque)}
-    return JobModel(CrankRocker(), effects, words, peak | square, rows, integrals=means, known=known)
+    peaks = drive.quantities(effects, known)
+    return JobModel(CrankRocker(), effects, words, peaks | square, rows, integrals=means, known=known)

@@ -7,14 +7,16 @@ from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup.design import BALANCE
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.mechanisms import counterweight
 from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
 from loomopt.program import numbers as scene_numbers
+from loomopt.program.drive import TORQUE
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
@@ -58,7 +60,8 @@ def program(scene: Scene, target: str) -> Program:
     limits += demanded(scene, physics.checks, known, {})
     margins = physics.kinematics.groups[""].margins
     limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in margins]
-    limits += _target_limits(scene, target, sizes)
+    asked = _target_limits(scene, target, sizes)
+    limits += asked
     taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}
     if target == "retrofit":
@@ -66,7 +69,8 @@ def program(scene: Scene, target: str) -> Program:
     starts = _starts(variables, known, direct, target == "retrofit")
     moves = (*_moves(variables, known, limited, sizes.most), *scene_numbers.axis_moves(scene, known, limited))
     objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
-    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves)
+    task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves
+    return Program(*task, goals=(BALANCE,) if target == "balance" else goals(asked))
 
 
 class _Sizes:
@@ -83,7 +87,7 @@ class _Sizes:
         self.room = counterweight.room(known, limited, max(reed, counterweight.holding(reed, front, resistance)))
         self.most = self.room["m4e"][1] * self.room["r4e"][1] ** 2
         self.inertia = max(reed, self.most) or 1.0
-        self.peak = (sampler.peak("peak_torque") if physics.loads else 0.0) or 1.0
+        self.peak = (sampler.peak(TORQUE) if physics.loads else 0.0) or 1.0
         # What a design can change of the reed torque is its share beside the resistance.
         self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
         self.mean_square = self.torque * max(self.torque, resistance)
@@ -96,7 +100,7 @@ class _Sizes:
 
     def figure(self, name: str) -> float:
         """Return the size of a figure."""
-        if name == "peak_torque":
+        if name == TORQUE:
             return self.peak
         if self.sampler.model.has_quantity(name):
             return self.sampler.peak(name) or 1.0
@@ -243,7 +247,7 @@ def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds
 
 def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
     """Return the target's levels in order."""
-    peak = Objective("peak_torque", "peak_torque", "peak", sizes.peak)
+    peak = Objective(TORQUE, TORQUE, "peak", sizes.peak)
     return {
         "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", sizes.torque), peak),
         "torque": (peak,),

@@ -3,52 +3,56 @@
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import Field
+
 from loomopt.effects import found
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.mechanisms import crank_rocker_faults
+from loomopt.program import drive
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
+from loomopt.units import Shown, usual
 
 
 class Operation(Table):
-    """speed: main shaft, rad/s; M0: peak resistance of the cloth, N·m."""
+    """What the loom does."""
 
-    speed: Speed | None = None
-    M0: Torque | None = None
+    speed: Speed | None = Field(None, description="speed of the main shaft")
+    M0: Torque | None = Field(None, description="peak resistance of the cloth about the rocking shaft D")
 
 
 class Mechanism(Table):
-    """Today's machine: links, m; counterweight m4e, kg, at radius r4e, m; reed system m4, kg, centre at r4, m."""
+    """Today's machine: crank-rocker A B C D, reed system and counterweight on the rocking shaft D."""
 
-    l1: PositiveLength
-    l2: PositiveLength
-    l3: PositiveLength
-    l4: PositiveLength
-    m4e: Mass = 0.0
-    r4e: Length = 0.0
-    m4: PositiveMass | None = None
-    r4: Length | None = None
+    l1: PositiveLength = Field(description="crank AB")
+    l2: PositiveLength = Field(description="connecting rod BC")
+    l3: PositiveLength = Field(description="rocker DC, the sley")
+    l4: PositiveLength = Field(description="frame AD, between main shaft and rocking shaft")
+    m4e: Mass = Field(0.0, description="mass of the counterweight")
+    r4e: Length = Field(0.0, description="distance of the counterweight from the rocking shaft D")
+    m4: PositiveMass | None = Field(None, description="mass of the reed system without counterweight")
+    r4: Length | None = Field(None, description="centre of mass of the reed system from the rocking shaft D")
 
 
 class TargetTable(Table):
-    """expected: design and figures the target is known to reach, SI; shown, never used to solve."""
+    """What every target's table may hold."""
 
-    expected: dict[str, Any] | None = None
+    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class TorqueTarget(TargetTable):
-    """M3_tolerance: largest |M3| at front dead centre, N·m; 1 % of M0 where it is not given."""
+    """Values of the target torque."""
 
-    M3_tolerance: Torque | None = None
+    M3_tolerance: Torque | None = Field(None, description="largest |M3| at front dead centre; 1 % of M0 without it")
 
 
 class RetrofitTarget(TargetTable):
-    """weights: design variable → weight of its change; 1 where it is not given."""
+    """Values of the target retrofit."""
 
-    weights: dict[str, PureNumber] = {}  # noqa: RUF012 (pydantic copies it)
+    weights: dict[str, PureNumber] = Field({}, description="design variable → weight of its change, 1 without it")
 
 
 RESISTED = ("resistance", 1.0)
@@ -60,12 +64,12 @@ FIGURES = {
     figure.name: figure
     for figure in (
         Figure("M3_fdc", "torque", "reed torque at front dead centre"),
-        Figure("peak_torque", "torque", "peak crank torque over the cycle", sides=("max",)),
+        *drive.FIGURES,
         Figure("alpha_fdc", "angular acceleration", "rocker acceleration at front dead centre"),
-        Figure("swing", "angle", "rocker swing"),
+        Figure("swing", "angle", "swing of the rocker DC"),
         Figure("theta", "angle", "angle between the dead centres' crank lines"),
         Figure("beta", "angle", "crank angle of front dead centre"),
-        Figure("mu_min", "angle", "least transmission angle", sides=("min",)),
+        Figure("mu_min", "angle", "least transmission angle, at C", sides=("min",)),
         Figure("J4", "inertia", "inertia of reed and counterweight"),
         Figure("r4", "length", "reed system's eccentricity"),
         Figure("pulse_rms", "torque", "rms reed torque over the pulse", sides=("max",)),
@@ -84,15 +88,15 @@ TARGETS = {
 }
 
 
-def fault(design: Mapping[str, float]) -> str:
+def fault(design: Mapping[str, float], shown: Shown = usual) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
-    return crank_rocker_faults.fault(*(design[name] for name in named)) if len(named) == 4 else ""
+    return crank_rocker_faults.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
 
 
 def check(scene: Scene) -> None:
     """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
-    reason = fault(scene.mechanism)
+    reason = fault(scene.mechanism, scene.show)
     if reason:
         raise BadInput(
             f"today's machine is not a crank-rocker: {reason}",

@@ -8,10 +8,12 @@ from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
+from loomopt.picture.units import told
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Curve
     from loomopt.picture.shapes import Drawing
 
 
@@ -22,13 +24,13 @@ class BeatupViews(JobViews):
         """Return the crank-rocker in both dead centres at full scale. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
 
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name)
+        return drawing.linkage(_numbers(scene, design), scene.name, told(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV, mm. Raises BadInput."""
+        """Return its joints and centres of mass as CSV. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
 
-        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design))
+        return drawing.joints_csv(_numbers(scene, design), told(scene))
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
@@ -45,6 +47,26 @@ class BeatupViews(JobViews):
             begins, ends = sampler.cycle.stretch(pulse.where)
             found |= {"pulse begins": begins, "pulse ends": ends}
         return found
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what the curves are called."""
+        from loomopt.picture.panels import Curve
+
+        return {
+            "psi": Curve("rocker angle"),
+            "psi_1": Curve("rocker speed"),
+            "psi_2": Curve("rocker acceleration"),
+            "psi_tt": Curve("rocker acceleration", at={FRONT: "alpha_fdc"}),
+            "mu": Curve("transmission angle", least="mu_min"),
+            "M3": Curve("reed torque", at={FRONT: "M3_fdc"}),
+            "Md": Curve("crank torque", peak="peak_torque"),
+        }
+
+
+def _numbers(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+    """Return all numbers of a design, with the offset of the reed's centre of mass where an effect has one."""
+    found = registry.of(scene).numbers_of(scene, design)
+    return found | {"offset": found.get(scene.full("offset"), 0.0)}
 
 
 VIEWS = BeatupViews()

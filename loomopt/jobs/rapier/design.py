@@ -11,7 +11,7 @@ import numpy as np
 from loomopt.cycle import TURN, Node
 from loomopt.jobs.base import Figures
 from loomopt.jobs.rapier.model import jerk_mean, match_mean
-from loomopt.jobs.rapier.scene import STROKE, VARIABLES, MatchTarget, match_table
+from loomopt.jobs.rapier.scene import FIGURES, STROKE, VARIABLES, MatchTarget, match_table
 from loomopt.mechanisms.turning_points import crossing
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
@@ -99,14 +99,16 @@ def figures(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     return found
 
 
-def say(target: str, figures: Figures) -> str:
+def say(scene: Scene, target: str, figures: Figures) -> str:
     """Say in one sentence what an optimum of the target reached; figures in SI."""
-    size = {name: value or 0.0 for name, value in figures.items()}
-    dwell = math.degrees(size["dwell"])
-    kept = f"stroke {1e3 * size['stroke']:.9g} mm and {dwell:.4g} deg of dwell"
+
+    def told(name: str, digits: int = 9) -> str:
+        return scene.show(figures.get(name) or 0.0, FIGURES[name].kind, digits)
+
+    kept = f"stroke {told('stroke')} and {told('dwell', 4)} of dwell"
     return {
-        "stroke-dwell": f"With {kept}, the least peak head acceleration is {size['peak_acceleration']:.9g} m/rad^2.",
-        "dwell": f"With stroke {1e3 * size['stroke']:.9g} mm, the largest dwell on both sides is {dwell:.9g} deg.",
-        "smooth": f"With {kept}, the least rms head jerk is {size['rms_jerk']:.9g} m/rad^3.",
-        "match": f"The head travel comes within {1e3 * size['match_rms']:.6g} mm rms of the table.",
+        "stroke-dwell": f"With {kept}, the least peak head acceleration is {told('peak_acceleration')}.",
+        "dwell": f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}.",
+        "smooth": f"With {kept}, the least rms head jerk is {told('rms_jerk')}.",
+        "match": f"The head travel comes within {told('match_rms', 6)} rms of the table.",
     }[target]

@@ -1,4 +1,4 @@
-"""The rapier drive drawn at full scale in mm: in both dead centres of the sley and where it hands the weft over."""
+"""The rapier drive drawn at full scale: in both dead centres of the sley and where it hands the weft over."""
 
 import functools
 import math
@@ -15,9 +15,11 @@ from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_faults, turning_points
 from loomopt.mechanisms.dyad import Vector
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
-from loomopt.picture.drawing import POINTER, Label, angle_between, arrow, captioned, place, pointer
+from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.shapes import Drawing, Line, Point, Primitive
 from loomopt.picture.skeleton import Skeleton
+from loomopt.picture.symbols import POINTER, angle_between, arrow, pointer
+from loomopt.picture.units import METRIC, Units
 
 FRONT, REAR, OVER = "front dead centre", "rear dead centre", "hand-over"
 LINKS = (("A0", "A"), ("A", "B1"), ("B0", "B1"), ("B0", "B2"), ("C0", "C"), ("C", "D"), ("B2", "D"))
@@ -73,32 +75,32 @@ class Drive:
 
     @property
     def radii(self) -> tuple[float, float, float]:
-        """The radii, mm, at which α, the swing and φ63 are drawn."""
-        return 500 * self.dimensions.l3p, 850 * self.dimensions.l3, 450 * self.dimensions.l6
+        """The radii, m, at which α, the swing and φ63 are drawn."""
+        return 0.5 * self.dimensions.l3p, 0.85 * self.dimensions.l3, 0.45 * self.dimensions.l6
 
     @property
     def height(self) -> float:
-        """Text height: 1.1 % of the machine, as l4 is small; mm of m."""
-        return 11 * float(self.dimensions.l71 + self.dimensions.l1)
+        """Text height, m: 1.1 % of the machine, as l4 is small."""
+        return 0.011 * float(self.dimensions.l71 + self.dimensions.l1)
 
     @functools.cached_property
     def skeleton(self) -> Skeleton:
         """Its joints and links, both cranks' circles and the path of D."""
         joints = {event: {name: _point(at) for name, at in pose.joints.items()} for event, pose in self.poses.items()}
         path = self.turn(np.asarray(TURN / SAMPLES * np.arange(SAMPLES), dtype=np.float64)).joints["D"]
-        d = tuple(Point(1000 * float(x), 1000 * float(y)) for x, y in zip(path.x, path.y, strict=True))
+        d = tuple(Point(float(x), float(y)) for x, y in zip(path.x, path.y, strict=True))
         return Skeleton(
             {name: joints[FRONT][name] for name in PIVOTS},
             {event: {name: at[name] for name in MOVING} for event, at in joints.items()},
             (("A0", "B0"), *LINKS),
-            (("A0", 1000 * self.dimensions.l1), ("C0", 1000 * self.dimensions.l4)),
+            (("A0", self.dimensions.l1), ("C0", self.dimensions.l4)),
             (Line("paths", d, closed=True),),
             {"C": 0.2, "D": 0.2},
         )
 
 
 def _point(vector: Vector) -> Point:
-    return Point(1000 * vector.x, 1000 * vector.y)
+    return Point(vector.x, vector.y)
 
 
 def of(design: Mapping[str, float]) -> Drive:
@@ -114,17 +116,17 @@ def of(design: Mapping[str, float]) -> Drive:
     return Drive(dimensions)
 
 
-def linkage(design: Mapping[str, float], title: str) -> Drawing:
+def linkage(design: Mapping[str, float], title: str, units: Units = METRIC) -> Drawing:
     """Return the drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput."""
     found = of(design)
     strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
-    texts = place([*_joints(found), *_labels(found)], strokes, found.height)
-    return captioned(Drawing(title, found.height, (*strokes, *texts)), _legend(found))
+    texts = place([*_joints(found), *_labels(found, units)], strokes, found.height)
+    return Drawing(title, found.height, (*strokes, *texts), _legend(found, units), units.length)
 
 
-def joints_csv(design: Mapping[str, float]) -> str:
-    """Return the joints that `linkage` draws as CSV, mm; digits round-trip. Raises BadInput."""
-    return of(design).skeleton.csv()
+def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
+    """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
+    return of(design).skeleton.csv(units)
 
 
 def _angles(found: Drive) -> list[Primitive]:
@@ -133,35 +135,34 @@ def _angles(found: Drive) -> list[Primitive]:
     front, rear = found.poses[FRONT].phi3, found.poses[REAR].phi3
     (alpha, swing, phi63), b2 = found.radii, found.skeleton.joints[OVER]["B2"]
     strokes: list[Primitive] = [
-        Line("dimensions", (b2, b2.towards(start, 1000 * d.l6))),
+        Line("dimensions", (b2, b2.towards(start, d.l6))),
         *angle_between(at["B0"], alpha, front, front + d.alpha, h),
         *angle_between(at["B0"], swing, rear, front, h),
         *angle_between(b2, phi63, start, start + found.phi63, h),
     ]
     side = found.sley.stand.frame_angle + math.pi
     for pivot, radius, sense in (("A0", d.l1, 1), ("C0", d.l4, -1)):
-        tip = at[pivot].towards(side, 1000 * radius)
-        strokes.append(arrow("notes", tip, side + sense * math.pi / 2, min(h, 400 * radius)))
+        tip = at[pivot].towards(side, radius)
+        strokes.append(arrow("notes", tip, side + sense * math.pi / 2, min(h, 0.4 * radius)))
     return [*strokes, *pointer(at["B1"], front + math.pi / 2, h)]
 
 
-def _labels(found: Drive) -> list[Label]:
-    """Name links with lengths in mm, angles in degrees, and the fell."""
+def _labels(found: Drive, units: Units) -> list[Label]:
+    """Name links with lengths, angles in degrees, and the fell."""
     d, at, up = found.dimensions, found.skeleton.at(FRONT), math.pi / 2
     front, rear = found.poses[FRONT].phi3, found.poses[REAR].phi3
     (alpha, swing, phi63), b2 = found.radii, found.skeleton.joints[OVER]["B2"]
-    middle, open_at = (front + rear) / 2, found.turned + found.phi63 / 2
+    start = found.turned
     sides = {"l1": up, "l2": up, "l3": math.pi, "l3p": math.pi, "l4": -0.5, "l5": up, "l6": math.pi}
     labels = [Label("notes", at["B1"].towards(front + up, POINTER * found.height), front + up, "fell")]
     for (name, side), (one, other) in zip(sides.items(), LINKS, strict=True):
-        near = at[one].part(at[other], 0.8 if name == "l3" else 0.5)
-        labels.append(Label(FRONT, near, side, f"{name} = {1000 * getattr(d, name):.6g}"))
+        labels.append(along(FRONT, at[one], at[other], side, f"{name} = {units.size(getattr(d, name))}"))
     return [
         *labels,
-        Label("frame", at["B0"].part(at["A0"]), -up / 2, f"l71 = {1000 * d.l71:.6g}"),
-        Label("dimensions", at["B0"].towards(front + d.alpha / 2, alpha), up, f"α = {math.degrees(d.alpha):.2f}°"),
-        Label("dimensions", at["B0"].towards(middle, swing), middle, f"swing = {math.degrees(front - rear):.2f}°"),
-        Label("dimensions", b2.towards(open_at, phi63), 0.0, f"φ63 max = {math.degrees(found.phi63):.2f}°"),
+        along("frame", at["B0"], at["A0"], -up / 2, f"l71 = {units.size(d.l71)}"),
+        around("dimensions", at["B0"], alpha, front, front + d.alpha, f"α = {math.degrees(d.alpha):.2f}°"),
+        around("dimensions", at["B0"], swing, rear, front, f"swing = {math.degrees(front - rear):.2f}°"),
+        around("dimensions", b2, phi63, start, start + found.phi63, f"φ63 max = {math.degrees(found.phi63):.2f}°"),
     ]
 
 
@@ -182,17 +183,17 @@ def _joints(found: Drive) -> list[Label]:
     return labels
 
 
-def _legend(found: Drive) -> tuple[tuple[str, str], ...]:
+def _legend(found: Drive, units: Units) -> tuple[tuple[str, str], ...]:
     """Return the lines below the drawing, each with its layer."""
     d, c0 = found.dimensions, found.skeleton.pivots["C0"]
     rows = [
         (at, f"A{prime} B1{prime} C{prime} D{prime}  {at}, crank at {math.degrees(found.phi1[at]):.2f}°")
         for at, prime in found.skeleton.primes.items()
     ]
-    stroke, ratio = 1000 * d.travel * found.phi63, f"i1 i2 = {d.i1 * d.i2:.5g}, wheel {1000 * d.wheel:.5g}"
-    stands = f"C0 at ({c0.x:.2f}, {c0.y:.2f}) from B0, C0 C at {math.degrees(d.phi40):.2f}° in front"
+    stroke, wheel = units.size(d.travel * found.phi63), units.size(d.wheel)
+    stands = f"C0 at ({units.size(c0.x)}, {units.size(c0.y)}) from B0, C0 C at {math.degrees(d.phi40):.2f}° in front"
     return (
         *rows,
-        ("notes", f"stroke = i1 i2 wheel/2 φ63 max = {stroke:.2f}; {ratio}"),
-        ("notes", f"{stands}; lengths in mm"),
+        ("notes", f"stroke = i1 i2 wheel/2 φ63 max = {stroke}; i1 i2 = {d.i1 * d.i2:.5g}, wheel {wheel}"),
+        ("notes", f"{stands}; {units.said}"),
     )

@@ -52,10 +52,10 @@ class Rapier(Job):
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum is worth."""
-        return designs.say(target, figures)
+        return designs.say(scene, target, figures)
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
-        """Return S with three derivatives, φ3, φ6, φ63, the transmission angle, the terms, tape force and torque."""
+        """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
         front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
         gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
         centres = sampler.given.values["centres"]
@@ -69,7 +69,7 @@ class Rapier(Job):
                 "phi3 [rad]": lambda at: at.pose.joints.phi3,
                 "phi6 [rad]": lambda at: at.pose.joints.phi3 + gap + at.pose.joints.phi63(at.pose.front),
                 "phi63 [rad]": lambda at: at.pose.joints.phi63(at.pose.front),
-                "mu [rad]": lambda at: math.pi / 2 - at.pose.joints.obliquity,
+                "mu [rad]": lambda at: math.pi / 2 - abs(at.pose.joints.obliquity),
             },
             "N",
             ("Q [N]", lambda at: at.force),

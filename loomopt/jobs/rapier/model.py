@@ -18,6 +18,7 @@ from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import rapier_drive, turning_points
 from loomopt.mechanisms.dyad import Vector, dot
+from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
 from loomopt.schema import Values
@@ -200,11 +201,10 @@ QUANTITIES: dict[str, Quantity] = {
     "miss_square": Quantity(lambda at: (at.pose.q - at.node.switch["datum"]) ** 2, figure=False),
     "dwell_travel": Quantity(lambda at: at.pose.q / at.values["s_dwell"], figure=False),
 }
-LOADED: dict[str, Quantity] = {
-    "peak_torque": Quantity(lambda at: at.crank_torque),
-    "tape_force": Quantity(lambda at: at.force),
-}
-"""Quantities of the motion, and those that loads give, SI."""
+TAPE_FORCE = {"tape_force": Quantity(lambda at: at.force)}
+"""Quantities of the motion, and the one of the tape that loads give, SI."""
+LOADED = (*TAPE_FORCE, drive.TORQUE, drive.POWER)
+"""Figures that loads give."""
 
 ROWS: dict[str, Row] = {
     "swing": Row(lambda at: at.values["centres"].swing),
@@ -238,8 +238,8 @@ def model(
     means: tuple[Integral, ...] = (),
 ) -> JobModel:
     """Return the drive with effects; arcs: the dwells that limits speak of; means: those that a target reads."""
-    drive = JobModel(RapierDrive(), effects)
-    quantities = QUANTITIES | (LOADED if drive.loads else {})
+    driven = drive.quantities(effects, known)
+    quantities = QUANTITIES | (TAPE_FORCE if driven else {}) | driven
     stretches = (dwells(arcs),) if arcs else ()
     return JobModel(RapierDrive(), effects, words, quantities, ROWS, stretches, means, known=known)
 

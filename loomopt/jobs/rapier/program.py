@@ -10,13 +10,13 @@ from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
-from loomopt.jobs.rapier.scene import match_table
+from loomopt.jobs.rapier.scene import FIGURES, match_table
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_drive, rapier_faults
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import bound_limits, demanded, distinct, ends, inside, numbers
-from loomopt.program.program import Limit, Move, Objective, Program, Variable
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
@@ -87,7 +87,8 @@ def program(scene: Scene, target: str) -> Program:
     moves += scene_numbers.axis_moves(scene, known, limited)
     objectives = (*_objectives(target, sampler, read(sampler).stroke), *scene_numbers.least(sampler))
     starts = _starts(variables, known)
-    return Program(physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS)
+    task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS
+    return Program(*task, goals=goals(limit for limit in limits if limit.name in kept and limit.name in FIGURES))
 
 
 def _reads_effects(scene: Scene) -> bool:
@@ -99,12 +100,15 @@ def _reads_effects(scene: Scene) -> bool:
 
 def _demand_figures(scene: Scene) -> None:
     """Raise BadInput for a limit on a figure that nothing in the scene gives."""
-    if set(LOADED) & set(scene.limits) and not model(scene).loads:
+    full = model(scene)
+    missing = [name for name in LOADED if name in scene.limits and not full.has_quantity(name)]
+    if missing:
         raise BadInput(
-            "no effect in the scene makes a tape force",
+            "peak_power needs the speed" if full.loads else "no effect in the scene makes a tape force",
             file=scene.origin,
             key="limits",
-            remedy="Put on head_inertia or tape_friction, or take the limit on tape_force or peak_torque out.",
+            remedy=f"{'Give operation.speed' if full.loads else 'Put on head_inertia or tape_friction'}, or take the "
+            f"limit on {missing[0]} out.",
         )
 
 

@@ -3,11 +3,14 @@
 import math
 from typing import Any
 
+from pydantic import Field
+
 from loomopt import scene_csv
 from loomopt.effects import found
 from loomopt.errors import BadInput
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.mechanisms import rapier_faults
+from loomopt.program import drive
 from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
@@ -19,49 +22,46 @@ MATCHED = {"phi1": "angle", "S": "length"}
 
 
 class Operation(Table):
-    """speed: main shaft, rad/s; stroke and s_dwell, m: head travel, and what counts as staying out of the shed.
+    """What the drive must do."""
 
-    dwell_after, dwell_before: crank angles next to front dead centre that the head must stay out, rad.
-    """
-
-    speed: Speed | None = None
-    stroke: PositiveLength | None = None
-    s_dwell: PositiveLength | None = None
-    dwell_after: DwellAngle | None = None
-    dwell_before: DwellAngle | None = None
+    speed: Speed | None = Field(None, description="speed of the main shaft")
+    stroke: PositiveLength | None = Field(None, description="travel S of the head, the largest")
+    s_dwell: PositiveLength | None = Field(None, description="head travel that counts as standing still")
+    dwell_after: DwellAngle | None = Field(None, description="angle after front dead centre within s_dwell")
+    dwell_before: DwellAngle | None = Field(None, description="angle before front dead centre within s_dwell")
 
 
 class Mechanism(Table):
-    """Today's drive [Hong17]: lengths and pivot C0 in m, angles in rad, gear ratios i1 and i2, tape wheel in m."""
+    """Today's drive [Hong17]: a four-bar A0 A B1 B0 moves the sley, which carries the drive of the head."""
 
-    l1: PositiveLength
-    l2: PositiveLength
-    l3: PositiveLength
-    l71: PositiveLength
-    phi30: Angle
-    l3p: PositiveLength
-    alpha: Angle
-    l4: PositiveLength
-    l5: PositiveLength
-    l6: PositiveLength
-    C0x: Coordinate
-    C0y: Coordinate
-    phi40: Angle
-    i1: PositiveNumber
-    i2: PositiveNumber = 1.0
-    wheel: PositiveLength
+    l1: PositiveLength = Field(description="main crank A0 A")
+    l2: PositiveLength = Field(description="connecting rod A B1")
+    l3: PositiveLength = Field(description="sley B0 B1")
+    l71: PositiveLength = Field(description="frame A0 B0, between main shaft and rocking shaft")
+    phi30: Angle = Field(description="angle of the sley at front dead centre")
+    l3p: PositiveLength = Field(description="arm B0 B2 of the sley, which carries link 6")
+    alpha: Angle = Field(description="angle of the arm B0 B2 from the sley")
+    l4: PositiveLength = Field(description="second crank C0 C, at twice the main shaft's speed")
+    l5: PositiveLength = Field(description="link 5, C D")
+    l6: PositiveLength = Field(description="driving link B2 D")
+    C0x: Coordinate = Field(description="second shaft C0 from the rocking shaft B0, along x")
+    C0y: Coordinate = Field(description="second shaft C0 from the rocking shaft B0, along y")
+    phi40: Angle = Field(description="angle of the second crank at front dead centre")
+    i1: PositiveNumber = Field(description="gear ratio from driving link to tape wheel, first stage")
+    i2: PositiveNumber = Field(1.0, description="gear ratio from driving link to tape wheel, second stage")
+    wheel: PositiveLength = Field(description="diameter of the tape wheel")
 
 
 class TargetTable(Table):
-    """expected: figures the target is known to reach, SI; shown, never used to solve."""
+    """What every target's table may hold."""
 
-    expected: dict[str, Any] | None = None
+    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class MatchTarget(TargetTable):
-    """table: CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene."""
+    """Values of the target match."""
 
-    table: str | None = None
+    table: str | None = Field(None, description="CSV file with the columns `phi1 [deg]` and `S [mm]`, beside the scene")
 
 
 VARIABLES = {
@@ -89,9 +89,9 @@ FIGURES = {
         Figure("phi_stroke", "angle", "crank angle of the hand-over, where the stroke is reached"),
         Figure("swing", "angle", "sley swing"),
         Figure("theta", "angle", "angle between the sley's dead centres' crank lines"),
-        Figure("sley_mu_min", "angle", "least transmission angle of the sley four-bar", sides=("min",)),
+        Figure("sley_mu_min", "angle", "least transmission angle of the sley four-bar, at B1", sides=("min",)),
         Figure("tape_force", "force", "peak tape force over the cycle", sides=("max",)),
-        Figure("peak_torque", "torque", "peak crank torque over the cycle", sides=("max",)),
+        *drive.FIGURES,
         Figure("match_rms", "length", "rms distance from the target's table", sides=()),
     )
 }
@@ -111,7 +111,7 @@ TARGETS = {
 
 def check(scene: Scene) -> None:
     """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
-    fault = rapier_faults.named(scene.mechanism)
+    fault = rapier_faults.named(scene.mechanism, scene.show)
     if fault:
         raise BadInput(
             f"today's drive does not turn all round: {fault}",

@@ -8,11 +8,15 @@ from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
+from loomopt.picture.units import told
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.panels import Curve
     from loomopt.picture.shapes import Drawing
+
+SWUNG = "of sley and driving link"
 
 
 class RapierViews(JobViews):
@@ -22,13 +26,13 @@ class RapierViews(JobViews):
         """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name)
+        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, told(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV, mm. Raises BadInput."""
+        """Return its joints as CSV. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
 
-        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design))
+        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), told(scene))
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
@@ -44,6 +48,23 @@ class RapierViews(JobViews):
         if "s_dwell" in scene.operation:
             found |= {"dwell begins": TURN - reading.dwell_before, "dwell ends": reading.dwell_after}
         return found
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what the curves are called."""
+        from loomopt.picture.panels import Curve
+
+        return {
+            "S": Curve("head travel"),
+            "S_1": Curve("head speed"),
+            "S_2": Curve("head acceleration", peak="peak_acceleration"),
+            "S_3": Curve("head jerk", peak="peak_jerk"),
+            "phi3": Curve("sley", SWUNG),
+            "phi6": Curve("driving link", SWUNG),
+            "phi63": Curve("link on the sley", SWUNG),
+            "mu": Curve("transmission angle", least="mu_min"),
+            "Q": Curve("tape force", peak="tape_force"),
+            "Md": Curve("crank torque", peak="peak_torque"),
+        }
 
 
 VIEWS = RapierViews()

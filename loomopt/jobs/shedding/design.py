@@ -18,6 +18,7 @@ from loomopt.maths import Number
 from loomopt.mechanisms import cam_limit
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import Spline, named_knots
+from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program, Variable
 from loomopt.program.sampling import Extreme, Sampler
@@ -25,7 +26,6 @@ from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY
-from loomopt.units import show
 
 CYCLE = {
     "contact_min": "lift",
@@ -34,6 +34,7 @@ CYCLE = {
     "pressure_angle_max": "pressure_angle",
     "curvature_min": "concavity",
     "curvature_max": "curvature",
+    **{figure.name: figure.name for figure in drive.FIGURES},
 }
 """Figures that are extremes over the cycle, with their quantities."""
 CLOSE = 1e-9
@@ -124,10 +125,9 @@ def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) 
     dwells: what alone the cam force is judged in; "" for all round.
     """
     size = {name: value or 0.0 for name, value in figures.items()}
-    stiffness = show(size["K1"], scene.unit("K1", "stiffness"), 9)
-    speed = show(size["speed"], scene.unit("speed", "angular speed"), 9)
+    stiffness, speed = scene.show(size["K1"], "stiffness", 9), scene.show(size["speed"], "angular speed", 9)
     kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
-    peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {size['contact_max']:.6g} N"
+    peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {scene.show(size['contact_max'], 'force')}"
     said = {
         "stiffness": f"The least return spring that {kept} has {stiffness}.",
         "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
@@ -140,14 +140,14 @@ def say(scene: Scene, now: Figures, dwells: str, target: str, figures: Figures) 
 def _today(scene: Scene, found: Figures) -> str:
     """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
     least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
-    wanted, angle = scene.operation["N_min"], math.degrees(found["contact_angle"] or 0.0)
-    spring = f"Today's spring ({show(scene.mechanism['K1'], scene.unit('K1', 'stiffness'), 9)})"
+    wanted, force = scene.operation["N_min"], scene.show(least, "force")
+    spring = f"Today's spring ({scene.show(scene.mechanism['K1'], 'stiffness', 9)})"
     if least >= wanted - CLOSE * max(most, 1.0):
-        return f"{spring} holds: the cam force is never less than {least:.6g} N."
-    lost = f"the cam force would be {least:.6g} N at {angle:.4f} deg"
+        return f"{spring} holds: the cam force is never less than {force}."
+    lost = f"the cam force would be {force} at {scene.show(found['contact_angle'] or 0.0, 'angle')}"
     speed = found["contact_speed"]
     if speed:
-        lost += f"; it holds up to {show(speed, scene.unit('speed', 'angular speed'), 7)}"
+        lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
 
 

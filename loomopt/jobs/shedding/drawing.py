@@ -1,8 +1,9 @@
-"""The cam with its roller follower drawn at full scale in mm, and its profile as a table for the workshop.
+"""The cam with its roller follower at full scale, the return spring beside it; the profile as a table.
 
 The cam stands still as it is at the beginning of the rise, and the arm goes round it, which shows the same contact.
 """
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,16 +18,22 @@ from loomopt.jobs.shedding.scene import Frame
 from loomopt.mechanisms.cam_follower import Follower, Stations
 from loomopt.mechanisms.cam_motion import Spline
 from loomopt.picture import tracing
-from loomopt.picture.drawing import Label, arrow, captioned, fixed_pivot, place
+from loomopt.picture.drawing import Label, along, around, place
+from loomopt.picture.return_spring import ReturnSpring
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive
 from loomopt.picture.skeleton import JOINT, Skeleton
+from loomopt.picture.symbols import arrow, fixed_pivot
+from loomopt.picture.units import Units, told
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
-from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, SHOWN_AS_ZERO
+from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
+from loomopt.units import factor, show
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"
+OPEN = {NEAR: "shed open upward", FAR: "shed open downward"}
+ORIGIN = Point(0.0, 0.0)
 STEP = 0.5
 """Degrees of cam angle between the table's rows at most."""
 SAME = 1e-9
@@ -57,12 +64,22 @@ class Cam:
         """Return what stands at cam angles, rad; at a corner, just behind it."""
         return self.stations(*self.sampler.cycle.located(theta))
 
+    def curves(self, pieces: Pieces, u: Floats) -> tuple[Floats, Floats]:
+        """Return points of the profile and of the roller centre's curve at nodes, (n, 2) m each."""
+        at = self.stations(pieces, u)
+        return at.profile, at.pitch
+
     @property
     def segments(self) -> dict[str, tuple[float, float]]:
         """Cam angles, rad, between which each segment lasts."""
         values = self.sampler.given.values
         far, turn, near = (float(values[f"begin.{name}"]) for name in ("far", "return", "near"))
         return {"rise": (0, far), "far dwell": (far, turn), "return": (turn, near), "near dwell": (near, 2 * math.pi)}
+
+    def spring(self, top: Point = ORIGIN, h: float = 1.0) -> ReturnSpring:
+        """Return the return spring with the heald frame's upper position at a point; h: text height, m."""
+        K1, X0, travel = (float(self.sampler.given.values[name]) for name in ("K1", "X0", "travel"))
+        return ReturnSpring(K1, X0, travel, top, h, f"frame, {OPEN[NEAR]}", f"frame, {OPEN[FAR]}")
 
     @property
     def undercut(self) -> Extreme | None:
@@ -87,25 +104,23 @@ def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
         remedy = f"Give them in [mechanism]; a roller follower has {', '.join(FOLLOWER)}"
         raise refusal("the cam cannot be drawn without its follower", scene.origin, keys, remedy=remedy)
     job = registry.of(scene)
-    fault = scene.schema.fault(job.numbers_of(scene, design))
+    fault = scene.schema.fault(job.numbers_of(scene, design), scene.show)
     if fault:
         raise refusal(f"the cam cannot be drawn: {fault}", scene.origin, "mechanism", remedy="Correct it")
     return Cam(job.sampler(scene, design))
 
 
+def allowed(found: Cam) -> float:
+    """Return how far a cam's curves may lie from the straight lines that are drawn for them, m."""
+    return max(CURVE_CLOSE, CURVE_NARROW * float(found.follower.arm + found.follower.centre_distance))
+
+
 def traced(found: Cam) -> Stations:
-    """Return stations once round, the last before the first again, close enough that straight lines join them.
+    """Return stations once round, the last before the first again, that straight lines join as closely as `allowed`.
 
-    No point of the profile or of the roller centre's curve is farther than CURVE_CLOSE from the lines. Corners of the
-    law are stations.
+    That holds for the profile and for the roller centre's curve. Corners of the law are stations.
     """
-
-    def curves(pieces: Pieces, u: Floats) -> tuple[Floats, Floats]:
-        at = found.stations(pieces, u)
-        return at.profile, at.pitch
-
-    size = found.follower.arm + found.follower.centre_distance
-    return found.stations(*tracing.nodes(curves, found.sampler.cycle.starts, max(CURVE_CLOSE, CURVE_NARROW * size)))
+    return found.stations(*tracing.nodes(found.curves, found.sampler.cycle.starts, allowed(found)))
 
 
 @dataclass(frozen=True)
@@ -117,23 +132,30 @@ class Picture:
 
     @property
     def height(self) -> float:
-        """Text height: 1.8 % of the machine; mm of m."""
-        return 18 * float(self.cam.follower.arm + self.cam.follower.centre_distance)
+        """Text height, m: 1.8 % of the machine."""
+        return 0.018 * float(self.cam.follower.arm + self.cam.follower.centre_distance)
 
+    @property
+    def spring(self) -> ReturnSpring:
+        """The return spring, with the heald frame beside the cam."""
+        top = Point(float(self.cam.follower.centre_distance) + 24 * self.height, 0.0)
+        return self.cam.spring(top, self.height)
+
+    @functools.cached_property
     def skeleton(self) -> Skeleton:
-        """Return arm B C with its roller, the point T that it touches, the shaft A and both curves."""
+        """Arm B C with its roller, the point T that it touches, the shaft A and both curves."""
         at, follower = self.cam.at(np.array(list(self.theta.values()))), self.cam.follower
-        distance, fine, shaft = 1000 * follower.centre_distance, traced(self.cam), Point(0.0, 0.0)
+        fine, shaft = traced(self.cam), ORIGIN
         placed = zip(self.theta.items(), _points(at.pitch), _points(at.profile), strict=True)
         joints = {
-            name: {"B": shaft.towards(math.pi / 2 - theta, distance), "C": roller, "T": touched}
+            name: {"B": shaft.towards(math.pi / 2 - theta, follower.centre_distance), "C": roller, "T": touched}
             for (name, theta), roller, touched in placed
         }
         return Skeleton(
             {"A": shaft},
             joints,
             (("B", "C"),),
-            (("A", 1000 * follower.base_radius), ("A", distance), ("C", 1000 * follower.roller_radius)),
+            (("A", follower.base_radius), ("A", follower.centre_distance), ("C", follower.roller_radius)),
             (Line(PITCH, _points(fine.pitch), closed=True), Line(PROFILE, _points(fine.profile), closed=True)),
             {"B": 0.0, "C": 0.25, "T": 0.12},
         )
@@ -147,22 +169,23 @@ def picture(found: Cam, least: float) -> Picture:
 
 def linkage(scene: Scene, found: Cam, figures: Figures) -> Drawing:
     """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
-    drawn = picture(found, figures["contact_angle"] or 0.0)
-    skeleton, h = drawn.skeleton(), drawn.height
-    strokes = [*skeleton.strokes(h), *_frame(found, skeleton, h)]
-    texts = place(_labels(drawn, skeleton), strokes, h)
-    return captioned(Drawing(scene.name, h, (*strokes, *texts)), _legend(scene, drawn, skeleton, figures))
+    drawn, units = picture(found, figures["contact_angle"] or 0.0), told(scene)
+    strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
+    texts = place(_labels(drawn, units), strokes, drawn.height)
+    legend = _legend(scene, drawn, figures, units)
+    return Drawing(scene.name, drawn.height, (*strokes, *texts), legend, units.length)
 
 
 def _points(curve: Floats) -> tuple[Point, ...]:
-    return tuple(Point(float(x), float(y)) for x, y in 1000 * curve)
+    return tuple(Point(float(x), float(y)) for x, y in curve)
 
 
-def _frame(found: Cam, skeleton: Skeleton, h: float) -> list[Primitive]:
+def _frame(drawn: Picture) -> list[Primitive]:
     """Draw the arm's pivot, where segments begin, and how the cam turns."""
-    shaft, pivots = skeleton.pivots["A"], {name: at["B"] for name, at in skeleton.joints.items()}
+    found, h, shaft = drawn.cam, drawn.height, drawn.skeleton.pivots["A"]
+    pivots = {name: at["B"] for name, at in drawn.skeleton.joints.items()}
     begins = np.array([begin for begin, end in found.segments.values() if end > begin])
-    begin, end, radius = math.radians(60), math.radians(150), 300 * found.follower.base_radius
+    begin, end, radius = math.radians(60), math.radians(150), 0.3 * found.follower.base_radius
     return [
         *fixed_pivot(pivots.pop(NEAR), h),
         *(Circle(name, pivot, JOINT * h) for name, pivot in pivots.items()),
@@ -172,27 +195,25 @@ def _frame(found: Cam, skeleton: Skeleton, h: float) -> list[Primitive]:
     ]
 
 
-def _labels(drawn: Picture, skeleton: Skeleton) -> list[Label]:
-    """Name shaft, joints, sizes in mm and the cam's segments in degrees; joints first: they must stand closest."""
-    found, shaft, near = drawn.cam, skeleton.pivots["A"], skeleton.joints[NEAR]
+def _labels(drawn: Picture, units: Units) -> list[Label]:
+    """Name shaft, joints, sizes and the cam's segments in degrees; joints first: they must stand closest."""
+    found, shaft, near = drawn.cam, drawn.skeleton.pivots["A"], drawn.skeleton.joints[NEAR]
     labels = [Label("frame", shaft, -math.pi / 4, "A")]
     for name, theta in drawn.theta.items():
-        at, mark = skeleton.joints[name], skeleton.primes[name]
+        at, mark = drawn.skeleton.joints[name], drawn.skeleton.primes[name]
         labels += [Label(name, at[joint], math.pi / 2 - theta, f"{joint}{mark}") for joint in "BC"]
-    size = {name: 1000 * getattr(found.follower, name) for name in SIZES}
-    roller, low = near["C"].towards(math.pi, size["roller_radius"]), math.radians(225)
-    labels += [
-        Label(NEAR, near["B"].part(near["C"]), math.pi, f"arm = {size['arm']:.6g}"),
-        Label(NEAR, roller, math.pi, f"roller_radius = {size['roller_radius']:.6g}"),
-    ]
-    for name in ("base_radius", "centre_distance"):
-        labels.append(Label("paths", shaft.towards(low, size[name]), low, f"{name} = {size[name]:.6g}"))
+    labels.append(along(NEAR, near["B"], near["C"], math.pi, f"arm = {units.size(found.follower.arm)}"))
+    rings = {"roller_radius": (NEAR, near["C"], math.pi)}
+    rings |= {name: ("paths", shaft, math.radians(225)) for name in ("base_radius", "centre_distance")}
+    for name, (layer, centre, side) in rings.items():
+        radius, half = getattr(found.follower, name), math.pi / 2
+        labels.append(around(layer, centre, radius, side - half, side + half, f"{name} = {units.size(radius)}"))
     for name, (begin, end) in found.segments.items():
         if end > begin:
-            (middle,) = _points(found.at(np.array([(begin + end) / 2])).pitch)
+            middle, *also = _points(found.at(begin + (end - begin) * np.array([0.5, 0.35, 0.65, 0.2, 0.8])).pitch)
             outward = math.atan2(middle.y, middle.x)
-            labels.append(Label("dimensions", middle, outward, f"{name} {math.degrees(end - begin):.6g}°"))
-    return labels
+            labels.append(Label("dimensions", middle, outward, f"{name} {math.degrees(end - begin):.6g}°", tuple(also)))
+    return [*labels, *drawn.spring.labels(units)]
 
 
 SIZES = ("arm", "centre_distance", "base_radius", "roller_radius")
@@ -203,24 +224,26 @@ def settled(least: float, most: float) -> float:
     return 0.0 if abs(least) <= SHOWN_AS_ZERO * abs(most) else least
 
 
-def _legend(scene: Scene, drawn: Picture, skeleton: Skeleton, figures: Figures) -> tuple[tuple[str, str], ...]:
+def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tuple[tuple[str, str], ...]:
     """Return the lines below the drawing, each with its layer."""
     size, found = {name: value or 0.0 for name, value in figures.items()}, drawn.cam
-    force = settled(size["contact_min"], size["contact_max"])
-    told = {NEAR: "shed open upward", FAR: "shed open downward", LEAST: f"{force:.6g} N"}
+    force, within = settled(size["contact_min"], size["contact_max"]), units.within(CURVE_PROMISED * allowed(found))
+    said = OPEN | {LEAST: show(force, units.force)}
     rows = [
-        (name, f"B{mark} C{mark}  {name}, {told[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
-        for name, mark in skeleton.primes.items()
+        (name, f"B{mark} C{mark}  {name}, {said[name]}: cam at {math.degrees(drawn.theta[name]):.2f}°")
+        for name, mark in drawn.skeleton.primes.items()
     ]
-    swing, travel, closest = math.degrees(found.follower.arm_swing), 1000 * size["travel"], size["curvature_max"]
-    bent = f"; pitch curve's least convex radius {1000 / closest:.4g}" if closest > 0.0 else ""
+    swing, closest = math.degrees(found.follower.arm_swing), size["curvature_max"]
+    bent = f"; pitch curve's least convex radius {units.size(1 / closest, 4)}" if closest > 0.0 else ""
     cut = [(PROFILE, "UNDERCUT: the roller cuts its own profile away")] if found.undercut else []
     return (
         *rows,
-        ("notes", f"law {_law(scene, found)}; arm swings {swing:.6g}° for {travel:.6g} of travel"),
+        ("notes", f"law {_law(scene, found)}; arm swings {swing:.6g}° for {units.size(size['travel'])} of travel"),
         ("notes", f"pressure angle at most {math.degrees(size['pressure_angle_max']):.2f}°{bent}"),
         *cut,
-        ("notes", "the cam is shown still: it turns anticlockwise under an arm that stays; lengths in mm"),
+        *drawn.spring.legend(units),
+        ("notes", "the cam is shown still: it turns anticlockwise under an arm that stays"),
+        ("notes", f"chord tolerance of profile and pitch curve {within}; {units.said}"),
     )
 
 
@@ -238,23 +261,26 @@ def joints_csv(scene: Scene, found: Cam) -> str:
     """
     import pandas as pd
 
-    at = _rows(found)
-    columns = {"theta [deg]": np.round(np.degrees(at.theta), DIGITS), "X [mm]": 1000 * at.X}
-    for name, curve in (("pitch", 1000 * at.pitch), ("profile", 1000 * at.profile)):
-        columns |= {f"{name}_{axis} [mm]": curve[:, k] for k, axis in enumerate("xy")}
+    nodes, units = _rows(found), told(scene)
+    at, unit, size = found.stations(*nodes), units.length, factor(units.length)
+    columns = {"theta [deg]": np.round(np.degrees(at.theta), DIGITS), f"X [{unit}]": at.X / size}
+    for name, curve in (("pitch", at.pitch / size), ("profile", at.profile / size)):
+        columns |= {f"{name}_{axis} [{unit}]": curve[:, k] for k, axis in enumerate("xy")}
     columns["pressure_angle [deg]"] = np.degrees(at.contact.pressure_angle)
-    columns["curvature [1/m]"] = at.contact.curvature
-    notes = {name: f"{1000 * getattr(found.follower, name):.9g} mm" for name in SIZES}
-    notes["arm_swing"] = f"{math.degrees(found.follower.arm_swing):.9g} deg"
+    columns[f"curvature [1/{unit}]"] = at.contact.curvature * size
+    notes = {name: show(getattr(found.follower, name), unit, 9) for name in SIZES}
+    notes |= {"arm_swing": show(found.follower.arm_swing, "deg", 9), **found.spring().notes(units)}
     notes["frame"] = "cam shaft at (0, 0), pivot at (0, centre_distance) at theta = 0; the cam turns anticlockwise"
     notes["curvature_of"] = "the pitch curve (roller centre), positive where convex"
+    within = units.within(CURVE_PROMISED * tracing.deviation(found.curves, *nodes))
+    notes["chord_tolerance"] = f"{within}: no curve is farther from straight lines that join the rows"
     table = pd.DataFrame(columns)
     table.attrs.update(provenance.provenance(scene, law=_law(scene, found), **notes))
     return provenance.csv(table)
 
 
-def _rows(found: Cam) -> Stations:
-    """Return the table's stations: every half degree and both sides of every corner, one where they are alike."""
+def _rows(found: Cam) -> tuple[Pieces, Floats]:
+    """Return the table's nodes: every half degree and both sides of every corner, one where they are alike."""
     cycle = found.sampler.cycle
     there = np.flatnonzero(np.diff(cycle.starts) > 0.0)
     pieces, u = [], []
@@ -269,4 +295,4 @@ def _rows(found: Cam) -> Stations:
     again = np.diff(at.theta) < math.radians(SAME)
     alike = np.abs(np.diff(bent)) <= SAME * np.max(np.abs(bent))
     kept = np.concatenate([[True], ~(again & alike)])
-    return found.stations(np.concatenate(pieces)[kept], np.concatenate(u)[kept])
+    return np.concatenate(pieces)[kept], np.concatenate(u)[kept]

@@ -93,7 +93,6 @@ class Shedding(Job):
             ("N [N]", lambda at: at.force),
             ("cam_torque [N*m]", lambda at: at.crank_torque),
             after,
-            also=tuple(sampler.angle(extreme) for extreme in sampler.extremes("lift")),
         )
 
     def studied(self, scene: Scene) -> Studied:

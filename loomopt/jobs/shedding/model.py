@@ -20,6 +20,7 @@ from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
 from loomopt.mechanisms.turning_points import followed
+from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Chain, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.schema import Table, Values
@@ -282,12 +283,14 @@ def model(
 ) -> JobModel:
     """Return the frame with its return spring and effects."""
     followed = known.issuperset(FOLLOWER)
+    partly = JobModel(CamFrame(law, dwells), effects, words).known_in
+    driven = {} if partly else drive.quantities((RETURN_SPRING, *effects), known)
     arm = {"the arm stays below 180 deg": ("arm_angle", math.pi)} if followed else {}
     return JobModel(
         CamFrame(law, dwells),
         (RETURN_SPRING, *effects),
         words,
-        QUANTITIES | (FOLLOWED if followed else {}),
+        QUANTITIES | (FOLLOWED if followed else {}) | driven,
         ROWS | law_rows(law),
         assembled={**arm, "the cam law never falls": ("law_fall", 0.0)},
         known=known,

@@ -17,10 +17,11 @@ from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, c
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.owned import owned
+from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
@@ -110,16 +111,17 @@ class _Task:
         limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
         limits += self._checks() + (self._law(self.law) if self.law else [])
         starts, moves = self._starts(variables), self._moves(variables)
-        # Every force is linear in K1 and K1 X0, and in the speed's square [Qiu21, eq 6]. With a free law any stiffer
-        # spring keeps contact too, and the laws that do for one stiffness are convex.
+        # Every force is linear in K1 and K1 X0, and in the speed's square, but power is not [Qiu21, eq 6]. With a free
+        # law any stiffer spring keeps contact too, and the laws that do for one stiffness are convex.
         free = {v.name for v in variables if v.lower < v.upper} - set(self.law.names if self.law else ())
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
-        linear = not self.checks and (spring or free == {"speed"})
+        linear = not self.checks and (spring or (free == {"speed"} and drive.POWER not in self.scene.limits))
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
         today = (
             named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
         )
-        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "")
+        contact = goals(replace(each, name="contact_min") for each in limits if each.name == "N_min")
+        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "", goals=contact)
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
@@ -209,7 +211,7 @@ class _Task:
                 found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
                 continue
             own = v.name != "speed" or "speed" in self.limited
-            found += [replace(each, relaxable=own and each.value > 0.0) for each in bound_limits(v)]
+            found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
         return found
 
     def _contact(self) -> list[Limit]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
 from loomopt import scene_csv
 from loomopt.effects import found
@@ -12,6 +12,7 @@ from loomopt.errors import BadInput
 from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
 from loomopt.mechanisms import cam_follower, cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.program import drive
 from loomopt.program.numbers import check_known
 from loomopt.quantities import (
     Angle,
@@ -29,6 +30,7 @@ from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
 from loomopt.tolerances import NARROWEST, SAME_ANGLE
+from loomopt.units import Shown, usual
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -51,70 +53,69 @@ LAW = Literal[
 
 
 class Operation(Table):
-    """speed: cam shaft, rad/s; N_min: least cam force that counts as contact, N."""
+    """What the motion must do."""
 
-    speed: Speed | None = None
-    N_min: Force = 0.0
+    speed: Speed | None = Field(None, description="speed of the cam shaft")
+    N_min: Force = Field(0.0, description="least cam force that counts as contact")
 
 
 class Frame(Table):
-    """The heald frame and its cam today, m and rad.
+    """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
-    travel: of the frame; law: of the rise, and mirrored of the return; law_coefficients: s'' of a spline law at evenly
-    spaced knots; law_table: CSV of a tabulated law. rise, far_dwell, near_dwell (and return): cam angles, a whole turn
-    together. arm, centre_distance, base_radius (of the roller's centre), roller_radius, arm_swing: the follower.
-    K1, X0: return spring, N/m, of both springs together, and its elongation with the shed open upward.
-    """
-
-    travel: Length
-    law: LAW = "cycloidal"
-    law_coefficients: Numbers | None = None
-    law_table: str | None = None
-    rise: SegmentAngle
-    far_dwell: SegmentAngle
-    near_dwell: SegmentAngle
-    base_radius: PositiveLength | None = None
-    arm: PositiveLength | None = None
-    centre_distance: PositiveLength | None = None
-    roller_radius: PositiveLength | None = None
-    arm_swing: Angle | None = None
-    K1: Stiffness
-    X0: Length
+    travel: Length = Field(description="travel of the heald frame")
+    law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
+    law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
+    law_table: str | None = Field(None, description="CSV file of a tabulated law")
+    rise: SegmentAngle = Field(description="cam angle of the rise")
+    far_dwell: SegmentAngle = Field(description="cam angle with the shed open downward")
+    near_dwell: SegmentAngle = Field(description="cam angle with the shed open upward")
+    base_radius: PositiveLength | None = Field(None, description="base circle of the roller's centre B, about A")
+    arm: PositiveLength | None = Field(None, description="arm CB of the follower")
+    centre_distance: PositiveLength | None = Field(None, description="from the cam shaft A to the arm's pivot C")
+    roller_radius: PositiveLength | None = Field(None, description="radius of the roller")
+    arm_swing: Angle | None = Field(None, description="angle through which the arm swings")
+    K1: Stiffness = Field(description="stiffness of the return spring, both springs together")
+    X0: Length = Field(description="elongation of the return spring with the shed open upward")
 
 
 # `return` is a word of the language: no field of a class can be written so.
-Mechanism: type[Table] = create_model("Mechanism", __base__=Frame, **{"return": (SegmentAngle, ...)})  # type: ignore[call-overload]
+RETURNED = {"return": (SegmentAngle, Field(description="cam angle of the return"))}
+Mechanism: type[Table] = create_model("Mechanism", __base__=Frame, **RETURNED)  # type: ignore[call-overload]
 
 
 class TargetTable(Table):
-    """expected: figures the target is known to reach, SI; shown, never used to solve."""
+    """What every target's table may hold."""
 
-    expected: dict[str, Any] | None = None
+    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class LawTarget(TargetTable):
-    """intervals: of the spline; symmetric: whether s(u) + s(1 − u) = 1 is asked; acceleration: largest |s''|."""
+    """Values of the target law."""
 
-    intervals: int = 16
-    symmetric: bool = False
-    acceleration: PositiveNumber = CYCLOID
+    intervals: int = Field(16, description="intervals of the spline")
+    symmetric: bool = Field(False, description="whether s(u) + s(1 − u) = 1 is asked")
+    acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
+
+SAID = {name: field.description or "" for own in (Operation, Frame) for name, field in own.model_fields.items()}
+"""What figures are that are numbers of the scene too."""
 
 VARIABLES = {"K1": "stiffness", "X0": "length"}
 
 FIGURES = {
     figure.name: figure
     for figure in (
-        Figure("K1", "stiffness", "return spring, both springs together", sides=()),
-        Figure("X0", "length", "its elongation with the shed open upward", sides=()),
+        Figure("K1", "stiffness", SAID["K1"], sides=()),
+        Figure("X0", "length", SAID["X0"], sides=()),
         Figure("contact_min", "force", "least cam force over the cycle", sides=("min",)),
         Figure("contact_angle", "angle", "cam angle where it is least", sides=()),
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
         Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=()),
-        Figure("speed", "angular speed", "cam shaft speed", sides=()),
+        Figure("speed", "angular speed", SAID["speed"], sides=()),
+        *drive.FIGURES,
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
         Figure("spring_stretch", "length", "largest elongation of the return spring", sides=("max",)),
-        Figure("travel", "length", "travel of the heald frame", sides=()),
+        Figure("travel", "length", SAID["travel"], sides=()),
         Figure("law_acceleration", "number", "peak |s''| of the cam law", sides=("max",)),
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),
@@ -138,16 +139,18 @@ def check(scene: Scene) -> None:
     total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
     for name in ("rise", "return"):
         if not scene.mechanism[name] >= NARROWEST:
-            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", f"{NARROWEST:g} rad and more")
+            least = f"{scene.show(NARROWEST, 'angle')} and more"
+            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
     if abs(total - 2 * math.pi) > SAME_TURN:
         given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-        problem, keys = f"the cam's segments add to {math.degrees(total):.9g} deg: {given}", ", ".join(SEGMENTS)
-        raise _refused(scene, f"mechanism.{keys}", problem, "360 deg together", "Correct one of them.")
+        problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
+        turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
+        raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
     if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
         dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
         check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
     check_law(scene)
-    reason = _follower(scene.mechanism)
+    reason = _follower(scene.mechanism, scene.show)
     if reason:
         raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
@@ -210,14 +213,14 @@ def _table(scene: Scene) -> cam_spline.Table:
         raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
 
 
-def _follower(numbers: Mapping[str, Any]) -> str:
+def _follower(numbers: Mapping[str, Any], shown: Shown) -> str:
     """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
-    return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}))
+    return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}), shown)
 
 
-def fault(numbers: Mapping[str, Any]) -> str:
+def fault(numbers: Mapping[str, Any], shown: Shown = usual) -> str:
     """Say why a design, SI, cannot work as this cam; "" when it can."""
     coefficients = tuple(map(float, knots(numbers)))
     reason = cam_spline.fault(coefficients) if coefficients else ""
@@ -227,7 +230,7 @@ def fault(numbers: Mapping[str, Any]) -> str:
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
     short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
-    return f"the {short[0]} takes no cam angle" if short else _follower(numbers)
+    return f"the {short[0]} takes no cam angle" if short else _follower(numbers, shown)
 
 
 SCHEMA = SceneSchema(

@@ -10,17 +10,20 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
 from loomopt.maths import FLOAT, Number
 from loomopt.picture.job_views import JobViews
-from loomopt.picture.panels import Mark, Panel, split
+from loomopt.picture.panels import BY_EFFECT, Curve, Panel
+from loomopt.program.curves import POWER
 from loomopt.program.sampling import Sampler
+from loomopt.program.stretches import near_zero
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
     from loomopt.picture.shapes import Drawing
 
-FORCE = "N [N]"
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
+FLOATS, NARROW = 1e-3, math.radians(5.0)
+"""Share of the spring's largest force that holds no roller; rad: a narrower stretch is where the force touches zero."""
 
 
 class SheddingViews(JobViews):
@@ -66,34 +69,55 @@ class SheddingViews(JobViews):
         angle = job.figures(scene, design)["contact_angle"]
         return found | {"least cam force": math.nan if angle is None else angle}
 
-    def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
-        """Return cam force, forces by effect and travel; pressure angle and curvature where there is a follower."""
-        from loomopt.jobs.shedding.drawing import settled
+    def words(self) -> Mapping[str, Curve]:
+        """Return what the curves are called."""
+        return {
+            "X": Curve("frame travel"),
+            "X_1": Curve("frame speed"),
+            "X_2": Curve("frame acceleration"),
+            "X_3": Curve(shown=False),
+            "s_2": Curve("acceleration s'' of the cam law", peak="law_acceleration"),
+            "N": Curve("cam force", least="contact_min", most="contact_max", wide=True),
+            "return_spring": Curve(panel=BY_EFFECT),
+            "cam_torque": Curve(peak="peak_torque"),
+            "pressure_angle": Curve(peak="pressure_angle_max"),
+            "curvature": Curve("pitch", least="curvature_min", most="curvature_max"),
+            "profile_curvature": Curve(shown=False),
+        }
 
-        job = registry.of(scene)
-        figures, values = job.figures(scene, design), job.numbers_of(scene, design)
-        angle, force, least = figures["contact_angle"], figures["contact_min"], values["N_min"]
-        points: tuple[Mark, ...] = ()
-        if angle is not None and force is not None:
-            said = settled(force, figures["contact_max"] or 0.0)
-            points = (Mark(angle, force, f"least {said:.6g} N at {math.degrees(angle):.2f} deg"),)
-        level = {f"N_min = {least:.6g} N; below, contact is lost": least}
-        forces = tuple(name for name in columns if split(name)[1] == "N" and name != FORCE)
-        shown = [
-            Panel((FORCE,), "cam force N", level, points, wide=True, today=True),
-            Panel(forces, "forces"),
-            Panel(("X [m]",), "travel X"),
-        ]
-        if "pressure_angle [rad]" in columns:
-            sharpest = {"undercut above 1/roller_radius": 1 / values["roller_radius"]}
-            shown.append(Panel(("pressure_angle [rad]",), "pressure angle"))
-            shown.append(Panel(("curvature [1/m]",), "pitch curvature", sharpest))
-        return tuple(shown)
+    def panels(self, scene: Scene, design: Mapping[str, float], columns: Sequence[str]) -> tuple[Panel, ...]:
+        """Return all panels, with what contact and the roller ask for."""
+        values = registry.of(scene).numbers_of(scene, design)
+        levels = {"N [N]": {"contact is lost below N_min =": (values["N_min"],)}}
+        if "roller_radius" in values:
+            levels["curvature [1/m]"] = {"undercut above 1/roller_radius =": (1 / values["roller_radius"],)}
+        found = super().panels(scene, design, columns)
+        # The law's own acceleration has the frame's shape: it says more only where it is limited. There is no torque in
+        # the dwells, and where forces are known in them alone, none is known.
+        partly = bool(registry.of(scene).model(scene).known_in)
+        left = {"s_2 [1]": "law_acceleration" not in scene.limits, "cam_torque [N*m]": partly, POWER: partly}
+        shown = [panel for panel in found if not left.get(panel.columns[0])]
+        return tuple(panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown)
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: forces that are known in the dwells only, an undercut cam."""
+        """Return what there is to remark upon: forces known in the dwells only, a roller that floats, an undercut."""
         sampler = registry.of(scene).sampler(scene, design)
-        return (*_partly(sampler), *(() if self.missing(scene) else _undercut(scene, design)))
+        undercut = () if self.missing(scene) else _undercut(scene, design)
+        return (*_partly(sampler), *_floating(scene, sampler), *undercut)
+
+
+def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:
+    """Say over which cam angles nothing holds the roller on the cam, where no least force is asked for."""
+    if scene.operation["N_min"] > 0.0:
+        return
+    spans = near_zero(sampler, "lift", FLOATS * abs(sampler.static["spring_force_max"]), NARROW)
+    if spans:
+        told = " and ".join(f"from {scene.show(a, 'angle', 4)} to {scene.show(b, 'angle', 4)}" for a, b in spans)
+        whole = scene.show(sum(end - begin for begin, end in spans), "angle", 3)
+        yield (
+            f"N_min is 0, and the cam force is less than {100 * FLOATS:g} % of the spring's largest force {told}: the "
+            f"roller floats for {whole} of the turn. What helps: an N_min above 0"
+        )
 
 
 def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
@@ -101,12 +125,13 @@ def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
 
     found = drawing.cam(scene, design)
     if found.undercut:
-        angle = math.degrees(found.sampler.angle(found.undercut))
-        roller, radius = 1000 * found.follower.roller_radius, 1000 / found.undercut.value
+        roller, radius = found.follower.roller_radius, 1 / found.undercut.value
+        angle, most = scene.show(found.sampler.angle(found.undercut), "angle", 5), scene.show(radius, "length", 4)
         yield (
-            f"the cam is undercut at {angle:.2f} deg: the roller's centre turns there with a radius of {radius:.4g} "
-            f"mm, {roller - radius:.3g} mm less than roller_radius = {roller:.6g} mm, so the profile is cut away and X "
-            f"not followed. What helps: a roller_radius below {radius:.4g} mm, or a larger base_radius"
+            f"the cam is undercut at {angle}: the roller's centre turns there with a radius of {most}, "
+            f"{scene.show(roller - radius, 'length', 3)} less than roller_radius = {scene.show(roller, 'length')}, so "
+            f"the profile is cut away and X not followed. What helps: a roller_radius below {most}, or a larger "
+            f"base_radius"
         )
 
 

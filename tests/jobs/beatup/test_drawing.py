@@ -1,21 +1,26 @@
+import cmath
 import csv
 import io
-import itertools
 import math
 
+import clear
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import loomopt as lo
 from loomopt.errors import BadInput
+from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.mechanisms import crank_rocker_synthesis
 from loomopt.picture import shapes
+from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Point, Text
 
 few = settings(max_examples=30, deadline=None, database=None)
-PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167, "m4e": 3.0, "r4e": 0.05}
+PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
+BALANCED = PAPER | {"m4": 56.8, "r4": 0.045, "m4e": 3.0, "r4e": 0.05}
 
 
 def texts(drawn):
@@ -46,43 +51,42 @@ def designs(draw):
 @given(design=designs())
 def test_links_are_drawn_at_full_scale_and_meet(layer, design):
     crank, rod, rocker = links(crank_rocker_drawing.linkage(design, ""), layer)
-    scale = 1e3 * design["l4"]
     lengths = [math.dist(*link) for link in (crank, rod, rocker)]
-    assert lengths == pytest.approx([1e3 * design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * scale)
+    assert lengths == pytest.approx([design[name] for name in ("l1", "l2", "l3")], rel=0, abs=1e-11 * design["l4"])
     assert crank[0] == rod[0]
     assert rod[1] == rocker[1]
     assert crank[1] == (0, 0)
-    assert rocker[0] == (1e3 * design["l4"], 0)
+    assert rocker[0] == (design["l4"], 0)
 
 
 def test_crank_and_rod_are_stretched_in_front_and_folded_at_the_rear():
     drawn = crank_rocker_drawing.linkage(PAPER, "")
-    for layer, length in (("front dead centre", 96.0), ("rear dead centre", 34.0)):
+    for layer, length in (("front dead centre", 0.096), ("rear dead centre", 0.034)):
         (b, a), (_, c), _ = links(drawn, layer)
         assert math.dist(a, c) == pytest.approx(length, rel=1e-12)
-        assert a.x * (c.y - b.y) - a.y * (c.x - b.x) + b.x * c.y - b.y * c.x == pytest.approx(0, abs=1e-10)
+        assert a.x * (c.y - b.y) - a.y * (c.x - b.x) + b.x * c.y - b.y * c.x == pytest.approx(0, abs=1e-16)
 
 
 def test_the_path_of_the_rocker_is_the_swing_and_the_crank_turns_on_its_circle():
     drawn = crank_rocker_drawing.linkage(PAPER, "")
     path = next(p for p in drawn.primitives if isinstance(p, Arc) and p.layer == "paths")
-    assert path.radius == pytest.approx(155.0, rel=1e-14)
+    assert path.radius == pytest.approx(0.155, rel=1e-14)
     assert math.degrees(path.end - path.begin) == pytest.approx(23.0875, abs=1e-3)
     _, (_, c), _ = links(drawn, "front dead centre")
-    assert math.dist(path.centre.towards(path.begin, path.radius), c) < 1e-10
+    assert math.dist(path.centre.towards(path.begin, path.radius), c) < 1e-13
     circle = next(p for p in drawn.primitives if isinstance(p, Circle) and p.layer == "paths")
     assert circle.centre == (0, 0)
-    assert circle.radius == pytest.approx(31.0, rel=1e-14)
+    assert circle.radius == pytest.approx(0.031, rel=1e-14)
 
 
 def test_the_arrow_to_the_fell_points_toward_decreasing_psi():
     (start, tip), _ = links(crank_rocker_drawing.linkage(PAPER, ""), "notes")
-    angles = [math.atan2(point.y, point.x - 167.0) for point in (start, tip)]
+    angles = [math.atan2(point.y, point.x - 0.167) for point in (start, tip)]
     assert angles[1] < angles[0]
 
 
 def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
-    shown = " | ".join(text.text for text in texts(crank_rocker_drawing.linkage(PAPER, "Reed")))
+    shown = " | ".join(text.text for text in texts(sheet(crank_rocker_drawing.linkage(PAPER, "Reed"))))
     for part in (
         "Reed",
         "l1 = 31",
@@ -100,18 +104,16 @@ def test_labels_carry_lengths_in_mm_and_angles_in_degrees():
 
 @few
 @given(design=designs())
-def test_no_two_texts_overlap(design):
-    drawn = crank_rocker_drawing.linkage(
-        design, "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
-    )
-    boxes = [shapes.text_box(text, drawn.height) for text in texts(drawn)]
-    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
+def test_labels_are_clear_of_links_and_of_each_other(design):
+    title = "A crank-rocker of the beat-up, drawn with a rather long title over two lines"
+    masses = {"m4": 50.0, "r4": 0.3 * design["l4"], "m4e": 3.0, "r4e": 0.4 * design["l4"]}
+    assert clear.faults_of(crank_rocker_drawing.linkage({**design, **masses}, title)) == []
 
 
 @few
 @given(design=designs())
 def test_the_extent_holds_every_joint_and_every_text(design):
-    drawn = crank_rocker_drawing.linkage(design, "title")
+    drawn = sheet(crank_rocker_drawing.linkage(design, "title"))
     box = shapes.extent(drawn)
     points = [point for p in drawn.primitives if isinstance(p, Line) for point in p.points]
     for text in texts(drawn):
@@ -126,7 +128,7 @@ def test_a_drawing_scales_with_its_machine():
     assert big.height == pytest.approx(1000 * small.height)
     for layer in ("frame", "front dead centre", "rear dead centre", "dimensions", "notes"):
         for one, other in zip(links(small, layer), links(big, layer), strict=True):
-            assert np.array(other) == pytest.approx(1000 * np.array(one), rel=1e-12, abs=1e-9)
+            assert np.array(other) == pytest.approx(1000 * np.array(one), rel=1e-12, abs=1e-12)
 
 
 def test_every_layer_drawn_on_has_a_style():
@@ -150,3 +152,65 @@ def test_joints_are_written_in_mm_with_every_digit():
 
 def test_control_characters_are_taken_out_of_text():
     assert shapes.plain("a\n\x1b[31mβ\x00") == "a  [31mβ "
+
+
+def arms(design):
+    """Return mass and arm from D, m, of each centre of mass, in both dead centres: along and across the rocker."""
+    found = crank_rocker_drawing.of(design).skeleton
+    for joints in found.joints.values():
+        d, c = np.array(found.pivots["D"]), np.array(joints["C"])
+        along = (c - d) / np.hypot(*(c - d))
+        for name, own in found.masses.items():
+            arm = np.array(joints[name]) - d
+            yield own.mass, float(arm @ along), float(arm[1] * along[0] - arm[0] * along[1])
+
+
+def test_the_counterweight_lies_opposite_the_reed_so_that_their_moment_is_that_of_the_figures():
+    scene = lo.load("beatup")
+    eccentricity = lo.evaluate(scene, {"m4e": 3.0, "r4e": 0.05}).figures["r4"]
+    found = list(arms(BALANCED))
+    assert [mass for mass, *_ in found] == [56.8, 3.0] * 2
+    assert [along for _, along, _ in found] == pytest.approx([0.045, -0.05] * 2, rel=1e-12)
+    for centre in (found[:2], found[2:]):
+        moment = sum(mass * along for mass, along, _ in centre)
+        assert moment == pytest.approx((56.8 + 3.0) * eccentricity, rel=1e-12)
+    assert all(abs(across) < 1e-15 for *_, across in found)
+
+
+def test_the_centres_of_mass_stand_off_the_rocker_by_the_offset_of_the_effect_that_has_one():
+    scene = lo.load("beatup").with_effect("gravity").set("effects.gravity.offset", "30 deg")
+    rows = registry.of(scene).views.joints_csv(scene, {"m4e": 3.0, "r4e": 0.05})
+    at = {
+        row["joint"]: complex(float(row["x [mm]"]), float(row["y [mm]"])) for row in csv.DictReader(io.StringIO(rows))
+    }
+    for prime in ("", "'"):
+        rocker, reed, weight = (at[f"{name}{prime}"] - at["D"] for name in "CGE")
+        assert math.degrees(cmath.phase(reed / rocker)) == pytest.approx(30, abs=1e-9)
+        assert math.degrees(cmath.phase(weight / rocker)) == pytest.approx(-150, abs=1e-9)
+    assert next(arms({**BALANCED, "offset": 0.1}))[2] == pytest.approx(0.045 * math.sin(0.1), rel=1e-12)
+
+
+def test_mass_and_radius_stand_in_drawing_and_table():
+    shown = [text.text for text in texts(crank_rocker_drawing.linkage(BALANCED, ""))]
+    assert {"G  m4 = 56.8 kg, r4 = 45", "E  m4e = 3 kg, r4e = 50", "G'", "E'"} <= set(shown)
+    rows = {row["joint"]: row for row in csv.DictReader(io.StringIO(crank_rocker_drawing.joints_csv(BALANCED)))}
+    assert list(rows) == ["A", "D", "B", "C", "G", "E", "B'", "C'", "G'", "E'"]
+    for name, mass, radius in (("E", 3.0, 50.0), ("E'", 3.0, 50.0), ("G", 56.8, 45.0)):
+        assert float(rows[name]["mass [kg]"]) == mass
+        assert float(rows[name]["radius [mm]"]) == radius
+        place = [float(rows[name][axis]) - float(rows["D"][axis]) for axis in ("x [mm]", "y [mm]")]
+        assert math.hypot(*place) == pytest.approx(radius, rel=1e-12)
+    assert rows["C"]["mass [kg]"] == ""
+
+
+@pytest.mark.parametrize(("m4e", "r4e"), [(0.0, 0.05), (3.0, 0.0)])
+def test_a_counterweight_that_is_not_there_is_not_drawn(m4e, r4e):
+    drawn = crank_rocker_drawing.linkage(PAPER | {"m4e": m4e, "r4e": r4e}, "")
+    assert not [p for p in drawn.primitives if p.layer == "masses"]
+    assert "mass" not in crank_rocker_drawing.joints_csv(PAPER | {"m4e": m4e, "r4e": r4e})
+
+
+def test_a_reed_beyond_its_rocker_is_joined_to_the_shaft():
+    for radius, count in ((0.1, 3), (0.2, 4)):
+        drawn = crank_rocker_drawing.linkage(PAPER | {"m4": 1.0, "r4": radius}, "")
+        assert len(links(drawn, "front dead centre")) == count

@@ -138,7 +138,7 @@ def test_dwells_are_pieces_on_their_own_side_of_front_dead_centre():
 
 def test_forces_are_quantities_only_with_loads():
     bare = JOB.model(SCENE.without_effect("head_inertia").without_effect("tape_friction"))
-    assert set(JOB.model(SCENE).quantities) - set(bare.quantities) == {"peak_torque", "tape_force"}
+    assert set(JOB.model(SCENE).quantities) - set(bare.quantities) == {"peak_torque", "peak_power", "tape_force"}
     assert type(bare) is JobModel
     keys = [
         JOB.model(scene).key

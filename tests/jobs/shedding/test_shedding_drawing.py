@@ -2,8 +2,8 @@
 
 import importlib
 import io
-import itertools
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import drawing as shedding_drawing
 from loomopt.mechanisms.cam_spline import cycloid_like
-from loomopt.picture import shapes
+from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, svg
 
@@ -82,9 +82,16 @@ def polyline(document, layer):
     return np.array([point[:2] for point in found.get_points()])
 
 
-def test_the_dxf_is_within_a_micrometre_of_the_true_profile(made, tmp_path):
+def promised(texts):
+    """Return the chord tolerance, mm, that a drawing's or a table's texts state."""
+    (found,) = [re.search(r"chord.tolerance\D*([0-9.]+) mm", text) for text in texts if "chord" in text]
+    return float(found[1])
+
+
+def test_the_dxf_is_within_the_chord_tolerance_that_it_states_of_the_true_profile(made, tmp_path):
     scene, design, law = made
     document = drawn(scene, design, tmp_path)
+    assert promised(text.dxf.text for text in document.modelspace().query("TEXT")) == MICROMETRE
     theta = np.linspace(0, 2 * np.pi, 5003)
     _, centre, profile, *_ = plain(scene, law, theta)
     _, dense_centre, dense_profile, *_ = plain(scene, law, np.linspace(0, 2 * np.pi, 80_021))
@@ -136,9 +143,9 @@ def test_the_positions_are_the_dwells_and_the_least_cam_force():
         "least cam force": least,
     }
     _, centre, profile, *_ = plain(scene, plain_cam.cycloidal, np.array(list(found.theta.values())))
-    for at, middle, touched in zip(found.skeleton().joints.values(), centre, profile, strict=True):
-        assert at["C"] == pytest.approx(tuple(middle), abs=1e-9)
-        assert at["T"] == pytest.approx(tuple(touched), abs=1e-9)
+    for at, middle, touched in zip(found.skeleton.joints.values(), centre, profile, strict=True):
+        assert at["C"] == pytest.approx(tuple(middle / 1e3), abs=1e-12)
+        assert at["T"] == pytest.approx(tuple(touched / 1e3), abs=1e-12)
 
 
 def table(scene, design):
@@ -148,7 +155,7 @@ def table(scene, design):
 
 
 COLUMNS = ["theta [deg]", "X [mm]", "pitch_x [mm]", "pitch_y [mm]", "profile_x [mm]", "profile_y [mm]"]
-COLUMNS += ["pressure_angle [deg]", "curvature [1/m]"]
+COLUMNS += ["pressure_angle [deg]", "curvature [1/mm]"]
 
 
 def test_the_profile_as_a_table_is_the_plain_cams(made):
@@ -162,7 +169,7 @@ def test_the_profile_as_a_table_is_the_plain_cams(made):
     assert rows["pressure_angle [deg]"].to_numpy() == pytest.approx(np.degrees(pressure), abs=1e-7)
     corners = np.cumsum([scene.mechanism[name] for name in SEGMENTS])
     inside = np.min(np.abs(theta[:, None] - np.array([0, *corners])), axis=1) > 1e-9
-    exact, shown = curvature[inside], rows["curvature [1/m]"].to_numpy()[inside]
+    exact, shown = curvature[inside], 1e3 * rows["curvature [1/mm]"].to_numpy()[inside]
     assert shown == pytest.approx(exact, rel=1e-7, abs=1e-6)
 
 
@@ -189,7 +196,52 @@ def test_an_angle_stands_twice_only_where_the_curvature_jumps():
     assert sorted(set(twice["theta [deg]"])) == [120, 180, 300]
     swing, rise, arm = scene.mechanism["arm_swing"], scene.mechanism["rise"], scene.mechanism["arm"]
     assert arm * swing * math.pi**2 / 2 / rise**2 > 0.02, "m: the harmonic's jump of l phi''"
-    assert np.all(np.abs(np.diff(twice["curvature [1/m]"])[::2]) > 0.1)
+    assert np.all(np.abs(np.diff(twice["curvature [1/mm]"])[::2]) > 1e-4)
+
+
+def test_straight_lines_from_row_to_row_are_within_the_tables_chord_tolerance(made):
+    scene, design, law = made
+    head, rows = table(scene, design)
+    _, centre, profile, *_ = plain(scene, law, np.linspace(0, 2 * np.pi, 9_001))
+    far = max(
+        plain_cam.distance(exact, rows[names].to_numpy()).max()
+        for exact, names in ((centre, COLUMNS[2:4]), (profile, COLUMNS[4:6]))
+    )
+    assert 0.25 * promised(head) < far < promised(head)
+
+
+def sketch(scene, design, tmp_path):
+    """Return the straight lines of the schematic layer, as (n, 2, 2) mm."""
+    lines = drawn(scene, design, tmp_path).modelspace().query('LINE[layer=="schematic"]')
+    return np.array([[line.dxf.start.vec2, line.dxf.end.vec2] for line in lines])
+
+
+def test_the_return_spring_is_drawn_with_its_preload_and_the_travel_at_scale(tmp_path):
+    scene, design = lo.load("shedding"), {"K1": 102602.609425357, "X0": 0.07}
+    level = [line for line in sketch(scene, design, tmp_path) if line[0, 1] == line[1, 1]]
+    _, top, bottom, slack = (line[0, 1] for line in level)  # the ground first
+    assert (slack - top, top - bottom) == pytest.approx((70.0, 65.6), abs=1e-9)
+    drawing = registry.of(scene).views.linkage(scene, design)
+    (coil,) = [p for p in drawing.primitives if isinstance(p, Line) and p.layer == "schematic" and len(p.points) > 9]
+    assert 1e3 * coil.points[-1].y == pytest.approx(top, abs=1e-9)
+    shown = {p.text for p in drawing.primitives if isinstance(p, Text)}
+    assert {"K1 = 102603 N/m", "X0 = 70", "travel = 65.6", "roller_radius = 20"} <= shown
+    legend = " | ".join(text for _, text in drawing.legend)
+    assert "7182.18 N" in legend, "K1 X0"
+    assert "schematic" in legend
+    assert 'data-layer="schematic"' in svg.render(drawing)
+
+
+def test_the_sketch_stands_clear_of_the_cam(tmp_path):
+    scene = lo.load("shedding")
+    lines = sketch(scene, {}, tmp_path)
+    assert lines[..., 0].min() > scene.mechanism["centre_distance"] * 1e3
+
+
+def test_the_table_tells_the_spring_of_the_design():
+    head = table(lo.load("shedding"), {"K1": 1e4, "X0": 0.05})[0]
+    told = {"# K1: 10000 N/m, all return springs together", "# X0: 50 mm of preload", "# preload: 500 N = K1 X0"}
+    assert told <= set(head)
 
 
 def test_the_table_says_where_it_comes_from_and_what_the_workshop_must_know():
@@ -215,16 +267,10 @@ def test_a_freed_rise_and_a_free_law_are_drawn_as_the_design_says():
 
 
 @pytest.mark.parametrize("name", PACKAGED)
-def test_no_two_texts_overlap_and_all_stand_on_the_sheet(name):
-    scene = lo.load(name)
-    drawing = registry.of(scene).views.linkage(scene, {})
-    texts = [p for p in drawing.primitives if isinstance(p, Text)]
-    boxes = [shapes.text_box(text, drawing.height) for text in texts]
-    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
-    sheet = shapes.extent(drawing)
-    assert all(sheet.left < box.left and box.right < sheet.right for box in boxes)
+def test_a_drawing_names_joints_sizes_and_segments(name):
+    drawing = sheet(registry.of(lo.load(name)).views.linkage(lo.load(name), {}))
     assert {primitive.layer for primitive in drawing.primitives} <= LAYERS.keys()
-    shown = {text.text for text in texts}
+    shown = {p.text for p in drawing.primitives if isinstance(p, Text)}
     assert {name, "A", "B", "C", "B'", "C'", "arm = 130", "roller_radius = 20", "base_radius = 50"} <= shown
     assert {"centre_distance = 140", "rise 120°", "far dwell 60°", "return 120°", "near dwell 60°"} <= shown
     assert not any("UNDERCUT" in text for text in shown)
@@ -236,7 +282,7 @@ def test_the_svg_shows_the_profile_at_full_scale():
     assert 'data-layer="profile"' in svg.render(drawing)
     (line,) = [p for p in drawing.primitives if isinstance(p, Line) and p.layer == "profile"]
     assert line.closed
-    assert [c.radius for c in drawing.primitives if isinstance(c, Circle) and c.layer == "near dwell"] == [20]
+    assert [c.radius for c in drawing.primitives if isinstance(c, Circle) and c.layer == "near dwell"] == [0.02]
 
 
 def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
@@ -244,7 +290,7 @@ def test_an_undercut_cam_is_drawn_as_it_is_and_says_so():
     scene = lo.load("shedding").update(changes)
     assert lo.evaluate(scene).figures["curvature_max"] > 1 / 0.020
     drawing = registry.of(scene).views.linkage(scene, {})
-    assert any("UNDERCUT" in p.text for p in drawing.primitives if isinstance(p, Text))
+    assert any("UNDERCUT" in text for _, text in drawing.legend)
 
 
 def without(scene, *names):
@@ -284,5 +330,5 @@ def test_the_least_force_of_a_design_is_where_its_figures_say(tmp_path):
     scene, stiff = lo.load("shedding"), {"K1": 102602.609425357, "X0": 0.08}
     angle = registry.of(scene).figures(scene, stiff)["contact_angle"]
     assert math.degrees(angle) == pytest.approx(88.3705853902866, abs=1e-6)
-    legend = [p.text for p in registry.of(scene).views.linkage(scene, stiff).primitives if isinstance(p, Text)]
+    legend = [text for _, text in registry.of(scene).views.linkage(scene, stiff).legend]
     assert "B'' C''  least cam force, 0 N: cam at 88.37°" in legend

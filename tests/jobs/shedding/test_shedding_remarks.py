@@ -3,6 +3,8 @@
 import math
 import re
 
+import inch
+import numpy as np
 import pytest
 
 import loomopt as lo
@@ -25,6 +27,51 @@ def narrow(**more):
 def test_a_sound_cam_needs_no_remark():
     for name in ("shedding", "shedding-static", "shedding-printed-travel"):
         assert remarks(lo.load(name)) == ()
+
+
+FLOATS = re.compile(
+    r"N_min is 0, .*? (?P<spans>from .*): the roller floats for (?P<whole>\S+) deg of the turn\..*N_min"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "spans"),
+    [
+        ("shedding-static", "stiffness", [(300, 360)]),
+        ("shedding", "force", [(300, 360)]),
+        ("shedding", "law", [(52.5, 112.5), (187.5, 247.5)]),
+    ],
+)
+def test_a_roller_without_force_over_a_stretch_is_said_to_float(name, target, spans):
+    """A near dwell at rest, and a free law, which follows the spring as far as it can."""
+    answer = lo.solve(name, target, starts=1)
+    (remark,) = (said for said in remarks(answer.scene, answer.design) if "floats" in said)
+    found = FLOATS.match(remark)
+    assert found
+    told = [float(each) for each in re.findall(r"(\S+) deg", found["spans"])]
+    assert told == pytest.approx([end for span in spans for end in span], abs=0.2)
+    assert float(found["whole"]) == pytest.approx(sum(end - begin for begin, end in spans), abs=0.5)
+    frame = answer.curves()
+    force, angle = frame["N [N]"], np.degrees(frame["phi [rad]"])
+    most = answer.figures["spring_force_max"]
+    for begin, end in spans:
+        assert force[(angle > begin) & (angle < end)].abs().max() < 2e-3 * most
+
+
+@pytest.mark.parametrize(("target", "least"), [("stiffness", "0 N"), ("speed", "0 N"), ("force", "100 N")])
+def test_a_force_that_touches_zero_or_a_least_force_asked_for_needs_no_remark(target, least):
+    answer = lo.solve(SCENE.set("operation.N_min", least), target, starts=1)
+    assert answer.figures["contact_min"] == pytest.approx(float(least.split()[0]), abs=1e-3)
+    assert remarks(answer.scene, answer.design) == ()
+
+
+def test_a_remark_is_in_the_units_of_the_scene():
+    scene = lo.load("shedding-static").set("display.angle", "rad")
+    answer = lo.solve(scene, starts=1)
+    assert any("from 5.236 rad to 6.283 rad" in said for said in remarks(scene, answer.design))
+    degrees = {"rise": 40, "far_dwell": 20, "return": 30, "near_dwell": 270}
+    (remark,) = remarks(inch.scene("shedding", **{f"mechanism__{key}": f"{each} deg" for key, each in degrees.items()}))
+    assert re.search(r"a radius of \S+ in, \S+ in less than roller_radius = 0\.787402 in", remark)
 
 
 def test_an_undercut_cam_is_remarked_upon_with_where_how_much_and_what_helps():

@@ -8,6 +8,7 @@ from loomopt.quantities import PositiveLength, Speed
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
+from loomopt.units import Shown
 from loomopt_press.model import LONGER
 
 
@@ -33,14 +34,15 @@ FIGURES = (
 )
 
 
-def fault(design: Mapping[str, float]) -> str:
+def fault(design: Mapping[str, float], shown: Shown) -> str:
     """Say why a design cannot work; "" when it can."""
-    return "" if design["crank"] < design["rod"] else "the crank must be shorter than the rod"
+    longest = shown(design["rod"], "length")
+    return "" if design["crank"] < design["rod"] else f"the crank must be shorter than the rod, {longest}"
 
 
 def check(scene: Scene) -> None:
     """Raise BadInput when today's press cannot turn."""
-    reason = fault(scene.mechanism)
+    reason = fault(scene.mechanism, scene.show)
     if reason:
         raise BadInput(
             f"today's press cannot turn: {reason}", file=scene.origin, key="mechanism.crank, rod", remedy="Mend it."

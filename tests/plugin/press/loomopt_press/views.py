@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from loomopt import balance, maths
 from loomopt.jobs import registry
 from loomopt.picture import effect_equations
-from loomopt.picture.drawing import Label, captioned, place
+from loomopt.picture.drawing import Label, along, place
 from loomopt.picture.equations import Equation, Symbols, equation, symbol
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Panel
 from loomopt.picture.shapes import Drawing, Point
 from loomopt.picture.skeleton import Skeleton
+from loomopt.picture.units import told
 from loomopt.scenes import Scene
 from loomopt_press.model import BOTTOM, TOP, SlidePose
 
@@ -24,21 +25,21 @@ class PressViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> Drawing:
         """Return the press in both dead centres and half way, at full scale."""
         known = registry.of(scene).numbers_of(scene, design)
-        skeleton, height = self._skeleton(known), 20 * (known["crank"] + known["rod"])
+        units, skeleton, height = told(scene), self._skeleton(known), 0.02 * (known["crank"] + known["rod"])
         strokes, at = skeleton.strokes(height), skeleton.at(HALF)
         labels = [
             Label("frame", at["A"], math.pi, "A"),
             Label(HALF, at["B"], 0.0, "B"),
             Label(HALF, at["C"], 0.0, "C"),
-            Label(HALF, at["A"].part(at["B"]), math.pi / 2, f"crank = {1000 * known['crank']:.6g}"),
-            Label(HALF, at["B"].part(at["C"]), 0.0, f"rod = {1000 * known['rod']:.6g}"),
+            along(HALF, at["A"], at["B"], math.pi / 2, f"crank = {units.size(known['crank'])}"),
+            along(HALF, at["B"], at["C"], 0.0, f"rod = {units.size(known['rod'])}"),
         ]
-        drawn = Drawing(scene.name, height, (*strokes, *place(labels, strokes, height)))
-        return captioned(drawn, [(event, event) for event in skeleton.joints] + [("notes", "lengths in mm")])
+        legend = (*((event, event) for event in skeleton.joints), ("notes", units.said))
+        return Drawing(scene.name, height, (*strokes, *place(labels, strokes, height)), legend, units.length)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
-        """Return its joints as CSV, mm."""
-        return self._skeleton(registry.of(scene).numbers_of(scene, design)).csv()
+        """Return its joints as CSV."""
+        return self._skeleton(registry.of(scene).numbers_of(scene, design)).csv(told(scene))
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations the scene really uses."""
@@ -60,7 +61,7 @@ class PressViews(JobViews):
         return tuple(Panel((column,), name) for name, column in shown.items() if column in columns)
 
     def _skeleton(self, known: Mapping[str, float]) -> Skeleton:
-        shaft, crank, rod = Point(0.0, 0.0), 1000 * known["crank"], 1000 * known["rod"]
+        shaft, crank, rod = Point(0.0, 0.0), known["crank"], known["rod"]
         positions = {TOP: 0.0, HALF: math.pi / 2, BOTTOM: math.pi}
         joints = {}
         for event, phi in positions.items():

@@ -1,0 +1,131 @@
+"""Write what the documents take from the program: glossary, sketches, and the README's outputs and words.
+
+    python docs/write.py            (or: make docs)
+
+The suite compares all of it with what stands there (tests/test_documents.py).
+"""
+
+import contextlib
+import io
+import os
+import re
+import shlex
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from unittest import mock
+
+from loomopt import api
+from loomopt.cli import run
+from loomopt.jobs import registry
+from loomopt.solving.words import Words
+from loomopt.tables import rows
+from loomopt.views import glossary, svg
+from loomopt.views.layout import Grid
+
+DOCS = Path(__file__).parent
+README = DOCS.parent / "README.md"
+WIDTH = "100"
+"""Columns of the outputs that the README shows."""
+BLOCK = re.compile(r"^```console\n\$ loomopt (.*)\n((?:.*\n)*?)```$", re.MULTILINE)
+TABLE = re.compile(r"(<!-- symbols of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
+LEFT_OUT = "..."
+CHANGES = re.compile(
+    r"(?<=limits )\S+(?=, stat)|(?<=stationarity )[^,]+|(?<=cycle )[^;]+|\(\d+$|\b\d+\.\d+ s\b|Time: .*"
+)
+"""What differs from run to run or from machine to machine: times, rounding, and how far a search came."""
+
+
+def glossary_text() -> str:
+    """Return docs/glossary.md."""
+    parts = [
+        "# Glossary\n",
+        "Every symbol that a table shows. `loomopt show PROBLEM --symbols` prints it for any scene, in its own\n"
+        "units; here they are those of the packaged ones. An x marks what the sketch names. Joints are the sketch's.\n",
+        "This page is written by `make docs`; its words stand in the program.\n",
+    ]
+    for job in registry.own_names():
+        scene = registry.load(job)
+        title, *grids = glossary.parts(scene)
+        parts.append(f"## {str(title).removeprefix(f'{job}: ').capitalize()}\n\n![Sketch](sketch-{job}.svg)\n")
+        parts += [f"### {grid.title}\n\n{table(grid)}" for grid in grids if isinstance(grid, Grid)]
+    return "\n".join(parts)
+
+
+def table(grid: Grid) -> str:
+    """Return a table as Markdown."""
+    lines = [grid.columns, ("---",) * len(grid.columns), *grid.lines]
+    return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+
+
+def sketches() -> dict[str, str]:
+    """Return the drawing of each job's packaged machine, by file name, as SVG."""
+    names = registry.own_names()
+    return {f"sketch-{name}.svg": svg.render(api.evaluate(name).draw().drawing) for name in names}
+
+
+def output(words: str) -> list[str]:
+    """Return what a command prints, line by line."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed), mock.patch.dict(os.environ, COLUMNS=WIDTH):
+        status = run(shlex.split(words))
+    if status:
+        raise SystemExit(f"loomopt {words} ends with exit status {status}")
+    return printed.getvalue().rstrip("\n").split("\n")
+
+
+def masked(line: str) -> str:
+    """Return a line without what differs from run to run."""
+    return CHANGES.sub("#", line.rstrip())
+
+
+def holds(told: list[str], printed: list[str]) -> bool:
+    """Say whether lines of the README are those that a command prints; "..." stands for any."""
+    words = [r"(?:.*\n)*?" if line.strip() == LEFT_OUT else re.escape(masked(line)) + r"\n" for line in told]
+    return re.fullmatch("".join(words), "".join(f"{masked(line)}\n" for line in printed)) is not None
+
+
+def updated(told: list[str], printed: list[str]) -> list[str]:
+    """Return lines of the README as a command prints them now: each by the word that it begins with."""
+    if holds(told, printed) or not told:
+        return told or printed
+    found, rest = [], iter(printed)
+    for line in told:
+        if line.strip() == LEFT_OUT or not line.strip():
+            found.append(line)
+        else:
+            found.append(next((now for now in rest if now.split()[:1] == line.split()[:1]), line))
+    return found
+
+
+def symbols(name: str) -> str:
+    """Return the symbols of a scene's answer in words, as Markdown."""
+    scene = registry.load(name)
+    said = {symbol.name: symbol.text for symbol in glossary.symbols(scene)}
+    words = Words(scene)
+    shown = [row["name"] for row in rows(api.evaluate(scene), scene)]
+    lines = tuple((f"`{each}`", words.unit(each).removeprefix("1"), said[each]) for each in shown)
+    return table(Grid("", ("symbol", "unit", "what it is"), lines))
+
+
+def readme_text(text: str, run: Callable[[str], list[str]] = output) -> str:
+    """Return the README with its outputs and words as they are now."""
+
+    def block(match: re.Match[str]) -> str:
+        lines = updated(match[2].rstrip("\n").split("\n") if match[2] else [], run(match[1]))
+        return "```console\n$ loomopt " + match[1] + "\n" + "\n".join(lines) + "\n```"
+
+    text = BLOCK.sub(block, text)
+    return TABLE.sub(lambda match: f"{match[1]}{symbols(match[2])}{match[3]}", text)
+
+
+def documents() -> Iterator[tuple[Path, str]]:
+    """Yield each file with what should stand in it."""
+    yield DOCS / "glossary.md", glossary_text()
+    for name, drawing in sketches().items():
+        yield DOCS / name, drawing
+    yield README, readme_text(README.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    for path, text in documents():
+        path.write_text(text, encoding="utf-8")

@@ -1,0 +1,159 @@
+"""What a designer works with in Python: a design that was evaluated or found, as tables, curves, figures and files."""
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from loomopt import designs, showing
+from loomopt.lazy import lazy
+from loomopt.scenes import Scene
+from loomopt.solving import engine, solution
+from loomopt.solving.asked import check_numbers, target_name
+from loomopt.tolerances import SLACK
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from loomopt.solving.proof import Proofs
+    from loomopt.views.notebook import Sketch
+
+
+@dataclass(frozen=True, repr=False)
+class Evaluation(solution.Evaluation, showing.Shown):
+    """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
+
+    target: whose limits it was judged by.
+    """
+
+    scene: Scene = field(kw_only=True, compare=False)
+    target: str = field(kw_only=True, default="")
+
+    def table(self) -> "pd.DataFrame":
+        """Return design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
+        from loomopt import tables
+
+        return tables.answer(self, self.scene)
+
+    def to_frame(self, *, si: bool = False) -> "pd.DataFrame":
+        """Return design and figures as one row, units in the column names, to be set beside others by `pd.concat`.
+
+        si: in SI, so that rows of scenes in different units have the same columns; else in the scene's own units.
+        """
+        from loomopt import tables
+
+        return tables.row(self, self.scene, self.target, self._outcome, si=si)
+
+    def curves(self) -> "pd.DataFrame":
+        """Return the curves of the design over the cycle, SI, units in the column names."""
+        return self.simulate()
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return the curves over the cycle as a figure, which shows itself in Jupyter.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        """
+        from loomopt.views import outputs
+
+        return outputs.plot(self.scene, self.design, self.target, None if path is None else Path(path))
+
+    def draw(self) -> "Sketch":
+        """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
+        from loomopt.views import notebook, outputs
+
+        return notebook.sketch(self.scene, self.design, outputs.what(self))
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Write linkage or cam for the workshop, as `loomopt export` does; return the file. Raises BadInput.
+
+        path: .dxf or .svg at true scale; .csv for the joints or the profile.
+        """
+        from loomopt.views import outputs
+
+        outputs.linkage(Path(path), self.scene, self.design, outputs.what(self))
+        return Path(path)
+
+    def evaluate(self) -> "Evaluation":
+        """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
+        return evaluated(self.scene, designs.checked(self.design, self.scene), self.target)
+
+    def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
+        """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`. Raises BadInput."""
+        from loomopt import tables
+
+        if accuracy is not None:
+            check_numbers(accuracy, 1)
+        return tables.curves(self.scene, self.design, accuracy, self.target)
+
+    def prove(self, *, slack: float = SLACK) -> "Proofs":
+        """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
+        from loomopt.solving import proof
+
+        return proof.prove(self.scene, designs.checked(self.design, self.scene), self.target, slack)
+
+    @property
+    def _outcome(self) -> str:
+        """What came of it, in a word."""
+        return "admissible" if self.admissible else "not admissible"
+
+    @property
+    def _told(self) -> str:
+        """What a designer asks first: the figures that the target is about."""
+        from loomopt.jobs import registry
+        from loomopt.solving.words import Words
+
+        objectives = registry.of(self.scene).program(self.scene, self.target).objectives
+        known = {each.figure: self.figures.get(each.figure) for each in objectives}
+        words = Words(self.scene)
+        return ", ".join(f"{name} {words.shown(name, value)}" for name, value in known.items() if value is not None)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.problem}, {self.target}: {self._outcome}; {self._told}>"
+
+
+@dataclass(frozen=True, repr=False)
+class Answer(Evaluation, solution.Solution):
+    """A solved target: the design that was found, what binds, what is certified, and today's machine beside it."""
+
+    @lazy
+    def before(self) -> Evaluation | None:
+        """Today's machine, evaluated when it is first read."""
+        return _judged(self.today(), self.scene, self.target) if self.today else None
+
+    @property
+    def _outcome(self) -> str:
+        return self.status
+
+    @property
+    def _told(self) -> str:
+        return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._told
+
+
+def _html(thing: showing.Shown) -> str:
+    from loomopt.views import notebook
+
+    return notebook.html(thing)
+
+
+showing.by(_html)
+
+
+def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
+    """Return figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
+    return _judged(engine.evaluate(scene, design, target), scene, target_name(scene, target))
+
+
+def solved(found: solution.Solution, scene: Scene) -> Answer:
+    """Return what a solve says as an object to work with."""
+    return Answer(**_fields(found) | {"scene": scene})
+
+
+def _judged(found: solution.Evaluation, scene: Scene, target: str) -> Evaluation:
+    return Evaluation(**_fields(found) | {"scene": scene, "target": target})
+
+
+def _fields(found: solution.Evaluation) -> dict[str, Any]:
+    return {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(found)}

@@ -1,0 +1,269 @@
+"""Curves over the crank angle as small diagrams; every text stands above its axes, so that none hides a curve."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from loomopt import files
+from loomopt.cycle import Floats
+from loomopt.picture.panels import Panel, each
+from loomopt.picture.shapes import plain
+from loomopt.program.curves import ANGLE
+from loomopt.units import factor, show
+from loomopt.views import figure
+from loomopt.views.figure import COLOURS, STYLES
+from loomopt.views.heads import LEGEND, SIZE, Entry, head
+from loomopt.views.pages import EDGE, Cell, stack, widen
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DASHED = (0, (4, 2))
+"""Today's machine beside a design: no other curve of it is drawn so."""
+TODAY, LINE, LIMIT = "#6b7280", "#374151", "#b91c1c"
+SAME = 1e-9
+"""deg; rows this near to an angle are at it."""
+ROUNDING = 1e-9
+"""Share of a curve's largest magnitude below which a marked value is 0, and by which two tops are alike."""
+FAR = 3.0
+"""Heights of a panel's curves by which a level may stand outside the curves and still be drawn."""
+GRAVITY = 9.80665
+WORDS = {"peak": "peak", "most": "largest", "least": "least"}
+HIGH, HIGH_WIDE, WIDTHS = 1.15, 1.9, (7.0, 11.0)
+"""Of axes, inches; widths of a figure with one column of panels and with two."""
+
+
+class Turn(NamedTuple):
+    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and the marks' angles, rad."""
+
+    angles: Floats
+    columns: "pd.DataFrame"
+    marks: Mapping[str, float]
+
+    def of(self, column: str) -> Floats:
+        """Return a column, SI, as long as the angles."""
+        values = self.columns[column].to_numpy(dtype=float)
+        return np.append(values, values[:1]) if len(self.angles) > len(values) else values
+
+
+def curves(
+    frame: "pd.DataFrame",
+    path: Path | None,
+    title: str,
+    marks: Mapping[str, float] | None = None,
+    panels: Sequence[Panel] = (),
+    today: tuple["pd.DataFrame", Mapping[str, float]] | None = None,
+    angle: str = "crank angle",
+) -> Any:
+    """Return small diagrams over `phi [rad]`, in degrees; written as PNG, PDF or SVG where there is a path.
+
+    marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
+    is shaded. panels: what to show, one panel per column with its unit without them. today: curves and marks of
+    today's machine, drawn dashed beside a design's. angle: what phi is.
+    Raises BadInput for another suffix, and ValueError where there is no column.
+    """
+    if path:
+        files.suffix(path, figure.SUFFIXES)
+    panels = panels or each(tuple(frame.columns))
+    if not panels or ANGLE not in frame:
+        raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
+    design, before = _turn(frame, marks or {}), _turn(*today) if today else None
+    with figure._own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
+        page, cells = _grid(panels)
+        entries = [_panel(cell.axes, panel, design, before) for cell, panel in cells]
+        widen(page, [cell for cell, _ in cells])
+        heads = {}
+        for (cell, panel), shown in zip(cells, entries, strict=True):
+            names = _mark(cell.axes, design.marks)
+            heads[cell.axes] = head(cell.axes, f"{panel.title}{_bracketed(panel)}", shown, names if cell.first else ())
+        stack(page, [cell for cell, _ in cells], heads)
+        _entitle(page, title, f"{angle} phi [deg]", both=before is not None)
+    if path:
+        figure.save(page, path)
+    return page
+
+
+def _turn(frame: "pd.DataFrame", marks: Mapping[str, float]) -> Turn:
+    """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
+    angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
+    closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
+    return Turn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks)
+
+
+def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
+    """Return a figure and its axes with their panels: wide ones on top, the others below in columns of their own."""
+    on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
+    wide = 1 if len(panels) <= 4 else 2
+    rows, height = math.ceil(len(others) / wide), len(on_top)
+    page = figure._figure(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0)
+    shared: Any = None
+    cells = []
+    for place, panel in enumerate([*on_top, *others]):
+        column, row = divmod(max(place - height, 0), rows or 1)
+        shared = axes = page.add_axes((0.1, 0.1, 0.5, 0.5), sharex=shared, label=str(place))
+        last = panel.wide or row == rows - 1 or place == len(panels) - 1
+        first = place == 0 or (row == 0 and not height)
+        where, high = (place, HIGH_WIDE) if panel.wide else (height + row, HIGH)
+        cells.append((Cell(axes, where, column, high, panel.wide, last, first), panel))
+    return page, cells
+
+
+def _entitle(page: Any, title: str, below: str, both: bool) -> None:
+    """Write the title, what phi is, and once which curves are the design's and which today's, where there are both."""
+    from matplotlib.lines import Line2D
+
+    high = page.get_figheight()
+    page.suptitle(plain(title), x=0.5, y=1 - EDGE / high, va="top", fontsize=11, parse_math=False)
+    page.supxlabel(below, x=0.5, y=EDGE / high, va="bottom", fontsize=9)
+    if both:
+        design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
+        lines, texts = [design, Line2D([], [], color=TODAY, linestyle=DASHED)], ["design", "today, dashed"]
+        place = 1 - EDGE / page.get_figwidth(), 1 - EDGE / high
+        page.legend(lines, texts, loc="upper right", bbox_to_anchor=place, borderaxespad=0.0, ncols=2, **LEGEND)
+
+
+def _bracketed(panel: Panel) -> str:
+    """Return the unit a panel is shown in, in brackets; "" of a pure number."""
+    unit = _unit(panel)
+    return "" if unit == "1" else f" [{unit}]"
+
+
+def _unit(panel: Panel) -> str:
+    return panel.unit or ("deg" if panel.si == "rad" else panel.si)
+
+
+def _panel(axes: Any, panel: Panel, design: Turn, before: Turn | None) -> list[Entry]:
+    """Draw a panel's columns with what is marked and limited; return what its legend says."""
+    size = factor(_unit(panel))
+    drawn = [design.of(column) / size for column in panel.columns]
+    old = [before.of(column) / size for column in panel.columns] if before else []
+    entries = []
+    for place, (values, label) in enumerate(zip(drawn, panel.labels, strict=True)):
+        colour, style = COLOURS[place % len(COLOURS)], STYLES[place % len(STYLES)]
+        (line,) = axes.plot(design.angles, values, color=colour, linewidth=1.4, linestyle=style, label=plain(label))
+        if label != panel.title:
+            entries.append((line, label))
+    for place, values in enumerate(old):
+        colour = COLOURS[place % len(COLOURS)] if len(old) > 1 else TODAY
+        label = f"{plain(panel.labels[place])}, today"
+        assert before
+        axes.plot(before.angles, values, color=colour, linewidth=1.1, linestyle=DASHED, label=label, zorder=2.1)
+    for turn, colour, said in ((design, COLOURS[0], ""), (before, TODAY, "today: ")):
+        entries += _points(axes, panel, turn, colour, said) if turn else []
+    _frame(axes, np.concatenate([*drawn, *old]), design.angles)
+    if panel.si == "m/s^2":
+        _in_g(axes, size)
+    return entries + _levels(axes, panel, size)
+
+
+def _frame(axes: Any, values: Floats, angles: Floats) -> None:
+    """Give axes their ticks, their grid and a zero where curves pass it."""
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    some = values[np.isfinite(values)]
+    low, high = (float(some.min()), float(some.max())) if some.size else (0.0, 0.0)
+    if high - low <= ROUNDING * max(abs(low), abs(high)):
+        room = abs(high) or 1.0
+        axes.set_ylim(low - room, high + room)
+    if low < 0 < high:
+        axes.axhline(0.0, color="#9ca3af", linewidth=0.6, zorder=1)
+    axes.set_xlim(angles.min(), angles.max())
+    axes.xaxis.set_major_locator(MultipleLocator(45))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
+    axes.yaxis.set_major_formatter(FuncFormatter(_tick))  # no common power that stands in the way
+    axes.grid(color="#e5e7eb", linewidth=0.5)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _tick(value: float, _: int) -> str:
+    return f"{value:g}"
+
+
+def _in_g(axes: Any, size: float) -> None:
+    """Give axes of an acceleration a second scale, in g; size: of the first one's unit, m/s²."""
+    scale = axes.secondary_yaxis("right", functions=(lambda y: y * size / GRAVITY, lambda g: g * GRAVITY / size))
+    scale.set_ylabel("[g]", fontsize=SIZE)
+    scale.yaxis.set_major_formatter(_tick)
+    scale.spines["right"].set_visible(False)
+
+
+def _points(axes: Any, panel: Panel, turn: Turn, colour: str, said: str) -> list[Entry]:
+    """Mark what of a panel's first column is marked; return what is to say of it."""
+    values, unit = turn.of(panel.columns[0]), _unit(panel)
+    entries = []
+    for how in panel.marked:
+        row = _row(values, turn, how)
+        if row is not None:
+            angle, value = float(turn.angles[row]), float(values[row])
+            value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
+            where = f" at {angle:.2f} deg" if how in WORDS else ""
+            (dot,) = axes.plot(angle, value / factor(unit), "o", color=colour, markersize=4.0, zorder=3)
+            entries.append((dot, f"{said}{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"))
+    return entries
+
+
+def _row(values: Floats, turn: Turn, how: str) -> int | None:
+    """Return the row of what is marked, the first of those alike; None where nothing is known."""
+    if how not in WORDS:
+        place = math.degrees(turn.marks.get(how, math.nan))
+        near = np.flatnonzero(np.abs(turn.angles - turn.angles[0] - (place - turn.angles[0]) % 360.0) <= SAME)
+        return int(near[0]) if near.size and np.isfinite(values[near[0]]) else None
+    heights = {"peak": np.abs(values), "most": values, "least": -values}[how]
+    if not np.isfinite(heights).any():
+        return None
+    alike = ROUNDING * float(np.nanmax(np.abs(values)))
+    return int(np.flatnonzero(heights >= np.nanmax(heights) - alike)[0])
+
+
+def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
+    """Draw a panel's levels that stand near its curves; return what they say."""
+    from matplotlib.lines import Line2D
+
+    low, high = axes.get_ylim()
+    room = FAR * (high - low)
+    entries = []
+    for place, (text, values) in enumerate(panel.levels.items()):
+        style: dict[str, Any] = {"color": LIMIT, "linewidth": 0.9, "linestyle": STYLES[place % len(STYLES)]}
+        near = [value / size for value in values if low - room <= value / size <= high + room]
+        for value in near:
+            axes.axhline(value, **style)
+            low, high = min(low, value - room / 20), max(high, value + room / 20)
+        axes.set_ylim(low, high)
+        far = "" if values[0] / size in near else ", beyond the scale"
+        entries.append((Line2D([], [], **style), f"{text} {show(values[0], _unit(panel))}{far}"))
+    return entries
+
+
+def _mark(axes: Any, marks: Mapping[str, float]) -> list[tuple[float, str]]:
+    """Shade stretches and mark angles wherever they fall on the axis; return the names with their places."""
+    low, high = axes.get_xlim()
+    marks = {name: angle for name, angle in marks.items() if math.isfinite(angle)}
+    names: list[tuple[float, str]] = []
+    stretches = [name.removesuffix(" begins") for name in marks if name.endswith(" begins")]
+    stretches = [name for name in stretches if f"{name} ends" in marks]
+    for name in stretches:
+        begin, end = math.degrees(marks[f"{name} begins"]), math.degrees(marks[f"{name} ends"])
+        end = begin + (end - begin) % 360
+        parts = [(max(begin + turn, low), min(end + turn, high)) for turn in _turns(begin, low - 360, high)]
+        parts = [(left, right) for left, right in parts if left < right]
+        for left, right in parts:
+            axes.axvspan(left, right, color="#fde68a", alpha=0.6, linewidth=0, zorder=0)
+        widest = max(parts, key=lambda part: part[1] - part[0], default=(low, low))
+        names.append((sum(widest) / 2, name))
+    marks = {name: angle for name, angle in marks.items() if name.rpartition(" ")[0] not in stretches}
+    for name, angle in marks.items():
+        for turn in _turns(math.degrees(angle), low, high):
+            place = math.degrees(angle) + turn
+            if low <= place <= high:
+                axes.axvline(place, color=LINE, linewidth=0.6, linestyle=(0, (9, 2, 1, 2)))
+                names.append((place, name))
+    return sorted(names)
+
+
+def _turns(angle: float, low: float, high: float) -> list[float]:
+    """Return the whole turns, deg, that may bring an angle between low and high."""
+    first, last = math.floor((low - angle) / 360), math.ceil((high - angle) / 360)
+    return [360.0 * turn for turn in range(first, last + 1)]

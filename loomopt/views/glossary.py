@@ -1,0 +1,138 @@
+"""Every symbol that a table shows, in words, and every figure that a source prints."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from loomopt.effects.kinds import Check, Load
+from loomopt.jobs import registry, sources
+from loomopt.picture.job_views import JobViews
+from loomopt.picture.panels import split
+from loomopt.picture.shapes import Text
+from loomopt.quantities import quantity_of
+from loomopt.scenes import Scene
+from loomopt.schema import Table
+from loomopt.solving.words import Words
+from loomopt.units import SI_UNIT
+from loomopt.views.layout import Grid
+
+ORDINALS = ("first", "second", "third")
+GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "mu": "μ"}
+"""Letters that drawings write as such."""
+SHARED = {"phi": "angle of the shaft", "motor_power": "crank torque times the speed of the shaft"}
+"""Columns that every job's curves may have."""
+KINDS = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"}
+"""SI unit → kind of quantity."""
+LONGEST_SYMBOL = 5
+"""Letters beyond which a name is made of words."""
+DRAWN = "x"
+"""What marks a symbol that the sketch shows."""
+
+
+class Symbol(NamedTuple):
+    """A symbol, its unit ("1" without one) and what it is."""
+
+    name: str
+    unit: str
+    text: str
+
+
+def parts(scene: Scene) -> list[str | Grid]:
+    """Return the tables of `loomopt show --symbols`; units are those of the scene's tables, of curves SI."""
+    drawn = labels(scene)
+    grids = (_grid(title, symbols, drawn) for title, symbols in _tables(scene).items())
+    return [f"{scene.name}: {scene.schema.title}", *grids]
+
+
+def symbols(scene: Scene) -> list[Symbol]:
+    """Return every symbol; one that names a number of the scene and a figure too comes twice, the figure last."""
+    return [symbol for symbols in _tables(scene).values() for symbol in symbols]
+
+
+def _tables(scene: Scene) -> dict[str, list[Symbol]]:
+    """Return the symbols by what they are."""
+    schema, words = scene.schema, Words(scene)
+    return {
+        "Operation": _numbers(scene, schema.operation),
+        "Mechanism; what [bounds] frees of it is the design": _numbers(scene, schema.mechanism),
+        "Values of effects": [
+            each for effect in schema.effects.values() for each in _numbers(scene, effect.own, f"{effect.name}.")
+        ],
+        "Columns of the curves": list(columns(scene)),
+        "Figures": [Symbol(each.name, words.unit(each.name), each.text) for each in schema.figures.values()],
+    }
+
+
+def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> Grid:
+    lines = tuple(
+        (each.name, "" if each.unit == "1" else each.unit, each.text, DRAWN if each.name in drawn else "")
+        for each in symbols
+    )
+    return Grid(title, ("symbol", "unit", "what it is", "in the sketch"), lines)
+
+
+def _numbers(scene: Scene, model: type[Table], path: str = "") -> list[Symbol]:
+    """Return the keys of a table with their units and descriptions; a word or a list has no unit."""
+    found = []
+    for name, field in model.model_fields.items():
+        quantity = quantity_of(model, name)
+        unit = scene.shown_in(quantity.kind) if quantity else "1"
+        found.append(Symbol(path + name, unit, field.description or ""))
+    return found
+
+
+def columns(scene: Scene) -> Iterator[Symbol]:
+    """Yield the columns of the curves of today's machine, SI."""
+    job, model = registry.of(scene), registry.of(scene).model(scene)
+    said = {getattr(load, "symbol", "") or load.name: load.summary for load in model.loads if isinstance(load, Load)}
+    for check in scene.active:
+        if isinstance(check, Check):
+            said |= {name: f"at each angle; its peak is the figure {name}" for name in check.quantities}
+    said |= SHARED
+    for column in job.curves(scene, job.today(scene), steps=4):
+        name, unit = split(column)
+        yield Symbol(name, unit, said.get(name) or _called(job.views, name, unit) or _derivative(name))
+
+
+def _called(views: JobViews, name: str, unit: str) -> str:
+    """Return what a job calls a column of its own; one of several of a kind by that kind too; "" where it does not."""
+    words: Mapping[str, Any] = getattr(views, "words", dict)()
+    curve = words.get(name)
+    if not (curve and curve.name):
+        return name.replace("_", " ") if len(name) > LONGEST_SYMBOL else ""
+    return f"{KINDS[unit]} of {curve.name}" if curve.panel and unit in KINDS else str(curve.name)
+
+
+def _derivative(name: str) -> str:
+    """Return what a column says that is a derivative of another one, by its name; "" for any other."""
+    base, _, order = name.rpartition("_")
+    if base and order in ("1", "2", "3"):
+        return f"{ORDINALS[int(order) - 1]} derivative of {base} with respect to the angle phi"
+    if base and order in ("t", "tt", "ttt"):
+        return f"{ORDINALS[len(order) - 1]} derivative of {base} with respect to time"
+    return ""
+
+
+def labels(scene: Scene) -> frozenset[str]:
+    """Return the symbols that the drawing of today's machine names; none where it cannot be drawn."""
+    views = registry.of(scene).views
+    if views.missing(scene):
+        return frozenset()
+    texts = {part.text for part in views.linkage(scene, {}).primitives if isinstance(part, Text)}
+    named = {text.partition(" = ")[0] for text in texts if " = " in text}
+    return frozenset(named | {name for name, letter in GREEK.items() if letter in named})
+
+
+def printed(scene: Scene) -> list[str | Grid]:
+    """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why."""
+    source = sources.read(scene.job)
+    lines = tuple(
+        (each.key, each.printed or "not printed", each.computed, "" if each.unit == "-" else each.unit, each.verdict)
+        for each in source.figures
+    )
+    why = tuple((each.key, each.item, each.inputs, each.remark) for each in source.figures)
+    return [
+        source.citation,
+        "The suite computes every one of these figures again.",
+        Grid("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
+        Grid("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
+    ]

@@ -1,0 +1,167 @@
+"""The JSON Schema of a job's scenes, by which editors complete and check TOML: from the models that read a scene."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any
+
+from pydantic import TypeAdapter
+
+from loomopt.effects.kinds import UNBUILT, Effect
+from loomopt.quantities import Quantity, quantity_of
+from loomopt.quantity_patterns import QUANTITY, foreign
+from loomopt.scene_display import KINDS
+from loomopt.scene_schema import SceneSchema
+from loomopt.scene_tables import Problem
+from loomopt.scenes import TABLES
+from loomopt.schema import Table
+from loomopt.units import DISPLAY_UNIT
+
+Json = dict[str, Any]
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+_NAME = r"^[^\s!-,./:-@\[-`{-~_-][^\s!-,./:-@\[-^`{-~]{0,63}$"
+"""A scene's name: as its reader has it, in words that every dialect of patterns understands alike."""
+
+
+def scene(schema: SceneSchema) -> Json:
+    """Return the JSON Schema (draft 2020-12) of a job's scenes."""
+    makers: Mapping[str, Callable[[SceneSchema], Json]] = {
+        "problem": _problem,
+        "operation": lambda of: _model(of.operation),
+        "mechanism": lambda of: _model(of.mechanism),
+        "effects": _effects,
+        "available": _effects,
+        "bounds": _bounds,
+        "limits": _limits,
+        "display": display,
+        "targets": lambda of: _closed({name: _model(target.own, target.text) for name, target in of.targets.items()}),
+    }
+    tables = {name: makers[name](schema) for name in TABLES}
+    whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
+    rules = [_given(each, "") for each in schema.needs]
+    rules += [_given(key, effect.name) for effect in _own(schema) for key in effect.needs]
+    found: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
+    return _hoisted(found | ({"allOf": rules} if rules else {}))
+
+
+def display(schema: SceneSchema) -> Json:
+    """Return [display]: the kinds of quantity, each with a unit."""
+    return _closed({key: _unit(kind) for key, kind in KINDS.items()})
+
+
+def _unit(kind: str) -> Json:
+    said = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+    return {"type": "string", "description": said, "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
+
+
+def _problem(schema: SceneSchema) -> Json:
+    found = _model(Problem)
+    found["properties"] |= {"job": {"const": schema.name}}
+    found["properties"]["name"] |= {"pattern": _NAME}
+    return found
+
+
+def _own(schema: SceneSchema) -> Iterator[Effect]:
+    """Yield the effects that a scene may turn on."""
+    yield from (effect for effect in schema.effects.values() if not isinstance(effect, UNBUILT))
+
+
+def _effects(schema: SceneSchema) -> Json:
+    found = {}
+    for effect in _own(schema):
+        own = _model(effect.own, effect.summary)
+        found[effect.name] = {"type": "object", "additionalProperties": own} if effect.many else own
+    return _closed(found)
+
+
+def _bounds(schema: SceneSchema) -> Json:
+    """Return [bounds]: every number by its name, as a range or as one value."""
+    kinds: dict[str, list[Quantity]] = {}
+    effects = [effect for effect in _own(schema) if not effect.many]
+    for model in (schema.mechanism, schema.operation, *(effect.own for effect in effects)):
+        for name in model.model_fields:
+            if quantity := quantity_of(model, name):
+                kinds.setdefault(name, []).append(quantity)
+    for name, kind in schema.variables.items():
+        kinds[name] = kinds.get(name, [Quantity(kind)])[:1]
+    found = _closed({name: _any([_bound(_quantity(each)) for each in of]) for name, of in kinds.items()})
+    if len(effects) < sum(1 for _ in _own(schema)):  # instances are named by the scene
+        found["additionalProperties"] = {"type": "object"}
+    return found
+
+
+def _bound(value: Json) -> Json:
+    free = {"enum": [True, False, "true", "false"], "description": "false: held at today's value until it is freed"}
+    return {"anyOf": [value, _closed({"min": value, "max": value, "free": free}, ["min", "max"])]}
+
+
+def _limits(schema: SceneSchema) -> Json:
+    """Return [limits]: every figure that may be limited, on the sides on which it may be."""
+    figures = [figure for figure in schema.figures.values() if figure.sides]
+    sides = {figure.name: dict.fromkeys(figure.sides, _quantity(Quantity(figure.kind))) for figure in figures}
+    said = {figure.name: figure.text for figure in figures}
+    return _closed({name: _closed(of) | {"minProperties": 1, "description": said[name]} for name, of in sides.items()})
+
+
+def _given(key: str, effect: str) -> Json:
+    """Return the rule that a key is given; effect: where that is on, always without one."""
+    table = next(table for table in TABLES if key.startswith(f"{table}."))
+    then = {"required": [table], "properties": {table: {"required": [key.removeprefix(f"{table}.")]}}}
+    if not effect:
+        return then
+    return {"if": {"required": ["effects"], "properties": {"effects": {"required": [effect]}}}, "then": then}
+
+
+def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:
+    """Return a table that holds nothing else."""
+    found: Json = {"type": "object", "additionalProperties": False, "properties": dict(properties)}
+    return found | ({"required": required} if required else {})
+
+
+def _any(schemas: list[Json]) -> Json:
+    different = [each for place, each in enumerate(schemas) if each not in schemas[:place]]
+    return different[0] if len(different) == 1 else {"anyOf": different}
+
+
+def _quantity(quantity: Quantity) -> Json:
+    return TypeAdapter(Annotated[float, quantity]).json_schema()
+
+
+def _model(model: type[Table], summary: str = "") -> Json:
+    """Return a table by its model; summary: what it is, in the words of its job."""
+    found = _without_null(model.model_json_schema())
+    return found | ({"description": summary} if summary else {})
+
+
+def _each(part: Json, change: Callable[[Json], Json]) -> Json:
+    """Return a schema with all schemas inside it changed."""
+
+    def inner(value: object) -> object:
+        if isinstance(value, list):
+            return [inner(each) for each in value]
+        return change(value) if isinstance(value, dict) else value
+
+    return {key: inner(value) for key, value in part.items()}
+
+
+def _without_null(part: Json) -> Json:
+    """Return a part of a schema without null, which no scene can say: a key is there or it is not."""
+    found = _each({key: value for key, value in part.items() if key != "default" or value is not None}, _without_null)
+    if "anyOf" in found:
+        rest = [each for each in found.pop("anyOf") if each != {"type": "null"}]
+        found = {**rest[0], **found} if len(rest) == 1 else {**found, "anyOf": rest}
+    return found
+
+
+def _hoisted(whole: Json) -> Json:
+    """Return a schema in which each kind of quantity stands once, under $defs; a place keeps its own description."""
+    kinds: dict[str, Json] = {}
+
+    def hoist(part: Json) -> Json:
+        if QUANTITY not in part:
+            return _each(part, hoist)
+        own: Json = {key: part[key] for key in ("description", "default") if key in part}
+        name = re.sub(r"\W+", "_", part[QUANTITY])
+        kinds.setdefault(name, {key: value for key, value in part.items() if key not in (QUANTITY, "title", *own)})
+        return {"$ref": f"#/$defs/{name}", **own}
+
+    return {**hoist(whole), "$defs": kinds}

@@ -1,0 +1,81 @@
+"""A JSON Schema applied to data by hand: what of draft 2020-12 the scenes' schemas use, and nothing else."""
+
+import re
+
+TYPES: dict[str, type | tuple[type, ...]] = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "integer": int,
+    "boolean": bool,
+    "number": (int, float),
+}
+KNOWN = {
+    *(
+        "$schema",
+        "$defs",
+        "$ref",
+        "title",
+        "description",
+        "default",
+        "type",
+        "enum",
+        "const",
+        "pattern",
+        "not",
+        "anyOf",
+    ),
+    *("allOf", "if", "then", "properties", "required", "additionalProperties", "items", "minItems", "maxItems"),
+    *("minimum", "exclusiveMinimum", "exclusiveMaximum", "minProperties"),
+}
+
+
+def valid(schema, data, root=None):
+    """Say whether data keeps a schema. Raises ValueError for a key that is not known here."""
+    root = root or schema
+    if schema in (True, {}):
+        return True
+    if set(schema) - KNOWN:
+        raise ValueError(f"not known here: {set(schema) - KNOWN}")
+
+    def keeps(part):
+        return valid(part, data, root)
+
+    if "$ref" in schema and not keeps(root["$defs"][schema["$ref"].removeprefix("#/$defs/")]):
+        return False
+    kind = TYPES.get(schema.get("type", ""), object)
+    if not isinstance(data, kind) or (isinstance(data, bool) and schema.get("type") in ("integer", "number")):
+        return False
+    if "enum" in schema and data not in schema["enum"]:
+        return False
+    if "const" in schema and data != schema["const"]:
+        return False
+    if ("not" in schema and keeps(schema["not"])) or not all(map(keeps, schema.get("allOf", []))):
+        return False
+    if "anyOf" in schema and not any(map(keeps, schema["anyOf"])):
+        return False
+    if "if" in schema and keeps(schema["if"]) and not keeps(schema["then"]):
+        return False
+    return _inside(schema, data, root)
+
+
+def _inside(schema, data, root):
+    """Say whether data of some type keeps what a schema says of that type."""
+    if isinstance(data, str):
+        return re.search(schema.get("pattern", ""), data) is not None
+    if isinstance(data, list):
+        size = schema.get("minItems", 0) <= len(data) <= schema.get("maxItems", len(data))
+        return size and all(valid(schema.get("items", {}), each, root) for each in data)
+    if isinstance(data, dict):
+        own, others = schema.get("properties", {}), schema.get("additionalProperties", {})
+        rest = [value for name, value in data.items() if name not in own]
+        return (
+            set(schema.get("required", ())) <= set(data)
+            and len(data) >= schema.get("minProperties", 0)
+            and all(valid(own[name], value, root) for name, value in data.items() if name in own)
+            and (not rest if others is False else all(valid(others, value, root) for value in rest))
+        )
+    if isinstance(data, int | float) and not isinstance(data, bool):
+        high, above = schema.get("exclusiveMaximum", data + 1), schema.get("exclusiveMinimum", data - 1)
+        return schema.get("minimum", data) <= data and above < data < high
+    return True

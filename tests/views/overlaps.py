@@ -1,0 +1,92 @@
+"""What runs into each other in a figure: boxes of texts and legends, lines, the figure's border; no pixels."""
+
+from itertools import combinations
+
+import numpy as np
+from matplotlib.path import Path
+from matplotlib.transforms import Bbox
+
+CLOSE = 0.5
+"""Pixels by which boxes may touch."""
+
+
+def found(figure):
+    """Return in words every text or legend that meets another, a line, or leaves the figure."""
+    figure.draw_without_rendering()
+    canvas = figure.canvas.get_renderer()
+    axes = [inner for each in figure.axes for inner in (each, *each.child_axes)]
+    texts = {text: _box(text, canvas) for text in _texts(figure, axes) if text.get_visible() and text.get_text()}
+    legends = [each.get_legend() for each in figure.axes if each.get_legend()] + list(figure.legends)
+    boxes = {legend: _box(legend, canvas) for legend in legends}
+    own = {text: legend for legend in legends for text in legend.get_texts()}
+    lines = [(name, path) for each in axes for name, path in _lines(each)]
+    said = [
+        f"{_said(one)} meets {_said(two)}" for one, two in combinations(texts, 2) if texts[one].overlaps(texts[two])
+    ]
+    said += [
+        f"{_said(text)} meets the legend of {_said(legend)}"
+        for text, box in texts.items()
+        for legend, area in boxes.items()
+        if own.get(text) is not legend and box.overlaps(area)
+    ]
+    said += [
+        f"two legends meet: {_said(a)}, {_said(b)}" for a, b in combinations(boxes, 2) if boxes[a].overlaps(boxes[b])
+    ]
+    for thing, box in {**texts, **boxes}.items():
+        said += [f"{_said(thing)} meets {name}" for name, path in lines if path.intersects_bbox(box, filled=False)]
+        if not _inside(box, figure.bbox):
+            said.append(f"{_said(thing)} leaves the figure")
+    return said
+
+
+def _texts(figure, axes):
+    yield from (text for text in (figure._suptitle, figure._supxlabel, *figure.texts) if text)
+    for legend in [*(each.get_legend() for each in axes), *figure.legends]:
+        yield from legend.get_texts() if legend else ()
+    for each in axes:
+        yield from (each.title, each._left_title, each._right_title, *each.texts)
+        for axis in (each.xaxis, each.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            yield from (axis.label, axis.offsetText)
+            for tick in axis.get_major_ticks():
+                if low <= tick.get_loc() <= high:
+                    yield from (tick.label1, tick.label2)
+
+
+def _lines(axes):
+    """Yield curves, levels, marks and the axes' own borders as paths in pixels, with a name each."""
+    for line in axes.lines:
+        points = line.get_transform().transform(line.get_xydata())
+        known = np.isfinite(points).all(axis=1)
+        if line.get_marker() not in ("None", None):
+            half = line.get_markersize() / 2 * axes.figure.dpi / 72
+            for x, y in points[known]:
+                yield (
+                    f"a point of {line.get_label()}",
+                    _rectangle(Bbox.from_extents(x - half, y - half, x + half, y + half)),
+                )
+        for run in np.split(points, np.flatnonzero(~known)):
+            run = run[np.isfinite(run).all(axis=1)]
+            if len(run) > 1 and line.get_linestyle() != "None":
+                yield f"the line {line.get_label()}", Path(run)
+    for name, spine in axes.spines.items():
+        if spine.get_visible():
+            yield f"the {name} border", spine.get_path().transformed(spine.get_transform())
+
+
+def _rectangle(box):
+    return Path([(box.x0, box.y0), (box.x1, box.y0), (box.x1, box.y1), (box.x0, box.y1), (box.x0, box.y0)])
+
+
+def _box(thing, canvas):
+    return thing.get_window_extent(canvas).padded(-CLOSE)
+
+
+def _inside(box, border):
+    return border.x0 <= box.x0 and border.y0 <= box.y0 and box.x1 <= border.x1 and box.y1 <= border.y1
+
+
+def _said(thing):
+    return (
+        repr(thing.get_text()) if hasattr(thing, "get_text") else f"legend {[t.get_text() for t in thing.get_texts()]}"
+    )

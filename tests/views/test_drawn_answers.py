@@ -1,0 +1,75 @@
+"""What a drawing is called: today's machine, the best design, the nearest one where limits are not held."""
+
+import dataclasses
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+import loomopt as lo
+from loomopt.cli import run
+from loomopt.solving.solution import Finding
+from loomopt.views import notebook, outputs, svg
+
+TOO_WIDE = {"limits.swing.min": "30 deg", "limits.swing.max": "31 deg"}
+
+
+@pytest.fixture(scope="module")
+def nearest():
+    """Return an answer that no admissible design exists for."""
+    return lo.solve(lo.load("beatup").update(TOO_WIDE), starts=1)
+
+
+def title(text):
+    """Return an SVG's title, which must stand on its sheet too."""
+    root = ElementTree.fromstring(text)
+    named = root.find("{*}title").text
+    assert named in [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
+    return named
+
+
+def test_todays_machine_is_drawn_as_such(tmp_path, capsys):
+    scene = lo.load("beatup")
+    assert run(["show", "beatup", "--figure", str(tmp_path / "a.svg")]) == 0
+    assert run(["export", "beatup", "--out", str(tmp_path / "b.svg")]) == 0
+    for name in ("a.svg", "b.svg"):
+        assert (tmp_path / name).read_text(encoding="utf-8") == svg.render(outputs.drawing(scene, {}))
+    assert title(svg.render(outputs.drawing(scene, {}))) == "beatup: today's machine"
+
+
+def test_the_nearest_design_of_an_infeasible_target_is_drawn_as_such(nearest, tmp_path):
+    assert nearest.status == "infeasible"
+    outputs.answer(tmp_path / "out", nearest, nearest.scene)
+    drawn = (tmp_path / "out/linkage.svg").read_text(encoding="utf-8")
+    broken = {limit.name for limit in nearest.limits if not limit.ok}
+    said, _, named = title(drawn).partition("; limits not held: ")
+    assert said == "beatup: nearest design for balance"
+    assert set(named.split(", ")) == broken != set()
+    assert "nearest design" in notebook.html(nearest)
+
+
+def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, capsys):
+    (tmp_path / "answer.json").write_text(json.dumps(nearest.as_dict()))
+    arguments = ["export", "beatup", "--design", str(tmp_path / "answer.json"), "--out", str(tmp_path / "a.svg")]
+    assert run(arguments) == 0
+    assert title((tmp_path / "a.svg").read_text(encoding="utf-8")).startswith(
+        "beatup: a given design; limits not held: "
+    )
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        ("optimal", "best design for balance"),
+        ("uncertified", "uncertified design for balance"),
+        ("interrupted", "best design for balance so far, interrupted"),
+        ("failed", "no design for balance found, where the search ended"),
+    ],
+)
+def test_an_answer_says_what_its_design_is(nearest, status, said):
+    held = dataclasses.replace(nearest, status=status, limits=())
+    assert outputs.what(held) == said
+    broken = Finding("swing", 0.5, None, 0.4, ok=False)
+    assert outputs.what(dataclasses.replace(held, limits=(broken,))) == f"{said}; limits not held: swing"
+    rounding = dataclasses.replace(broken, rounding=True)
+    assert outputs.what(dataclasses.replace(held, limits=(rounding,))) == said
