@@ -22,7 +22,7 @@ M3_LIGHT = 76.98110208119851
 
 
 def optimal(scene, target=None):
-    answer = lo.solve(scene, target)
+    answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
     assert answer.certificate.feasibility <= 1e-9
@@ -156,7 +156,7 @@ def test_a_clash_below_what_is_promised_is_none(share):
 
 @pytest.mark.parametrize("share", [1e-8, 1e-7, 1e-6, 1e-3])
 def test_a_clash_above_it_is_never_called_optimal(share):
-    answer = lo.solve(lo.load("shedding").set("bounds.K1.max", f"{K1 * (1 - share)!r} N/m"))
+    answer = lo.solve(lo.load("shedding").set("bounds.K1.max", f"{K1 * (1 - share)!r} N/m"), starts=1)
     assert answer.status in ("infeasible", "failed", "uncertified")
     assert answer.certificate is None or not answer.certificate.passed
 
@@ -170,7 +170,7 @@ def test_a_clash_above_it_is_never_called_optimal(share):
     ],
 )
 def test_a_clash_above_it_is_refused_with_what_would_do(share):
-    answer = lo.solve(lo.load("shedding").set("bounds.K1.max", f"{K1 * (1 - share)!r} N/m"))
+    answer = lo.solve(lo.load("shedding").set("bounds.K1.max", f"{K1 * (1 - share)!r} N/m"), starts=1)
     assert answer.status == "infeasible"
     assert any("K1" in text for text in answer.clash)
     alone = {one.limit: one.needed for one in answer.relaxation if one.alone}

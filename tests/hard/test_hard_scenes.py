@@ -23,7 +23,7 @@ def assert_finite(answer):
 
 
 def optimal(scene, target=None):
-    answer = lo.solve(scene, target)
+    answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
     assert_finite(answer)
@@ -88,7 +88,7 @@ def test_the_rapiers_figures_per_angle_know_no_speed_and_its_force_grows_with_th
 
 def test_1e6_rpm_of_a_cam_is_refused_with_each_limit_that_would_do():
     """K1 as in test_hard_cams; the speed that 1 MN/m survives is certified as the highest for that spring."""
-    answer = lo.solve(lo.load("shedding").set("operation.speed", "1e6 rpm"))
+    answer = lo.solve(lo.load("shedding").set("operation.speed", "1e6 rpm"), starts=1)
     assert answer.status == "infeasible"
     alone = {one.limit: one.needed for one in answer.relaxation if one.alone}
     assert alone["K1"] == pytest.approx(278922581701.12384, rel=1e-9)
@@ -127,7 +127,7 @@ def test_a_four_bar_of_any_size_is_balanced_alike(unit, factor):
 
 def test_lengths_of_km_with_inertias_of_metres_are_certified_or_refused_with_the_reason():
     """A counterweight at 80 km on a reed of 0.62 kg m²: eleven decades between what may be and what is."""
-    answer = lo.solve(sized("beatup-light", "km"))
+    answer = lo.solve(sized("beatup-light", "km"), starts=1)
     assert answer.status in ("optimal", "uncertified")
     assert (answer.status == "optimal") == answer.certificate.passed
     assert answer.certificate.passed or answer.certificate.reasons
@@ -149,7 +149,7 @@ def test_a_rapier_drive_of_any_size_has_the_same_angles(unit, factor):
     ],
 )
 def test_an_answer_of_any_size_prints_as_json_without_nan(problem):
-    text = json.dumps(lo.solve(sized(problem, "um").set("operation.speed", "1e3 rpm")).as_dict(), allow_nan=False)
+    text = json.dumps(lo.solve(sized(problem, "um").set("operation.speed", "1e3 rpm"), starts=1).as_dict(), allow_nan=False)
     assert "NaN" not in text
 
 
@@ -174,7 +174,7 @@ def test_without_resistance_the_reed_can_only_be_made_to_press_less():
 
 @pytest.mark.parametrize("target", ["torque", "retrofit"])
 def test_without_resistance_a_tolerance_of_1_percent_of_it_is_zero_and_refused_by_name(target):
-    answer = lo.solve(lo.load("beatup").set("operation.M0", "0 N*m"), target)
+    answer = lo.solve(lo.load("beatup").set("operation.M0", "0 N*m"), target, starts=1)
     assert answer.status == "infeasible"
     assert any("M3_fdc = 0" in text for text in answer.clash)
     alone = [one.needed for one in answer.relaxation if one.alone and one.limit == "M3_fdc"]
@@ -197,6 +197,6 @@ def test_a_machine_with_a_crank_of_1e_9_of_the_frame_is_evaluated_to_rounding():
 
 @pytest.mark.xfail(reason="natural sizes come from today's torques: uncertified, stationarity 1", strict=True)
 def test_a_crank_of_no_size_today_does_not_spoil_the_optimum():
-    answer = lo.solve(lo.load("beatup").set("mechanism.l1", "167e-9 mm"))
+    answer = lo.solve(lo.load("beatup").set("mechanism.l1", "167e-9 mm"), starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.figures["peak_torque"] == pytest.approx(88.6894134918, rel=1e-9)

@@ -18,7 +18,7 @@ ALIKE = 1e-9
 
 
 def solved(scene, target):
-    answer = lo.solve(scene, target)
+    answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.certificate.passed
     return answer

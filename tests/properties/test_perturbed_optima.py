@@ -35,7 +35,7 @@ OPTIMA = {
 def solved(job, target, changes):
     """Return the program of a task and its optimum, SI."""
     scene = lo.load(job).update(changes)
-    answer, program = lo.solve(scene, target), registry.of(scene).program(scene, target)
+    answer, program = lo.solve(scene, target, starts=1), registry.of(scene).program(scene, target)
     assert answer.status == "optimal", answer.message
     return program, registry.of(scene).values(program, designs.flat(answer.design))
 

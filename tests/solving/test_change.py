@@ -27,7 +27,7 @@ def unsettled(monkeypatch):
     def solve(scene, target=None):
         with monkeypatch.context() as patch:
             patch.setattr(change, "with_least_change", lambda search: search)
-            return lo.solve(scene, target)
+            return lo.solve(scene, target, starts=1)
 
     return solve
 
@@ -120,7 +120,7 @@ def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
 
 
 def test_angles_that_need_not_change_do_not():
-    answer = lo.solve(freed(operation__speed="60 rpm"))
+    answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
     assert degrees(answer) == pytest.approx([120.0, 60.0, 120.0, 60.0], abs=1e-9)
     assert answer.certificate.settled == (f"rise, far_dwell, return: {LEAST}",)
@@ -128,14 +128,14 @@ def test_angles_that_need_not_change_do_not():
 
 
 def test_only_the_angle_that_must_change_changes():
-    answer = lo.solve(freed(operation__speed="60 rpm", bounds__rise__min="125 deg"))
+    answer = lo.solve(freed(operation__speed="60 rpm", bounds__rise__min="125 deg"), starts=1)
     assert degrees(answer) == pytest.approx([125.0, 60.0, 120.0, 55.0], abs=1e-9)
 
 
 def test_no_angles_nearer_to_todays_hold_as_weak_a_spring(unsettled):
     """From rise 100° and return 140°, at a speed at which the spring needs a longer rise."""
     scene = uneven()
-    answer = lo.solve(scene)
+    answer = lo.solve(scene, starts=1)
     widths = {name: scene.bounds[name].max - scene.bounds[name].min for name in ANGLES[:3]}
 
     def far(design):
@@ -157,7 +157,7 @@ def test_no_angles_nearer_to_todays_hold_as_weak_a_spring(unsettled):
 
 def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
     scene = lo.load("shedding").set("operation.speed", "100 rpm")
-    answer = lo.solve(scene, "law")
+    answer = lo.solve(scene, "law", starts=1)
     own = np.array(answer.design["law"])
     todays = 2 * math.pi * np.sin(2 * math.pi * np.arange(17) / 16)
     assert answer.certificate.settled == (f"law: {LEAST}",)
@@ -176,7 +176,7 @@ def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
 
 def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
     scene = lo.load("rapier").update(ROOM)
-    answer, before = lo.solve(scene), unsettled(scene)
+    answer, before = lo.solve(scene, starts=1), unsettled(scene)
     assert answer.certificate.settled == (f"alpha, C0x, C0y, phi40: {LEAST}",)
     assert answer.figures["peak_acceleration"] == pytest.approx(before.figures["peak_acceleration"], rel=1e-9)
     names = ("alpha", "C0x", "C0y", "phi40")
@@ -215,7 +215,7 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
         return after
 
     monkeypatch.setattr(change, "with_least_change", kept)
-    answer = lo.solve(scene, target)
+    answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal"
     assert answer.certificate.settled
     before, after = seen[0]
@@ -225,14 +225,14 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
 @pytest.mark.parametrize(("name", "target"), [("beatup", "balance"), ("beatup-light", "balance"), ("beatup", "pulse")])
 def test_a_counterweight_and_a_common_scale_are_settled_by_their_own_rules(name, target, monkeypatch):
     monkeypatch.setattr(change, "tried", lambda *_: pytest.fail("solved again"))
-    answer = lo.solve(lo.load(name), target)
+    answer = lo.solve(lo.load(name), target, starts=1)
     assert not answer.certificate.unique
     assert answer.certificate.open == ()
 
 
 def test_what_is_left_open_is_said(monkeypatch):
     monkeypatch.setattr(change, "_moved", lambda *_: None)
-    answer = lo.solve(freed(operation__speed="60 rpm"))
+    answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
     assert "Left open, for others are as good: rise, far_dwell, return." in answer.message
     assert answer.as_dict()["certificate"]["settled"] == ["open: rise, far_dwell, return"]

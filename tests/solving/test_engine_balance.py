@@ -30,7 +30,7 @@ def scene_of(M0):
 
 @pytest.fixture(scope="module")
 def answers():
-    return {M0: lo.solve(scene_of(M0)) for M0 in BEST}
+    return {M0: lo.solve(scene_of(M0), starts=1) for M0 in BEST}
 
 
 @each_resistance
@@ -74,7 +74,7 @@ def test_every_random_start_reaches_the_same_design(answers, M0, monkeypatch, re
     reached = []
     for start in drawn:
         monkeypatch.setattr(exchange, "starts", lambda *_, only=start: [only])
-        found = lo.solve(scene)
+        found = lo.solve(scene, starts=1)
         if found.figures["peak_torque"] == pytest.approx(BEST[M0][1], rel=1e-7):
             reached.append(found)
     record_property("share of random starts that reach the best", len(reached) / STARTS)
@@ -101,7 +101,7 @@ def test_the_start_itself_may_be_the_optimum(answers):
 
 @each_resistance
 def test_a_warm_start_from_a_neighbour_ends_where_a_cold_one_does(answers, M0):
-    neighbour = lo.solve(scene_of(M0 + 30))
+    neighbour = lo.solve(scene_of(M0 + 30), starts=1)
     warm = lo.solve(scene_of(M0), near=neighbour)
     assert warm.status == "optimal"
     assert warm.figures["peak_torque"] == pytest.approx(BEST[M0][1], rel=1e-9)
@@ -127,7 +127,7 @@ def test_a_balanced_machine_is_called_balanced(answers):
 
 @pytest.mark.parametrize("accuracy", [1e-11, 1e-4])
 def test_accuracy_asked_for_is_accuracy_given(accuracy):
-    answer = lo.solve(scene_of(745), accuracy=accuracy)
+    answer = lo.solve(scene_of(745), accuracy=accuracy, starts=1)
     assert answer.status == "optimal"
     assert answer.certificate.violation <= accuracy
     assert answer.figures["peak_torque"] == pytest.approx(BEST[745][1], rel=max(1e-9, accuracy))
@@ -139,12 +139,12 @@ def test_accuracy_asked_for_is_accuracy_given(accuracy):
 @pytest.mark.parametrize("pulse", [295, 300, 302.5, 305, 310, 315, 318, 320])
 def test_a_pulse_that_settles_the_first_level_is_certified(pulse):
     scene = lo.load("beatup").set("limits.pulse_rms.max", f"{pulse} N*m")
-    answer = lo.solve(scene)
+    answer = lo.solve(scene, starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.figures["pulse_rms"] == pytest.approx(pulse, rel=1e-9)
     assert Machine(scene).excess(answer.design) <= 1e-9
     price = next(price for price in answer.binding if price.limit == "pulse_rms")
-    looser = lo.solve(scene.set("limits.pulse_rms.max", f"{pulse + 0.01} N*m"))
+    looser = lo.solve(scene.set("limits.pulse_rms.max", f"{pulse + 0.01} N*m"), starts=1)
     gained = abs(answer.figures["M3_fdc"]) - abs(looser.figures["M3_fdc"])
     assert gained / 0.01 == pytest.approx(price.worth["M3_fdc"], rel=1e-3)
 
@@ -157,7 +157,7 @@ def test_a_variable_of_the_task_may_come_first(monkeypatch):
     size = next(v.scale for v in program.variables if v.name == "s")
     changed = replace(program, objectives=(Objective("s", "s", "value", size), *program.objectives))
     monkeypatch.setattr(type(job), "program", lambda *_: changed)
-    answer = lo.solve(scene, "torque")
+    answer = lo.solve(scene, "torque", starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.figures["M3_fdc"] == pytest.approx(8.0, rel=1e-9)
     assert answer.design["m4e"] * answer.design["r4e"] ** 2 < 0.02
@@ -169,7 +169,7 @@ def test_a_variable_of_the_task_may_come_first(monkeypatch):
 def test_a_generous_bound_of_the_counterweight_spoils_no_answer(bound, most, effect):
     scene = lo.load("beatup").set(f"bounds.{bound}.max", most)
     scene = scene.with_effect(effect) if effect else scene
-    answer, plain = lo.solve(scene), lo.solve(lo.load("beatup").with_effect(effect) if effect else lo.load("beatup"))
+    answer, plain = lo.solve(scene, starts=1), lo.solve(lo.load("beatup").with_effect(effect) if effect else lo.load("beatup"), starts=1)
     assert answer.status == "optimal", answer.message
     assert abs(answer.figures["M3_fdc"]) <= abs(plain.figures["M3_fdc"]) + 1e-9
     assert answer.figures["peak_torque"] <= plain.figures["peak_torque"] * (1 + 1e-9), "more room is no loss"

@@ -38,7 +38,7 @@ def optimum(problem, target):
     """Return the program of a packaged task and its optimum."""
     scene = lo.load(problem)
     program = registry.of(scene).program(scene, target)
-    answer = lo.solve(scene, target)
+    answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal"
     return program, answer.point.x
 

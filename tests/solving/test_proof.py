@@ -55,7 +55,7 @@ KEPT = {
 
 @functools.cache
 def solved(name, target=None):
-    return lo.solve(lo.load(name), target)
+    return lo.solve(lo.load(name), target, starts=1)
 
 
 @functools.cache
@@ -146,7 +146,7 @@ def test_proofs_take_no_longer_than_the_solves_they_follow():
             taken.append(time.perf_counter() - began)
         return min(taken)
 
-    yardstick = least(lambda: lo.solve(lo.load("rapier")))
+    yardstick = least(lambda: lo.solve(lo.load("rapier"), starts=1))
     for name in JOBS:
         scene, design = lo.load(name), solved(name).design
         assert least(functools.partial(lo.prove, scene, design)) < 3 * yardstick, name
@@ -340,14 +340,14 @@ def test_what_the_boxes_do_not_decide_is_undecided_and_does_not_pass(monkeypatch
     assert "peak peak_torque" in open_ones
     assert not proofs.passed
     assert violated(proofs) == set()
-    answer = lo.solve(scene, prove=True)
+    answer = lo.solve(scene, prove=True, starts=1)
     assert (answer.status, answer.certificate.passed) == ("uncertified", False)
     assert "peak_torque as claimed is undecided" in answer.message
 
 
 @pytest.mark.parametrize("name", JOBS)
 def test_solve_with_prove_says_that_the_cycle_is_proven_and_changes_nothing_else(name):
-    answer, before = lo.solve(lo.load(name), prove=True), solved(name)
+    answer, before = lo.solve(lo.load(name), prove=True, starts=1), solved(name)
     assert (answer.status, answer.certificate.passed, answer.certificate.whole_cycle) == ("optimal", True, "proven")
     assert before.certificate.whole_cycle in ("refined", "bounded")
     assert (answer.design, answer.figures) == (before.design, before.figures)
@@ -404,7 +404,7 @@ def test_a_free_law_is_proven_with_its_own_knots_whatever_the_target_has(interva
 
 def test_the_coils_of_an_answer_are_proven_and_a_wire_too_thin_is_not():
     scene = lo.load("shedding-printed-travel").with_effect("coil")
-    answer = lo.solve(scene, prove=True)
+    answer = lo.solve(scene, prove=True, starts=1)
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "proven")
     proofs = lo.prove(scene, answer.design)
     rows = {"coil_index", "shear_share", "bending_share", "surge_ratio", "spring_length", "coils give K1"}
@@ -436,20 +436,20 @@ def test_a_design_is_judged_by_its_own_numbers_whether_the_target_chooses_them_o
 
 
 def test_a_free_sleys_answer_is_proven_without_freeing_it_again():
-    answer = lo.solve(lo.load("rapier").free(["sley"]))
+    answer = lo.solve(lo.load("rapier").free(["sley"]), starts=1)
     assert all(each.ok for each in lo.evaluate(lo.load("rapier"), answer.design).limits)
     assert lo.prove(lo.load("rapier"), answer.design).passed
 
 
 def test_a_free_cams_answer_is_proven_without_freeing_it_again():
     freed_angles = lo.load("shedding").free(["rise", "far_dwell", "return", "near_dwell"])
-    assert lo.prove(lo.load("shedding"), lo.solve(freed_angles).design).passed
+    assert lo.prove(lo.load("shedding"), lo.solve(freed_angles, starts=1).design).passed
 
 
 def test_a_looser_limit_of_the_same_name_hides_none():
     """The target's own tolerance of 7.45 N*m beside 20 N*m in [limits], a design with 8 N*m."""
     scene = lo.load("beatup").set("limits.M3_fdc.max", "20 N*m")
-    design = lo.solve(lo.load("beatup").set("targets.torque.M3_tolerance", "8 N*m"), "torque").design
+    design = lo.solve(lo.load("beatup").set("targets.torque.M3_tolerance", "8 N*m"), "torque", starts=1).design
     statuses = {proof.text: proof.status for proof in lo.prove(scene, design, "torque").proofs}
     assert statuses["M3_fdc <= 20 N*m"] == "proven"
     assert statuses["M3_fdc <= 7.45 N*m"] == "violated"

@@ -23,7 +23,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def longest(scene):
-    return lo.solve(scene, "dwell")
+    return lo.solve(scene, "dwell", starts=1)
 
 
 def test_longest_dwell_is_held_on_both_sides_at_the_exact_stroke(scene, longest):
@@ -37,7 +37,7 @@ def test_longest_dwell_is_held_on_both_sides_at_the_exact_stroke(scene, longest)
 
 def test_longest_dwell_lies_between_what_exists_and_what_does_not(scene, longest):
     near = math.radians(0.2)
-    shorter, longer = (lo.solve(dwelling(scene, longest.figures["dwell"] + change)) for change in (-near, near))
+    shorter, longer = (lo.solve(dwelling(scene, longest.figures["dwell"] + change), starts=1) for change in (-near, near))
     assert shorter.status == "optimal"
     assert Drive(scene, shorter.design).stray(*[longest.figures["dwell"] - near] * 2) <= 6e-3 * (1 + 1e-9)
     assert longer.status == "infeasible"
@@ -77,7 +77,7 @@ def test_longer_dwells_cost_acceleration_throughout_the_table(scene, table):
 
 def test_table_of_dwells_is_what_cold_solves_give(scene, table):
     for place in (0, 5, 10):
-        cold = lo.solve(dwelling(scene, math.radians(TABLE[place])))
+        cold = lo.solve(dwelling(scene, math.radians(TABLE[place])), starts=1)
         assert cold.figures["peak_acceleration"] == pytest.approx(table[place].figures["peak_acceleration"], rel=1e-8)
 
 

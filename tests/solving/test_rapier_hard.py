@@ -55,27 +55,27 @@ def test_what_cannot_be_had_is_said_with_relaxations_that_help(name):
     scene = lo.load("rapier").update(HARD[name])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        answer = lo.solve(scene)
+        answer = lo.solve(scene, starts=1)
     assert answer.status == "infeasible", answer.message
     assert not answer.admissible
     assert all(math.isfinite(value) for value in numbers(answer))
     assert answer.relaxation
     together = [one for one in answer.relaxation if not one.alone] or [answer.relaxation[0]]
-    helped = lo.solve(granted(scene, together, 1e-3))
+    helped = lo.solve(granted(scene, together, 1e-3), starts=1)
     assert helped.status in ("optimal", "uncertified"), helped.message
     assert helped.admissible
 
 
 def test_a_design_that_no_start_leads_to_is_found_from_todays_machine():
     """No drive with so short a link closes near any start; the least relaxation is none: solve from there."""
-    answer = lo.solve(lo.load("rapier").update({"bounds.l5": {"min": "50 mm", "max": "120 mm"}}))
+    answer = lo.solve(lo.load("rapier").update({"bounds.l5": {"min": "50 mm", "max": "120 mm"}}), starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.design["l5"] == pytest.approx(0.120, rel=1e-9)
 
 
 def test_a_transmission_angle_of_80_degrees_is_bought_with_acceleration():
     scene = lo.load("rapier")
-    steep, plain = lo.solve(scene.set("limits.mu_min.min", "80 deg")), lo.solve(scene)
+    steep, plain = lo.solve(scene.set("limits.mu_min.min", "80 deg"), starts=1), lo.solve(scene, starts=1)
     assert steep.status == "optimal"
     assert steep.figures["mu_min"] >= math.radians(80) - 1e-9
     assert steep.figures["peak_acceleration"] > plain.figures["peak_acceleration"]
@@ -84,7 +84,7 @@ def test_a_transmission_angle_of_80_degrees_is_bought_with_acceleration():
 def test_a_drive_that_is_fixed_altogether_is_told_its_own_stroke():
     scene = lo.load("rapier")
     fixed = {f"bounds.{name}": scene.given(f"mechanism.{name}") for name in scene.bounds if scene.bounds[name].free}
-    answer = lo.solve(scene.update(fixed))
+    answer = lo.solve(scene.update(fixed), starts=1)
     assert answer.status == "infeasible"
     relaxation = answer.relaxation[0]
     assert relaxation.limit == "stroke"
@@ -116,7 +116,7 @@ TABLES = {
 def test_a_table_that_cannot_be_matched_is_refused(tmp_path, name):
     text, part = TABLES[name]
     with pytest.raises(BadInput, match=part) as refused:
-        lo.solve(wished(tmp_path, text), "match")
+        lo.solve(wished(tmp_path, text), "match", starts=1)
     assert "\n" not in str(refused.value)
 
 
@@ -136,13 +136,13 @@ def other():
 def test_a_drives_own_travel_is_recovered(tmp_path, every):
     """To 1e-7 m of 0.85 m: the mean square is then at rounding, its root is not."""
     scene = lo.load("rapier") if every == 18 else other()
-    answer = lo.solve(wished(tmp_path, travels(scene, every)), "match")
+    answer = lo.solve(wished(tmp_path, travels(scene, every)), "match", starts=1)
     assert answer.status == "optimal", answer.message
     assert answer.figures["match_rms"] < 1e-7
 
 
 def test_a_second_table_is_matched_and_not_the_first(tmp_path):
     for scene in (lo.load("rapier"), other()):
-        answer = lo.solve(wished(tmp_path, travels(scene, 20)), "match")
+        answer = lo.solve(wished(tmp_path, travels(scene, 20)), "match", starts=1)
         assert answer.status == "optimal", answer.message
         assert answer.figures["match_rms"] < 1e-7

@@ -27,7 +27,7 @@ RATE = "coils give K1"
 def coiled(name="shedding-printed-travel", target=None, **changes):
     """Return the answer of a packaged scene with coils; in keys, __ stands for a dot."""
     scene = lo.load(name).with_effect("coil")
-    return lo.solve(scene.update({key.replace("__", "."): value for key, value in changes.items()}), target)
+    return lo.solve(scene.update({key.replace("__", "."): value for key, value in changes.items()}), target, starts=1)
 
 
 def loosened(answer, relaxation, more):
@@ -165,10 +165,10 @@ def test_the_least_relaxations_help_when_granted_and_not_when_cut_short(name, ch
     alone = [relaxation for relaxation in answer.relaxation if relaxation.alone]
     assert "speed" in [relaxation.limit for relaxation in alone]
     for relaxation in alone:
-        helped = lo.solve(loosened(answer, relaxation, 1e-3))
+        helped = lo.solve(loosened(answer, relaxation, 1e-3), starts=1)
         assert helped.status == "optimal", relaxation.text
     shortest = next(relaxation for relaxation in alone if relaxation.limit == "speed")
-    assert lo.solve(loosened(answer, shortest, -1e-3)).status == "infeasible"
+    assert lo.solve(loosened(answer, shortest, -1e-3), starts=1).status == "infeasible"
 
 
 def test_the_fastest_cam_that_any_coil_keeps_up_with_is_that_found_by_hand():
@@ -244,7 +244,7 @@ def test_the_least_peak_force_with_coils_is_less_than_with_the_softest_of_them()
     assert answer.design["wire"] in WIRES
     assert answer.design["wire"] == 0.0075
     assert all(limit.ok for limit in answer.limits)
-    free = lo.solve(lo.load("shedding-printed-travel"), "force").figures["contact_max"]
+    free = lo.solve(lo.load("shedding-printed-travel"), "force", starts=1).figures["contact_max"]
     assert free < answer.figures["contact_max"] < softer.figures["contact_max"]
     v = answer.design
     assert v["K1"] == pytest.approx(2 * rate(STEEL, v["wire"], v["diameter"], v["turns"]), rel=1e-9)
@@ -302,7 +302,7 @@ def machine(seed):
 @pytest.mark.parametrize("seed", range(12))
 def test_coils_of_random_machines_are_the_softest_and_then_the_lightest_that_are_sold(seed):
     case = machine(seed)
-    answer, contact = lo.solve(product(case).with_effect("coil")), Contact(case)
+    answer, contact = lo.solve(product(case).with_effect("coil"), starts=1), Contact(case)
     by_hand = {wire: K1 for wire in SOLD if (K1 := softest(STEEL, contact, wire))}
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "bounded")
     assert answer.design["wire"] in WIRES

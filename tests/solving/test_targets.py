@@ -28,7 +28,7 @@ def answer_of():
 
     def solved(M0, target):
         if (M0, target) not in known:
-            known[M0, target] = lo.solve(scene_of(M0), target)
+            known[M0, target] = lo.solve(scene_of(M0), target, starts=1)
         return known[M0, target]
 
     return solved
@@ -79,7 +79,7 @@ def test_torque_is_the_best_slsqp_finds(answer_of, M0):
 @pytest.mark.parametrize("weights", [{}, {"l1": 50.0, "m4e": 0.1}], ids=["equal", "weighted"])
 def test_retrofit_is_the_best_slsqp_finds(M0, weights):
     scene = scene_of(M0).update({f"targets.retrofit.weights.{name}": value for name, value in weights.items()})
-    machine, ours = Machine(scene), lo.solve(scene, "retrofit")
+    machine, ours = Machine(scene), lo.solve(scene, "retrofit", starts=1)
     squares, balanced = change(machine, weights), [lambda d: machine.static(d)["M3_fdc"] / 100]
     ends = [least(machine, squares, start, equal=balanced) for start in random_designs(machine, STARTS, 3)]
     theirs = best([squares(end) if end else None for end in ends])
@@ -94,8 +94,8 @@ def test_retrofit_is_the_best_slsqp_finds(M0, weights):
 @pytest.mark.parametrize("kept", ["l1", "l2", "l3", "l4"])
 def test_a_heavy_weight_keeps_a_length_as_it_is_today(kept):
     scene = scene_of(745)
-    today, plain = scene.mechanism[kept], lo.solve(scene, "retrofit").design[kept]
-    heavy = lo.solve(scene.set(f"targets.retrofit.weights.{kept}", 1e6), "retrofit")
+    today, plain = scene.mechanism[kept], lo.solve(scene, "retrofit", starts=1).design[kept]
+    heavy = lo.solve(scene.set(f"targets.retrofit.weights.{kept}", 1e6), "retrofit", starts=1)
     assert heavy.status == "optimal"
     assert abs(heavy.design[kept] - today) <= 1e-4 * abs(plain - today)
     assert abs(heavy.figures["M3_fdc"]) <= 1e-9 * 745
@@ -104,14 +104,14 @@ def test_a_heavy_weight_keeps_a_length_as_it_is_today(kept):
 
 @pytest.mark.parametrize("tolerance", ["0 N*m", "1 N*m", "20 N*m"])
 def test_torque_keeps_the_tolerance_it_is_given(tolerance):
-    answer = lo.solve(scene_of(745).set("targets.torque.M3_tolerance", tolerance), "torque")
+    answer = lo.solve(scene_of(745).set("targets.torque.M3_tolerance", tolerance), "torque", starts=1)
     room = float(tolerance.split()[0])
     assert answer.status == "optimal"
     assert answer.figures["M3_fdc"] == pytest.approx(room, abs=1e-9 * 745), "more reed torque always buys peak torque"
 
 
 def test_torque_without_tolerance_is_the_balance_of_two_levels(answer_of):
-    firm = lo.solve(scene_of(745).set("targets.torque.M3_tolerance", "0 N*m"), "torque")
+    firm = lo.solve(scene_of(745).set("targets.torque.M3_tolerance", "0 N*m"), "torque", starts=1)
     assert firm.figures["peak_torque"] == pytest.approx(answer_of(745, "balance").figures["peak_torque"], rel=1e-9)
 
 
@@ -138,7 +138,7 @@ def solved_with(scene, target, limit, side, value):
     unit = {"m4e": "kg", "M3_fdc": "N*m", "swing": "rad", "theta": "rad", "mu_min": "rad"}.get(limit, "m")
     key = f"{'bounds' if limit in DESIGN else 'limits'}.{limit}.{side}"
     key = "targets.torque.M3_tolerance" if limit == "M3_fdc" else key
-    answer = lo.solve(scene.set(key, f"{value!r} {unit}"), target)
+    answer = lo.solve(scene.set(key, f"{value!r} {unit}"), target, starts=1)
     assert answer.status == "optimal"
     return answer
 
@@ -203,7 +203,7 @@ def test_worth_of_a_fixed_value_has_the_sign_of_its_side(key, value):
 
     def fixed(at):
         held = f"{at!r} {unit}"
-        return lo.solve(scene.set(key, held if unit == "m" else {"min": held, "max": held}))
+        return lo.solve(scene.set(key, held if unit == "m" else {"min": held, "max": held}), starts=1)
 
     (price,) = [price for price in fixed(value).binding if price.limit == name]
     outward = step if price.side == "max" else -step
