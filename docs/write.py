@@ -19,7 +19,7 @@ from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.solving.words import Words
 from loomopt.tables import rows
-from loomopt.views import glossary, svg
+from loomopt.views import glossary, outputs, svg
 from loomopt.views.layout import Grid
 
 DOCS = Path(__file__).parent
@@ -59,8 +59,11 @@ def table(grid: Grid) -> str:
 
 def sketches() -> dict[str, str]:
     """Return the drawing of each job's packaged machine, by file name, as SVG."""
-    names = registry.own_names()
-    return {f"sketch-{name}.svg": svg.render(api.evaluate(name).draw().drawing) for name in names}
+    found = {}
+    for name in registry.own_names():
+        scene = registry.load(name)
+        found[f"sketch-{name}.svg"] = svg.render(outputs.drawing(scene, glossary.sketched(scene), "sketch"))
+    return found
 
 
 def output(words: str) -> list[str]:

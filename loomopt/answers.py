@@ -16,11 +16,12 @@ MOST_TOLD, LONGEST_TOLD = 8, 200
 
 
 class Handed(NamedTuple):
-    """What a design file brings: a design, unchecked; the scene it holds in; its target, where it names one."""
+    """What a design file brings: a design, unchecked; the scene it holds in; an answer's target and status."""
 
     design: object
     scene: Scene
     target: str | None = None
+    status: str | None = None
 
 
 def read(path: Path, scene: Scene) -> Handed:
@@ -31,7 +32,9 @@ def read(path: Path, scene: Scene) -> Handed:
     target, own = data.get("target"), data.get("scene")
     if target is not None and not isinstance(target, str):
         raise refusal("the target is no name", str(path), "target", target, remedy="Correct it or take it out")
-    return Handed(data["design"], scene if own is None else _resumed(own, scene, str(path)), target)
+    status = data.get("status")
+    whole = scene if own is None else _resumed(own, scene, str(path))
+    return Handed(data["design"], whole, target, status if isinstance(status, str) else None)
 
 
 def _resumed(own: object, scene: Scene, origin: str) -> Scene:

@@ -23,7 +23,7 @@ import typer  # noqa: E402
 from loomopt import commands, interrupts  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
-from loomopt.shell import DIFFERS, Progress, mistake, read_number, read_scene, remark, worded  # noqa: E402
+from loomopt.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded  # noqa: E402
 
 UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
@@ -61,7 +61,9 @@ def solve(
     gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
     seconds: Annotated[str, typer.Option("--time", metavar="S", help="How long --global may take, s.")] = "60",
     as_json: Json = False,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write answer, tables and drawing there.")] = None,
+    outs: Annotated[
+        list[Path] | None, typer.Option("--out", metavar="DIR", help="Write answer, tables and drawing there.")
+    ] = None,
 ) -> None:
     """Solve a problem and certify the answer."""
     from loomopt import api
@@ -73,6 +75,7 @@ def solve(
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
     settings |= {"prove": proven, "everywhere": everywhere}
+    out = only("--out", outs)
     if out:
         from loomopt.views import outputs
 

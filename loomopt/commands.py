@@ -98,7 +98,7 @@ def show(
     equations: Annotated[bool, typer.Option("--equations", help="Print the equations the scene really uses.")] = False,
     symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
     sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
-    figure: Annotated[Path | None, typer.Option(metavar="F", help="Draw the mechanism: .png, .svg or .pdf.")] = None,
+    figure: Annotated[list[Path] | None, typer.Option(metavar="F", help="Draw it: .png, .svg or .pdf.")] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -107,9 +107,9 @@ def show(
     from loomopt.views import glossary, layout, outputs, scene_view
 
     scene = read_scene(problem, sets, on, off)
-    if figure:
-        outputs.picture(figure, scene, {})
-        remark(f"Wrote {figure}")
+    for path in figure or ():
+        outputs.picture(path, scene, {})
+        remark(f"Wrote {path}")
     shown: list[str | layout.Grid] = [*scene_view.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
     shown += glossary.printed(scene) if sources else []
@@ -129,7 +129,7 @@ def evaluate(
     """Show the figures of a design (today's without one)."""
     from loomopt import api
 
-    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
     found = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
@@ -154,7 +154,7 @@ def prove(
     from loomopt import api
     from loomopt.views import layout, outputs, terminal
 
-    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
     with Progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
@@ -181,15 +181,17 @@ def simulate(
     off: Without = None,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
+    from loomopt import api
     from loomopt.solving.asked import check_numbers
     from loomopt.views import layout, outputs, scene_view
 
-    scene, given, name = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, status = read_asked(problem, design, target, sets, on, off)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else ""
     for path in out or ():
-        outputs.curves(path, scene, given, asked, name)
+        outputs.curves(path, scene, given, asked, name, said)
         remark(f"Wrote {path}")
     if not out:
         layout.show(*scene_view.curves(scene, given, layout.width()))
@@ -197,7 +199,9 @@ def simulate(
 
 def export(
     problem: Problem,
-    out: Annotated[Path, typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for joints or profile.")],
+    out: Annotated[
+        list[Path], typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for joints or profile; any number.")
+    ],
     design: Design = None,
     target: Target = None,
     sets: Set = None,
@@ -208,10 +212,11 @@ def export(
     from loomopt import api
     from loomopt.views import outputs
 
-    scene, given, name = read_asked(problem, design, target, sets, on, off)
-    said = outputs.what(api.evaluate(scene, given, name)) if given else ""
-    outputs.linkage(out, scene, given, said)
-    remark(f"Wrote {out}")
+    scene, given, name, status = read_asked(problem, design, target, sets, on, off)
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given else ""
+    for path in out:
+        outputs.linkage(path, scene, given, said)
+        remark(f"Wrote {path}")
     remarked(scene, given)
 
 

@@ -58,7 +58,7 @@ class Evaluation(solution.Evaluation, showing.Shown):
         """
         from loomopt.views import outputs
 
-        return outputs.plot(self.scene, self.design, self.target, None if path is None else Path(path))
+        return outputs.plot(self, self.scene, self.target, None if path is None else Path(path))
 
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""

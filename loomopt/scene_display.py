@@ -63,8 +63,11 @@ def units(
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:
-    """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity."""
-    kind = next((kind for kind, unit in SI_UNIT.items() if unit == si), None)
+    """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
+
+    What swings stays in rad/s, whatever unit the shaft's speed has.
+    """
+    kind = next((kind for kind, unit in SI_UNIT.items() if unit == si and kind != "angular speed"), None)
     return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
 
 

@@ -95,11 +95,15 @@ def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: l
 
 
 class Asked(NamedTuple):
-    """What a command line asks of a design: the scene it holds in, the design (SI; none for today's), the target."""
+    """What a command line asks of a design: the scene it holds in, the design (SI; none for today's), the target.
+
+    status: of an answer in its own scene and for its own target, as its file says.
+    """
 
     scene: "Scene"
     design: dict[str, float]
     target: str | None
+    status: str | None = None
 
 
 def read_asked(
@@ -119,7 +123,7 @@ def read_asked(
 
     scene = load(problem)
     if design is None:
-        scene, given, name = changed(scene, sets, on, off), dict[str, float](), target
+        scene, given, name, status = changed(scene, sets, on, off), dict[str, float](), target, None
     else:
         from loomopt import answers, designs
         from loomopt.scene_errors import clean
@@ -128,11 +132,21 @@ def read_asked(
         own = answers.changes(scene, handed.scene)
         scene = changed(handed.scene, sets, on, off)
         given, name = designs.checked(handed.design, scene, str(design)), target or handed.target
+        status = handed.status if name == handed.target and not (sets or on or off) else None
         if own:
             here = [*(sets or ()), *(f"{each} on" for each in on or ()), *(f"{each} off" for each in off or ())]
             then = f"; then, of this call: {', '.join(clean(each, 80) for each in here)}" if here else ""
             remark(f"Remark: the scene is that of {clean(str(design))}: {', '.join(own)}{then}.")
-    return Asked(scene, given, target_name(scene, name) if name else None)
+    return Asked(scene, given, target_name(scene, name) if name else None, status)
+
+
+def only(option: str, given: list[Path] | None) -> Path | None:
+    """Return the one path that an option gives; None without it. Raises BadInput where it is given more than once."""
+    from loomopt.scene_errors import refusal
+
+    if given and len(given) > 1:
+        raise refusal("it is given more than once", key=option, origin="", remedy="Give it once")
+    return given[0] if given else None
 
 
 def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:

@@ -1,6 +1,8 @@
 """Answers and curves as pandas tables; column names carry their unit in ASCII, every table its provenance."""
 
 import functools
+import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
@@ -24,14 +26,14 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     """Return one row per design variable and figure: today, design, limits and unit, in the scene's display units.
 
     binds: the side, min or max, on which a solved design's limit binds; reached: yes or no
-    where the target asks what may be out of reach.
+    where the target asks what may be out of reach. Of an evaluated design, today's machine is not among them.
     """
     from loomopt.table_frame import TableFrame
 
     found = rows(solution, scene)
-    left_out = {"reached"} if not solution.reached else set()
+    left_out = {"reached"} if not solution.reached else set[str]()
     if not isinstance(solution, Solution):
-        left_out.add("binds")
+        left_out |= {"binds", "today"}
     frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in found])
     more = {}
     if isinstance(solution, Solution):
@@ -59,11 +61,18 @@ def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -
         old = {**before.design, **before.figures}.get(name) if before else None
         low, high = (limit.min, limit.max) if limit else (None, None)
         numbers = {"today": old, "design": value, "min": low, "max": high}
-        shown = {column: None if number is None else number / size for column, number in numbers.items()}
+        shown = {column: None if number is None else _as_written(number, size) for column, number in numbers.items()}
         marks = {"binds": binding.get(name, ""), "reached": REACHED[solution.reached.get(name)]}
         found.append({"name": name, "unit": unit, **shown, "ok": limit.ok if limit else True, **marks})
         found += _per_second(found[-1], words.kind(name), scene, solution.design.get("speed"))
     return _without_rounding(found)
+
+
+def _as_written(value: float, size: float) -> float:
+    """Return an SI value in units of a size: with 15 digits where these are the same value, as 23.4 is for 23.4 deg."""
+    exact = value / size
+    short = float(f"{exact:.15g}")
+    return short if math.isclose(short * size, value, rel_tol=sys.float_info.epsilon) else exact
 
 
 PER_SECOND = {"travel acceleration": ("acceleration", 2), "travel jerk": ("jerk", 3)}

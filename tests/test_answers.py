@@ -61,7 +61,7 @@ def test_a_whole_answer_brings_its_scene_and_its_target(answer, file):
 def test_a_design_alone_holds_in_the_scene_at_hand(tmp_path, content):
     place = tmp_path / "design.json"
     place.write_text(json.dumps(content))
-    assert answers.read(place, SCENE) == ({"l1": 0.03}, SCENE, None)
+    assert tuple(answers.read(place, SCENE)) == ({"l1": 0.03}, SCENE, None, None)
 
 
 def test_what_an_answers_scene_has_otherwise_is_told_with_what_the_file_says():

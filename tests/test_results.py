@@ -42,7 +42,8 @@ def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, 
     assert isinstance(figure, Figure)
     assert isinstance(figure, ShownFigure)
     assert figure._repr_png_().startswith(PNG)
-    assert figure.get_suptitle() == f"{found.scene.name}: design for {found.target}, curves over the cycle"
+    of = "best design for balance" if isinstance(found, lo.Answer) else "a given design, limits not held"
+    assert figure.get_suptitle() == f"{found.scene.name}: {of}, curves over the cycle"
     assert len(figure.axes) >= len(found.curves().columns) / 3
     assert ElementTree.parse(tmp_path / "curves.svg").getroot().tag.endswith("svg")
     with pytest.raises(lo.BadInput):

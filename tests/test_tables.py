@@ -93,6 +93,13 @@ def test_without_a_speed_motion_stands_per_radian_only():
     assert not [name for name in table.index if name.endswith("_t")]
 
 
+def test_bounds_come_back_as_they_were_given():
+    scene = SCENE.update({"bounds.l2.max": "3.34646 in", "limits.swing.max": "23.4 deg", "display.length": "in"})
+    table = lo.evaluate(scene).table()
+    assert (table.loc["l2", "max"], table.loc["swing", "max"], table.loc["theta", "min"]) == (3.34646, 23.4, -2.2)
+    assert "today" not in table.columns, "of an evaluated design, there is nothing beside it"
+
+
 def test_csv_reads_back_to_the_last_digit(answer):
     for frame in (lo.simulate(SCENE), answer.table()):
         back = pd.read_csv(io.StringIO(tables.csv(frame)), comment="#", dtype=str)

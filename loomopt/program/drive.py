@@ -8,8 +8,13 @@ from loomopt.schema import Figure
 
 TORQUE, POWER = "peak_torque", "peak_power"
 FIGURES = (
-    Figure(TORQUE, "torque", "peak crank torque over the cycle", sides=("max",)),
-    Figure(POWER, "power", "peak motor power over the cycle, crank torque times speed", sides=("max",)),
+    Figure(TORQUE, "torque", "peak |crank torque| over the cycle", sides=("max",)),
+    Figure(
+        POWER,
+        "power",
+        "peak |motor power| over the cycle, driving or braking: crank torque times speed",
+        sides=("max",),
+    ),
 )
 
 

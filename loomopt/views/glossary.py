@@ -1,5 +1,6 @@
 """Every symbol that a table shows, in words, and every figure that a source prints."""
 
+import math
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -120,12 +121,18 @@ def _derivative(name: str) -> str:
     return ""
 
 
+def sketched(scene: Scene) -> dict[str, float]:
+    """Return the design, SI, that a sketch shows: today's, and what is 0 today in the middle of its bounds."""
+    bounds = {name: bound for name, bound in scene.bounds.items() if scene.mechanism.get(name) == 0.0}
+    return {name: (bound.min + bound.max) / 2 for name, bound in bounds.items() if bound.max < math.inf}
+
+
 def labels(scene: Scene) -> frozenset[str]:
-    """Return the symbols that the drawing of today's machine names; none where it cannot be drawn."""
+    """Return the symbols that the sketch of a scene names; none where it cannot be drawn."""
     views = registry.of(scene).views
     if views.missing(scene):
         return frozenset()
-    texts = {part.text for part in views.linkage(scene, {}).primitives if isinstance(part, Text)}
+    texts = {part.text for part in views.linkage(scene, sketched(scene)).primitives if isinstance(part, Text)}
     named = {name for text in texts for name in re.findall(r"(\w+) = ", text)}
     return frozenset(named | {name for name, letter in GREEK.items() if letter in named})
 
@@ -140,7 +147,8 @@ def printed(scene: Scene) -> list[str | Grid]:
     why = tuple((each.key, each.item, each.inputs, each.remark) for each in source.figures)
     return [
         source.citation,
-        "The suite computes every one of these figures again.",
+        "The source's own machines, in its units, whatever this scene has otherwise. The suite computes every one of "
+        "these figures again.",
         Grid("Printed and computed", ("figure", "printed", "computed", "unit", "verdict"), lines, right=(1, 2)),
         Grid("What each is, from what, and why", ("figure", "what it is", "from", "why"), why),
     ]

@@ -153,15 +153,20 @@ def _without_null(part: Json) -> Json:
 
 
 def _hoisted(whole: Json) -> Json:
-    """Return a schema in which each kind of quantity stands once, under $defs; a place keeps its own description."""
+    """Return a schema in which each kind of quantity stands once, under $defs; a place keeps its own description.
+
+    Defaults are SI numbers inside, where a scene has text with a unit: they are not told.
+    """
     kinds: dict[str, Json] = {}
 
     def hoist(part: Json) -> Json:
         if QUANTITY not in part:
             return _each(part, hoist)
-        own: Json = {key: part[key] for key in ("description", "default") if key in part}
+        own: Json = {key: part[key] for key in ("description",) if key in part}
         name = re.sub(r"\W+", "_", part[QUANTITY])
-        kinds.setdefault(name, {key: value for key, value in part.items() if key not in (QUANTITY, "title", *own)})
+        kinds.setdefault(
+            name, {key: value for key, value in part.items() if key not in (QUANTITY, "title", "default", *own)}
+        )
         return {"$ref": f"#/$defs/{name}", **own}
 
     return {**hoist(whole), "$defs": kinds}

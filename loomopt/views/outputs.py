@@ -37,6 +37,7 @@ FOUND = {
     "interrupted": "best design for {} so far, interrupted",
 }
 """What an answer's design is, by its status and target."""
+BROKEN = "; limits not held: "
 
 
 def document(found: Evaluation) -> str:
@@ -121,10 +122,17 @@ def _no_folder(folder: Path, reason: str) -> BadInput:
     return BadInput(f"the answer cannot be written there: {reason}", file=str(folder), key="--out", remedy=remedy)
 
 
-def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = None, target: str | None = None) -> None:
+def curves(
+    path: Path,
+    scene: Scene,
+    design: Design,
+    accuracy: float | None = None,
+    target: str | None = None,
+    said: str = "",
+) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
-    target: what the design was found for, to be named in the table.
+    target: what the design was found for, to be named in the table; said: what it is, for a figure's title.
     """
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target)
@@ -135,26 +143,29 @@ def curves(path: Path, scene: Scene, design: Design, accuracy: float | None = No
     else:
         from loomopt.views import figure
 
-        drawn = plotted(frame, scene, flat(design), target)
+        drawn = plotted(frame, scene, flat(design), target, said)
         atomically(path, functools.partial(figure.save, drawn))
 
 
-def plot(scene: Scene, design: Design, target: str, path: Path | None) -> "Figure":
-    """Return a design's curves as a figure; path: a file to write it to as well. Raises BadInput."""
+def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Figure":
+    """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.views import figure
 
     if path:
         suffix(path, PICTURES)
-    drawn = plotted(tables.curves(scene, design, target=target), scene, flat(design), target)
+    frame = tables.curves(scene, found.design, target=target)
+    drawn = plotted(frame, scene, flat(found.design), target, what(found))
     if path:
         atomically(path, functools.partial(figure.save, drawn))
     return drawn
 
 
-def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None) -> "Figure":
+def plotted(
+    frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None, said: str = ""
+) -> "Figure":
     """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
-    design: SI; today's without one. target: what it was found for.
+    design: SI; today's without one. target: what it was found for. said: what it is, where more is known.
     """
     from loomopt.picture.panels import in_units
     from loomopt.views import curve_figure
@@ -165,18 +176,26 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], ta
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
     subject = (f"design for {target}" if target else GIVEN) if design else TODAY
-    title = f"{scene.name}: {subject}, curves over the cycle"
+    name, broken, _ = said.partition(BROKEN)
+    title = f"{scene.name}: {name or subject}{', limits not held' if broken else ''}, curves over the cycle"
     drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
     return drawn
 
 
-def what(found: Evaluation) -> str:
-    """Say in a few words what the design of an evaluation or of an answer is."""
+def what(found: Evaluation, target: str | None = None, status: str | None = None) -> str:
+    """Say in a few words what the design of an evaluation or of an answer is.
+
+    target, status: of the answer whose design was evaluated, where it was one's.
+    """
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
-    said = f"; limits not held: {broken}" if broken else ""
-    if not isinstance(found, Solution):
-        return GIVEN + said
-    return FOUND[found.status].format(found.target) + said
+    said = f"{BROKEN}{broken}" if broken else ""
+    if isinstance(found, Solution):
+        return FOUND[found.status].format(found.target) + said
+    if target and status in FOUND and not (broken and status == "optimal"):
+        return FOUND[status].format(target) + said
+    own, scene = flat(found.design), found.scene
+    now = registry.of(scene).today(scene) if scene else {}
+    return (TODAY if own.items() <= now.items() else GIVEN) + said
 
 
 def drawing(scene: Scene, design: Design, said: str = "") -> "Drawing":

@@ -10,6 +10,7 @@ from loomopt.cycle import Floats
 from loomopt.designs import Design, flat
 from loomopt.jobs import registry
 from loomopt.owned import label, owned
+from loomopt.scene_display import KINDS
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
 from loomopt.units import factor
@@ -35,19 +36,20 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"{scene.name}: {scene.title}",
         f"Job: {scene.job}, {scene.schema.title}",
         f"Source: {scene.source or 'not given'}",
-        f"Tables show {', '.join(f'{kind} in {scene.shown_in(kind)}' for kind in _kinds(scene))}",
+        f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
         Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
-        Grid("Effects that are on", ("effect", "what it is"), effects),
+        Grid("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         Grid("Figures", ("figure", "what it is"), figures),
     ]
 
 
-def _kinds(scene: Scene) -> list[str]:
-    """Return the kinds of quantity, those with units, of a scene's design variables and figures."""
+def _kinds(scene: Scene) -> dict[str, str]:
+    """Return the kinds of quantity, by their keys in [display], of a scene's design variables and figures."""
     kinds = [*scene.schema.variables.values(), *(figure.kind for figure in scene.schema.figures.values())]
-    return [kind for kind in dict.fromkeys(kinds) if scene.shown_in(kind) != "1"]
+    keys = {kind: key for key, kind in KINDS.items()}
+    return {keys[kind]: kind for kind in dict.fromkeys(kinds) if kind in keys}
 
 
 def _targets(scene: Scene) -> list[tuple[str, str, str]]:

@@ -149,7 +149,9 @@ def test_a_rapier_drive_of_any_size_has_the_same_angles(unit, factor):
     ],
 )
 def test_an_answer_of_any_size_prints_as_json_without_nan(problem):
-    text = json.dumps(lo.solve(sized(problem, "um").set("operation.speed", "1e3 rpm"), starts=1).as_dict(), allow_nan=False)
+    text = json.dumps(
+        lo.solve(sized(problem, "um").set("operation.speed", "1e3 rpm"), starts=1).as_dict(), allow_nan=False
+    )
     assert "NaN" not in text
 
 

@@ -169,7 +169,10 @@ def test_a_variable_of_the_task_may_come_first(monkeypatch):
 def test_a_generous_bound_of_the_counterweight_spoils_no_answer(bound, most, effect):
     scene = lo.load("beatup").set(f"bounds.{bound}.max", most)
     scene = scene.with_effect(effect) if effect else scene
-    answer, plain = lo.solve(scene, starts=1), lo.solve(lo.load("beatup").with_effect(effect) if effect else lo.load("beatup"), starts=1)
+    answer, plain = (
+        lo.solve(scene, starts=1),
+        lo.solve(lo.load("beatup").with_effect(effect) if effect else lo.load("beatup"), starts=1),
+    )
     assert answer.status == "optimal", answer.message
     assert abs(answer.figures["M3_fdc"]) <= abs(plain.figures["M3_fdc"]) + 1e-9
     assert answer.figures["peak_torque"] <= plain.figures["peak_torque"] * (1 + 1e-9), "more room is no loss"

@@ -77,7 +77,10 @@ def test_units_of_length_do_not_matter(target, length):
 @pytest.mark.parametrize("target", ["balance", "retrofit"])
 def test_units_of_mass_angle_and_speed_do_not_matter(target):
     scene = lo.load("beatup-heavy").with_effect("gravity").with_effect("rod_inertia")
-    same(lo.solve(scene, target, starts=1), lo.solve(changed(scene, in_units("m", "lb", "rad", "rad/s")), target, starts=1))
+    same(
+        lo.solve(scene, target, starts=1),
+        lo.solve(changed(scene, in_units("m", "lb", "rad", "rad/s")), target, starts=1),
+    )
 
 
 @pytest.mark.parametrize("M0", [600, 745, 800, 900])

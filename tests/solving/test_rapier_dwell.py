@@ -37,7 +37,9 @@ def test_longest_dwell_is_held_on_both_sides_at_the_exact_stroke(scene, longest)
 
 def test_longest_dwell_lies_between_what_exists_and_what_does_not(scene, longest):
     near = math.radians(0.2)
-    shorter, longer = (lo.solve(dwelling(scene, longest.figures["dwell"] + change), starts=1) for change in (-near, near))
+    shorter, longer = (
+        lo.solve(dwelling(scene, longest.figures["dwell"] + change), starts=1) for change in (-near, near)
+    )
     assert shorter.status == "optimal"
     assert Drive(scene, shorter.design).stray(*[longest.figures["dwell"] - near] * 2) <= 6e-3 * (1 + 1e-9)
     assert longer.status == "infeasible"

@@ -52,9 +52,28 @@ def test_a_design_that_breaks_limits_is_exported_as_such(nearest, tmp_path, caps
     (tmp_path / "answer.json").write_text(json.dumps(nearest.as_dict()))
     arguments = ["export", "beatup", "--design", str(tmp_path / "answer.json"), "--out", str(tmp_path / "a.svg")]
     assert run(arguments) == 0
-    assert title((tmp_path / "a.svg").read_text(encoding="utf-8")).startswith(
-        "beatup: a given design; limits not held: "
-    )
+    said = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
+    assert said.startswith("beatup: nearest design for balance; limits not held: ")
+    assert run([*arguments, "--set", "limits.swing.max=30 deg"]) == 0
+    said = title((tmp_path / "a.svg").read_text(encoding="utf-8"))
+    assert said.startswith("beatup: a given design; limits not held: "), "in another scene it is no answer"
+
+
+def test_every_file_that_is_asked_for_is_written_or_a_second_one_refused(tmp_path, capsys):
+    paths = [tmp_path / name for name in ("a.svg", "a.dxf", "a.csv", "b.svg", "b.png")]
+    outs = [word for path in paths[:3] for word in ("--out", str(path))]
+    assert run(["export", "beatup", *outs]) == 0
+    assert run(["show", "beatup", "--figure", str(paths[3]), "--figure", str(paths[4])]) == 0
+    assert [path.exists() for path in paths] == [True] * 5
+    capsys.readouterr()
+    assert run(["solve", "beatup", "--out", str(tmp_path / "c"), "--out", str(tmp_path / "d")]) == 2
+    assert "given more than once" in capsys.readouterr().err
+    assert not (tmp_path / "d").exists()
+
+
+def test_todays_machine_is_called_so_wherever_it_is_evaluated():
+    assert outputs.what(lo.evaluate("beatup-light")) == "today's machine"
+    assert outputs.what(lo.evaluate("beatup-light", {"l1": 0.0305})).startswith("a given design")
 
 
 @pytest.mark.parametrize(

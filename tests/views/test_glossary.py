@@ -53,7 +53,7 @@ def test_units_are_those_of_the_scene():
 
 def test_what_the_sketch_names_is_marked(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    assert {"l1", "l2", "l3", "l4", "m4", "r4"} <= glossary.labels(lo.load("beatup"))
+    assert {"l1", "l2", "l3", "l4", "m4", "r4", "m4e", "r4e"} <= glossary.labels(lo.load("beatup"))
     assert "mu_min" not in glossary.labels(lo.load("beatup"))
     assert glossary.labels(lo.load("shedding-static").update({})) != frozenset()
     assert run(["show", "beatup", "--symbols"]) == 0
