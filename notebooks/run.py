@@ -29,7 +29,8 @@ METADATA = {
     "language_info": {"name": "python"},
 }
 _TIME = re.compile(r"<p>Time: .*?</p>", re.DOTALL)
-_SEARCH = re.compile(r"\d+ of \d+ reached")
+_SEARCH = re.compile(r"\d+ of \d+ reached|reached by \d+ solves?")
+"""How far a search came, which rounding may change from machine to machine."""
 _SVG = re.compile(r"<svg.*?</svg>", re.DOTALL)
 _LETTERS = re.compile(r"<text[^>]*>([^<]*)<")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?(?!\w)")
@@ -84,11 +85,11 @@ def said(notebook: NotebookNode) -> Iterator[tuple[str, str]]:
 
 
 def _texts(output: NotebookNode) -> Iterator[str]:
-    yield output.get("text", output.output_type)
+    yield _SEARCH.sub("reached by #", output.get("text", output.output_type))
     for kind, value in sorted(output.get("data", {}).items()):
         yield kind
         if kind not in PICTURES:
-            yield _SEARCH.sub("# reached", _SVG.sub(lambda drawn: _letters(drawn[0]), value))
+            yield _SEARCH.sub("reached by #", _SVG.sub(lambda drawn: _letters(drawn[0]), value))
         elif "svg" in kind:
             yield _letters(value)
 

@@ -1,4 +1,4 @@
-"""Notebooks run from a clean kernel, hold in their assertions, and say what stands in them; nothing in them is local."""
+"""Notebooks run from a clean kernel, hold what they assert, and say what stands in them; nothing in them is local."""
 
 import copy
 import importlib.util
@@ -48,7 +48,6 @@ def test_a_notebook_holds_no_path_date_or_time_of_a_machine(name):
 @pytest.mark.parametrize("name", STORED)
 def test_a_notebook_ends_in_assertions_on_references_with_the_relative_error_printed(name):
     *_, checks, last = STORED[name].cells
-    assert "reference" in checks.outputs[0].text or "relative error" in checks.outputs[0].text
     assert checks.outputs[0].text.count("relative error") > 5
     lines = last.source.splitlines()
     assert len([line for line in lines if line.startswith("assert ")]) > 5
@@ -64,6 +63,7 @@ def test_a_notebook_ends_in_assertions_on_references_with_the_relative_error_pri
         ("peak 88.6894 N*m", "peak -88.6894 N*m", True),
         ("peak 88.6894 N*m", "peaks 88.6894 N*m", True),
         ("limits 2e-16", "limits 7e-15", False),
+        ("The only optimum reached by 15 solves", "The only optimum reached by 16 solves", False),
         ("relative error 2e-10", "relative error 2e-05", True),
         ("<td>1</td>", "<td>1</td><td>2</td>", True),
     ],
