@@ -6,6 +6,8 @@ What differs from run to run is left out: times, addresses, versions. The suite 
 with what stands there (tests/test_notebooks.py).
 """
 
+import base64
+import io
 import math
 import os
 import re
@@ -17,6 +19,7 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 from nbformat import NotebookNode
+from PIL import Image
 
 FOLDER = Path(__file__).parent
 LONGEST = 600
@@ -32,6 +35,8 @@ _TIME = re.compile(r"<p>Time: .*?</p>", re.DOTALL)
 _SEARCH = re.compile(r"\d+ of \d+ reached|reached by \d+ solves?")
 """How far a search came, which rounding may change from machine to machine."""
 _SVG = re.compile(r"<svg.*?</svg>", re.DOTALL)
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+"""Digits of a drawing beyond a hundredth of a millimetre, which no page shows."""
 _LETTERS = re.compile(r"<text[^>]*>([^<]*)<")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?(?!\w)")
 
@@ -70,11 +75,21 @@ def executed(path: Path) -> NotebookNode:
 
 
 def _clean(data: NotebookNode) -> None:
-    """Leave out of one output its time, and its plain text where it shows more than that."""
-    if "text/html" in data:
-        data["text/html"] = _TIME.sub("", data["text/html"])
+    """Leave out of one output its time, and its plain text where it shows more than that; make its pictures small."""
+    for kind in data.keys() & {"text/html", "image/svg+xml"}:
+        data[kind] = _SVG.sub(lambda drawn: _DIGITS.sub(r"\1", drawn[0]), _TIME.sub("", data[kind]))
+    if "image/png" in data:
+        data["image/png"] = _small(data["image/png"])
     if len(data) > 1:
         data.pop("text/plain", None)
+
+
+def _small(picture: str) -> str:
+    """Return a PNG, base64, in at most 256 colours: a diagram has no more."""
+    drawn, found = Image.open(io.BytesIO(base64.b64decode(picture))), io.BytesIO()
+    few = drawn.convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    few.save(found, "PNG", optimize=True)
+    return base64.b64encode(found.getvalue()).decode()
 
 
 def said(notebook: NotebookNode) -> Iterator[tuple[str, str]]:
