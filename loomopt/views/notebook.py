@@ -16,7 +16,7 @@ from loomopt.views.layout import Grid, spaced
 
 PAGE = 720
 """Longer side of a drawing on a page of a notebook, pixels."""
-_SIZE = re.compile(r'width="([\d.]+)[^"]*" height="([\d.]+)[^"]*"')
+_SIZE = re.compile(r'width="([\d.e+-]+)[^"]*" height="([\d.e+-]+)[^"]*"')
 
 
 @dataclass(frozen=True)
