@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: solve test lint types docs benchmark clean
+.PHONY: solve test lint types docs notebooks benchmark clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
@@ -19,6 +19,9 @@ types: .venv/installed-test
 
 docs: .venv/installed
 	$(BIN)/python docs/write.py
+
+notebooks: .venv/installed-test
+	$(BIN)/python notebooks/run.py
 
 benchmark: .venv/installed-test
 	$(BIN)/pip install -q -e '.[bench]'

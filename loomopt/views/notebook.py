@@ -1,5 +1,6 @@
 """How things show themselves in Jupyter: what the terminal shows, as self-contained HTML, and the mechanism drawn."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -13,10 +14,14 @@ from loomopt.solving.solution import Evaluation, Solution
 from loomopt.views import outputs, scene_view, svg, terminal
 from loomopt.views.layout import Grid, spaced
 
+PAGE = 720
+"""Longer side of a drawing on a page of a notebook, pixels."""
+_SIZE = re.compile(r'width="([\d.e+-]+)[^"]*" height="([\d.e+-]+)[^"]*"')
+
 
 @dataclass(frozen=True)
 class Sketch:
-    """A mechanism drawn at full scale; in Jupyter it shows itself.
+    """A mechanism drawn at full scale; in Jupyter it shows itself, as large as a page takes.
 
     drawing: its lines, circles and texts; svg: the same as SVG text.
     """
@@ -29,7 +34,7 @@ class Sketch:
         return svg.render(self.drawing)
 
     def _repr_svg_(self) -> str:
-        return self.svg
+        return _SIZE.sub(_on_page, self.svg, count=1)
 
     def __repr__(self) -> str:
         return f"<Sketch {self.drawing.title}>"
@@ -62,7 +67,14 @@ def html(thing: object) -> str:
 
 def _drawn(scene: Scene, design: Design, said: str = "") -> str:
     """Return the mechanism as SVG where the scene gives what a drawing needs, else ""."""
-    return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said).svg
+    return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said)._repr_svg_()
+
+
+def _on_page(size: re.Match[str]) -> str:
+    """Return a drawing's size as one that a page takes; letters, as large as the drawing asks, go with it."""
+    sides = [float(side) for side in size.groups()]
+    width, height = (round(PAGE * side / max(sides)) for side in sides)
+    return f'width="{width}" height="{height}"'
 
 
 def _page(parts: Sequence[str | Grid], drawn: str = "") -> str:

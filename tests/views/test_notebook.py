@@ -50,3 +50,16 @@ def test_an_infeasible_answer_shows_what_helps():
     words = "".join(tree(infeasible._repr_html_()).itertext()).replace("\xa0", " ")
     assert "No admissible design exists" in words
     assert all(relaxation.text in words for relaxation in infeasible.relaxation)
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_a_drawing_fits_a_page_whatever_the_machines_size(name):
+    found = lo.evaluate(name)
+    drawn = found.draw()
+    root, full = (ElementTree.fromstring(text) for text in (drawn._repr_svg_(), drawn.svg))
+    width, height = float(root.get("width")), float(root.get("height"))
+    assert max(width, height) == notebook.PAGE
+    sides = [float(side) for side in root.get("viewBox").split()[2:]]
+    assert width / height == pytest.approx(sides[0] / sides[1], rel=2e-3)
+    assert full.get("width") == f"{sides[0]:.12g}mm"
+    assert found._repr_html_().endswith(f"{drawn._repr_svg_()}</div>")
