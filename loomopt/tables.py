@@ -125,6 +125,22 @@ def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bo
     return frame
 
 
+def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
+    """Return curves, SI, as a file has them.
+
+    In the units that [display] chooses, in inches and pounds where these are the scene's, else in SI.
+    """
+    from loomopt.program.curves import split
+
+    found, names = frame.copy(), {}
+    for column in frame.columns:
+        name, si = split(column)
+        unit = scene.filed_in(si)
+        if unit != si:
+            found[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
+    return found.rename(columns=names)
+
+
 def curves(
     scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
 ) -> "pd.DataFrame":

@@ -11,6 +11,7 @@ import pytest
 import loomopt as lo
 from loomopt import tables
 from loomopt.units import factor, parse_unit
+from loomopt.views import outputs
 
 SCENE = lo.load("beatup")
 
@@ -98,6 +99,25 @@ def test_bounds_come_back_as_they_were_given():
     table = lo.evaluate(scene).table()
     assert (table.loc["l2", "max"], table.loc["swing", "max"], table.loc["theta", "min"]) == (3.34646, 23.4, -2.2)
     assert "today" not in table.columns, "of an evaluated design, there is nothing beside it"
+
+
+@pytest.mark.parametrize(
+    ("scene", "units"),
+    [
+        (SCENE, ("rad", "N*m")),
+        (inch.scene("beatup"), ("rad", "lbf*in")),
+        (SCENE.set("display.torque", "kN*m"), ("deg", "kN*m")),
+    ],
+    ids=["metric", "inches", "chosen"],
+)
+def test_a_file_of_curves_has_the_scenes_units(scene, units, tmp_path):
+    outputs.curves(tmp_path / "curves.csv", scene, {})
+    angle, torque = units
+    filed, plain = read_back((tmp_path / "curves.csv").read_text()), lo.simulate(scene)
+    assert filed[f"phi [{angle}]"].to_numpy() * factor(angle) == pytest.approx(plain["phi [rad]"].to_numpy(), abs=1e-12)
+    assert filed[f"Md [{torque}]"].to_numpy() * factor(torque) == pytest.approx(plain["Md [N*m]"].to_numpy(), rel=1e-12)
+    assert [str(column).split(" [")[0] for column in filed] == [str(column).split(" [")[0] for column in plain]
+    assert "psi_t [rad/s]" in filed
 
 
 def test_csv_reads_back_to_the_last_digit(answer):

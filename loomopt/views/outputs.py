@@ -78,7 +78,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
     contents = {
         "answer.json": document(solution) + "\n",
         "table.csv": tables.csv(tables.answer(solution, scene)),
-        "curves.csv": tables.csv(tables.curves(scene, solution.design, target=solution.target)),
+        "curves.csv": tables.csv(tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)),
     }
     view = registry.of(scene).views
     if not view.missing(scene):
@@ -137,9 +137,9 @@ def curves(
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target)
     if ending == ".csv":
-        text(path, tables.csv(frame))
+        text(path, tables.csv(tables.filed(frame, scene)))
     elif ending == ".parquet":
-        atomically(path, frame.to_parquet)
+        atomically(path, tables.filed(frame, scene).to_parquet)
     else:
         from loomopt.views import figure
 
