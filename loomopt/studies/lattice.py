@@ -27,6 +27,10 @@ class Lattice:
         """How many points there are."""
         return math.prod(map(len, self.ranks))
 
+    def places(self, point: int) -> tuple[int, ...]:
+        """Return which value of each axis a point has, counted from 0."""
+        return tuple(int(k) for k in np.unravel_index(point, [len(ranks) for ranks in self.ranks]))
+
     @functools.cached_property
     def points(self) -> "np.ndarray[tuple[int, int], np.dtype[np.int64]]":
         """Rank on each axis of every point."""
@@ -37,7 +41,8 @@ class Lattice:
         """The points of each round that has any, in order."""
         finest = np.zeros(self.size, dtype=int)
         for axis, ranks in enumerate(self.ranks):
-            finest = np.maximum(finest, np.array([_round(rank, len(ranks)) for rank in range(len(ranks))])[self.points[:, axis]])
+            rounds = np.array([_round(rank, len(ranks)) for rank in range(len(ranks))])
+            finest = np.maximum(finest, rounds[self.points[:, axis]])
         found = [np.flatnonzero(finest == each).tolist() for each in range(1 + int(math.log2(COARSE)))]
         return [points for points in found if points]
 

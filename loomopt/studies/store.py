@@ -49,7 +49,7 @@ class Store:
             self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(f"PRAGMA user_version = {VERSION}")
         elif head != (APPLICATION, VERSION):
-            raise BadInput("the file is no store of this version", file=str(self.path), key="--store", remedy=_OTHER)
+            raise BadInput("the file is no store of this version", file=str(self.path), key="store", remedy=_OTHER)
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -70,7 +70,7 @@ class Store:
             busy = "locked" in str(error)
             problem = "another run has it open" if busy else f"it cannot be used as a store: {error}"
             remedy = "Wait for that run, or name another file" if busy else _OTHER
-            raise BadInput(problem, file=str(self.path), key="--store", remedy=remedy) from None
+            raise BadInput(problem, file=str(self.path), key="store", remedy=remedy) from None
 
     def __enter__(self) -> "Store":
         return self

@@ -63,6 +63,13 @@ class Sweep:
     name = "sweep"
 
     @property
+    def asked(self) -> dict[str, object]:
+        """What is asked of every row, for people."""
+        ends = ((axis.key, axis.texts[0], axis.texts[-1], len(axis.texts)) for axis in self.axes)
+        over = "; ".join(f"{key} = {first} ... {last}, {count} values" for key, first, last, count in ends)
+        return {"over": over, "accuracy": self.accuracy, "seed": self.seed}
+
+    @property
     def settings(self) -> dict[str, object]:
         """What its rows depend on, as JSON data."""
         over = [[axis.key, list(axis.values)] for axis in self.axes]
@@ -110,31 +117,21 @@ class Sweep:
         return [self._task(point, usable, known) for point in (rounds[done] if done < len(rounds) else ())]
 
     def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> Task:
-        places = self._places(point)
-        place = {axis.key: axis.values[k] for axis, k in zip(self.axes, places, strict=True)}
-        ask: dict[str, object] = {"set": {axis.key: axis.texts[k] for axis, k in zip(self.axes, places, strict=True)}}
-        parent, *others = self.lattice.neighbours(point, usable) if usable else [None]
-        if others and others[0] is not None:
-            ask["beyond"] = dict(known[others[0]].warm)
-        return Task(point, parent, place, ask)
+        places = zip(self.axes, self.lattice.places(point), strict=True)
+        parent, *beyond = self.lattice.neighbours(point, usable) if usable else [None]
+        ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
+        return Task(point, parent, {axis.key: axis.values[k] for axis, k in places}, ask)
 
-    def _places(self, point: int) -> list[int]:
-        """Return which value of each axis a point has."""
-        found = []
-        for axis in reversed(self.axes):
-            point, k = divmod(point, len(axis.values))
-            found.append(k)
-        return found[::-1]
-
-    def scene_of(self, task: Task) -> Scene:
-        """Return the scene of a task. Raises BadInput for a combination that is none."""
-        return self.scene.update(task.ask["set"])
+    def scene_at(self, point: int) -> Scene:
+        """Return the scene of a point. Raises BadInput for a combination that is none."""
+        places = zip(self.axes, self.lattice.places(point), strict=True)
+        return self.scene.update({axis.key: axis.texts[k] for axis, k in places})
 
     def solve(self, task: Task, parent: Row | None) -> Solution:
         """Return the answer of a task. Raises BadInput for a combination that is no scene."""
-        scene = self.scene_of(task)
+        scene = self.scene_at(task.point)
         program = registry.of(scene).program(scene, self.target)
-        starts = (parent.warm if parent else {}, task.ask.get("beyond", {}))
+        starts = [parent.warm if parent else {}, *task.ask["beyond"]]
         near: list[Point] = [point for data in starts if (point := warm.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
@@ -142,7 +139,7 @@ class Sweep:
         """Return the row of a task. Raises BadInput for a combination that is no scene."""
         answer = self.solve(task, parent)
         passed = answer.certificate is not None and answer.certificate.passed
-        scene = self.scene_of(task)
+        scene = self.scene_at(task.point)
         start = warm.written(answer.point, registry.of(scene).program(scene, self.target)) if passed else {}
         return Row(
             point=task.point,
