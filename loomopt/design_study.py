@@ -56,7 +56,8 @@ class DesignStudy:
         """
         from loomopt.views import study_figure
 
-        return study_figure.plot(self.study, self.rows, None if path is None else Path(path))
+        drawn: Figure = study_figure.plot(self.study, self.rows, None if path is None else Path(path))
+        return drawn
 
     def as_dict(self) -> dict[str, object]:
         """Return the object that `--json` prints."""

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from loomopt.solving.screening import Screening
 
 
-def searched(
-    search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None
-) -> Search:
+def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
     """Return the search after so many starts, or as wide as it takes; after none where points `near` lead on.
 
     count: the job's own starts and random ones; None for a search of the best basin. More are tried where none is

@@ -50,7 +50,7 @@ class Processes(Executor):
         try:
             self.submit(os.getpid).result()
         except BrokenExecutor:
-            remedy = "In a script, make the call below `if __name__ == \"__main__\":`, as Python's multiprocessing asks"
+            remedy = 'In a script, make the call below `if __name__ == "__main__":`, as Python\'s multiprocessing asks'
             raise BadInput("worker processes cannot start here", key="workers", remedy=remedy) from None
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
@@ -110,10 +110,12 @@ def dask(address: str) -> Iterator[Executor]:
         remedy = "Install it: pip install 'loomopt[dask]'"
         raise BadInput("Dask's distributed is not installed", key="--dask", remedy=remedy) from None
     try:
-        client: Any = Client(address, set_as_default=False)
+        client: Any = Client(address, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         remedy = "Start `dask scheduler` and `dask worker`, and give the address that the scheduler prints"
         problem = f"no Dask scheduler is reached: {' '.join(str(error).split())[:200]}"
-        raise BadInput(problem, key="--dask", value=address, allowed="such as tcp://127.0.0.1:8786", remedy=remedy) from None
+        raise BadInput(
+            problem, key="--dask", value=address, allowed="such as tcp://127.0.0.1:8786", remedy=remedy
+        ) from None
     with client:
         yield client.get_executor(retries=RETRIES)

@@ -1,6 +1,7 @@
 """A study as a table: a row per point, units in the column names, provenance once for all."""
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -103,18 +104,21 @@ def frame(study: Sweep, rows: Sequence[Row], si: bool = False) -> "pd.DataFrame"
     from loomopt.table_frame import TableFrame
 
     parts = columns(study, rows, si)
-    cells = {column.heading: pd.array(column.shown, dtype="Float64") for column in parts["place"]}
+    cells: dict[str, object] = {column.heading: _floats(column) for column in parts["place"]}
     cells |= {"status": [row.status for row in rows], "certified": [row.certified for row in rows]}
-    numbers = {column.heading: column for part in ("design", "figures", "multipliers") for column in parts[part]}
-    cells |= {heading: column.shown for heading, column in numbers.items()}
+    for part in ("design", "figures", "multipliers"):
+        cells |= {column.heading: _floats(column) for column in parts[part]}
     for name in dict.fromkeys(name for row in rows for name in row.reached):
         cells[f"{name} reached"] = pd.array([row.reached.get(name) for row in rows], dtype="boolean")
     cells["parent"] = pd.array([row.parent for row in rows], dtype="Int64")
     cells |= {"time [s]": [row.seconds for row in rows], "reason": [row.reason for row in rows]}
     found = TableFrame(cells, index=pd.Index([row.point for row in rows], name="point"))
-    found = found.astype({heading: "float64" for heading in [*numbers, *(each.heading for each in parts["place"])]})
     found.attrs.update(told(study))
     return found
+
+
+def _floats(column: Column) -> list[float]:
+    return [math.nan if value is None else value for value in column.shown]
 
 
 def told(study: Sweep) -> dict[str, str]:
@@ -162,4 +166,3 @@ def _line(study: Sweep, rows: Sequence[Row]) -> list[tuple[float, Row]]:
         return []
     key = next(iter(study.kinds))
     return sorted(((row.place[key], row) for row in rows), key=lambda pair: (pair[0], pair[1].point))
-

@@ -159,7 +159,9 @@ class Sweep:
 
 def multipliers(answer: Solution) -> dict[str, float]:
     """Return what each limit that binds costs: the figure that it moves, the limit and its side → worth, SI."""
-    return {priced(figure, each.limit, each.side): worth for each in answer.binding for figure, worth in each.worth.items()}
+    return {
+        priced(figure, each.limit, each.side): worth for each in answer.binding for figure, worth in each.worth.items()
+    }
 
 
 def priced(figure: str, limit: str, side: str) -> str:
@@ -176,9 +178,7 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def planned(
-    scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0
-) -> Sweep:
+def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0) -> Sweep:
     """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
     name = target_name(scene, target)
     check_numbers(accuracy, None)

@@ -133,7 +133,7 @@ class Crew:
                 suspects.extend(work for work in lost if self.deaths[work[0].point] < MOST_DEATHS)
 
     def _hand_out(self, waiting: "deque[Work]", alone: bool) -> "list[Work]":
-        """Give the executor as many tasks as it wants, one to be alone; return those that a broken one has not taken."""
+        """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
         if self.executor is None and self.make:
             self.executor = self.make()
         assert self.executor

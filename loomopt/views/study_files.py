@@ -24,7 +24,7 @@ SAME = 1e-9
 """Relative spread of a column below which its number is the same in all rows."""
 
 MOST_REASONS = 5
-"""Reasons that are told below a table, each once; all are in the table's last column."""
+"""Reasons that are told below a table."""
 
 
 def check_table(path: Path) -> None:
@@ -79,9 +79,10 @@ def parts(study: Sweep, rows: Sequence[Row], si: bool = False) -> list[str | Gri
     left = f" of {study.size}" if len(rows) < study.size else ""
     first = f"{study.scene.name}, {study.target}: {len(rows)}{left} points, {outcome}"
     grid = Grid("", (*heads, "status"), tuple(lines), right=tuple(range(len(heads))))
-    reasons = dict.fromkeys(f"{row.status}: {row.reason}" for row in rows if row.reason)
+    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in rows if row.reason]
+    more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
     said = [_said(study, change, si) for change in study_table.changes(study, rows)]
-    return [first, grid, *said, *list(reasons)[:MOST_REASONS]]
+    return [first, grid, *said, *reasons[:MOST_REASONS], *more]
 
 
 def _said(study: Sweep, change: Change, si: bool) -> str:
