@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from loomopt import designs
+from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.nlp.point import Point
 from loomopt.provenance import versions
@@ -192,15 +193,19 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     if math.prod(map(len, listed.values())) > ranges.MOST_VALUES:
         remedy = "Sweep over fewer values at a time"
         raise refusal(f"these are more than {ranges.MOST_VALUES} combinations", scene.origin, "over", remedy=remedy)
-    base = scene.update({key: texts[0] for key, texts in listed.items()})
-    axes = tuple(_axis(base, key, texts) for key, texts in listed.items())
+    ends = [{key: texts[k] for key, texts in listed.items()} for k in (0, -1)]
+    base = scene.update(ends[0])
+    axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
     job = registry.of(base)
     job.demand(base, name)
     return Sweep(base, name, axes, accuracy, seed, bool(job.program(base, name).single))
 
 
-def _axis(base: Scene, key: str, texts: Sequence[str | float]) -> Axis:
-    """Return an axis, each of whose values makes a scene by itself. Raises BadInput."""
+def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]) -> Axis:
+    """Return an axis, each of whose values makes a scene with the first or the last values of the others.
+
+    Raises BadInput.
+    """
     kind = quantity(base, key)
     values = []
     for text in texts:
@@ -208,5 +213,10 @@ def _axis(base: Scene, key: str, texts: Sequence[str | float]) -> Axis:
             values.append(kind.validate(text))
         except QuantityError as error:
             raise misread(error, base.origin, key, text) from None
-        base.set(key, text)
+        try:
+            base.set(key, text)
+        except BadInput:
+            if len(ends[0]) == 1:
+                raise
+            base.update({**ends[-1], key: text})
     return Axis(key, tuple(texts), tuple(values), kind.kind)

@@ -1,4 +1,4 @@
-"""Running studies: the same rows whoever computes them, whatever dies meanwhile; nothing finished is lost or repeated."""
+"""Running studies: the same rows whoever computes them, whatever dies; nothing finished is lost or done twice."""
 
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
