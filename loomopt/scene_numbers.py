@@ -18,8 +18,9 @@ WITHOUT_FILES = ("problem", "display")
 def quantity(scene: Scene, key: str) -> Quantity:
     """Return what the number under a dotted key may be. Raises BadInput where the scene has no number there."""
     known = dict(_quantities(scene))
-    if key in known:
-        return known[key]
+    table = key.rpartition(".")[0]  # such as a target's weights, each number of which has a name of its own
+    if key in known or (table in known and scene.given(key) is not None):
+        return known.get(key) or known[table]
     if scene.given(key) is not None:
         remedy = "Vary a number, such as operation.speed"
         raise refusal("it is no number", scene.origin, key, scene.given(key), remedy=remedy)

@@ -136,12 +136,16 @@ class Sweep:
         near: list[Point] = [point for data in starts if (point := warm.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
+    def _warm(self, task: Task, answer: Solution) -> dict[str, object]:
+        """Return what a neighbour can start from."""
+        scene = self.scene_at(task.point)
+        return warm.written(answer.point, registry.of(scene).program(scene, self.target))
+
     def solved(self, task: Task, parent: Row | None) -> Row:
         """Return the row of a task. Raises BadInput for a combination that is no scene."""
         answer = self.solve(task, parent)
         passed = answer.certificate is not None and answer.certificate.passed
-        scene = self.scene_at(task.point)
-        start = warm.written(answer.point, registry.of(scene).program(scene, self.target)) if passed else {}
+        leads = passed and not self.cold
         return Row(
             point=task.point,
             place=task.place,
@@ -154,7 +158,7 @@ class Sweep:
             reached=answer.reached,
             certified=passed,
             seconds=answer.time["total_s"],
-            warm=start,
+            warm=self._warm(task, answer) if leads else {},
         )
 
 

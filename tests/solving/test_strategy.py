@@ -191,3 +191,14 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts():
         if seen == 6:
             break
     assert seen == 6
+
+
+def test_of_several_neighbours_the_better_basin_counts():
+    """Both points lead on; whichever comes first, the deeper of two valleys is the answer."""
+    found = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
+    best = found.best.candidate.point
+    other = next(c.point for c in found.reached if abs(c.objectives[0] - found.best.candidate.objectives[0]) > 1e-3)
+    for near in ((other, best), (best, other)):
+        again = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
+        assert again.stayed
+        assert again.best.candidate.objectives == pytest.approx(found.best.candidate.objectives)

@@ -25,7 +25,7 @@ def values(rows):
 
 
 def test_rows_come_in_the_order_of_points_each_after_its_parent(chain):
-    seen = []
+    seen: list[Row] = []
     rows = runs.run(chain, on_row=seen.append)
     assert [row.point for row in rows] == list(range(24))
     assert [row.parent for row in rows] == [None] * 8 + list(range(16))
@@ -114,7 +114,7 @@ def test_a_row_is_the_same_through_json():
     assert Row.from_dict(json.loads(json.dumps(row.as_dict()))) == row
     assert "warm" not in row.told()
     with pytest.raises(TypeError):
-        row.figures["f"] = 1.0
+        row.as_dict()["figures"]["f"] = 1.0
 
 
 @pytest.mark.parametrize("count", [0, -1, 5000])

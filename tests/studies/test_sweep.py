@@ -76,7 +76,7 @@ def test_killed_at_twelve_rows_and_resumed_by_two_processes_it_has_the_same_dige
 
 def test_a_dask_cluster_of_which_a_worker_is_killed_has_the_same_digest(serial):
     distributed = pytest.importorskip("distributed")
-    killed = []
+    killed: list[int] = []
 
     def kill(row):
         if len(killed) < 1 and row.parent is not None:
