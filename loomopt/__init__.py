@@ -6,7 +6,8 @@
 
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
-    from loomopt.api import Answer, Evaluation, evaluate, load, prove, scene, simulate, solve
+    from loomopt.api import Answer, Evaluation, evaluate, load, prove, scene, simulate, solve, sweep
+    from loomopt.design_study import DesignStudy
     from loomopt.errors import BadInput
     from loomopt.scenes import Scene
     from loomopt.solving.proof import Proofs
@@ -16,6 +17,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "Answer": "loomopt.api",
     "BadInput": "loomopt.errors",
+    "DesignStudy": "loomopt.design_study",
     "Evaluation": "loomopt.api",
     "Proofs": "loomopt.solving.proof",
     "Scene": "loomopt.scenes",
@@ -25,11 +27,13 @@ _HOMES = {
     "scene": "loomopt.api",
     "simulate": "loomopt.api",
     "solve": "loomopt.api",
+    "sweep": "loomopt.api",
 }
 
 __all__ = [
     "Answer",
     "BadInput",
+    "DesignStudy",
     "Evaluation",
     "Proofs",
     "Scene",
@@ -39,6 +43,7 @@ __all__ = [
     "scene",
     "simulate",
     "solve",
+    "sweep",
 ]
 
 

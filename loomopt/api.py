@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
 from loomopt import designs, results
@@ -16,12 +17,15 @@ from loomopt.tolerances import SLACK
 if TYPE_CHECKING:
     import pandas as pd
 
+    from loomopt.design_study import DesignStudy
     from loomopt.solving.proof import Proofs
+    from loomopt.studies.rows import Row
+    from loomopt.studies.sweep import Over
 
 Given = Scene | str | os.PathLike[str]
 """A scene, or what `load` takes: a packaged name or a path."""
 
-__all__ = ["Answer", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve"]
+__all__ = ["Answer", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve", "sweep"]
 
 
 def solve(
@@ -111,6 +115,33 @@ def simulate(
     own = _scene(scene)
     name = target_name(own, target) if target else None
     return tables.curves(own, _design(design, own), accuracy, name)
+
+
+def sweep(
+    scene: Given,
+    over: "Over",
+    target: str | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
+    *,
+    workers: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    accuracy: float = ACCURACY,
+    seed: int = 0,
+    on_row: "Callable[[Row], None] | None" = None,
+) -> "DesignStudy":
+    """Return a row for every combination of scene numbers, solved for a target (the job's default without one).
+
+    over: dotted key → its values as a scene gives them, or "LO:HI:STEP UNIT". executor: any of `concurrent.futures`, or
+    a function that makes one; workers: so many processes on this machine instead. The rows are the same, whoever
+    computes them. store: a file that each row is written to as it comes; resume: takes those that are there. accuracy,
+    seed: as in `solve`. on_row(row): called as each is there. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.design_study import conducted
+    from loomopt.studies.sweep import planned
+
+    study = planned(_scene(scene), over, target, accuracy=accuracy, seed=seed)
+    return conducted(study, executor, workers, store, resume, on_row)
 
 
 def _scene(given: Given) -> Scene:

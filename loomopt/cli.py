@@ -20,7 +20,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import typer  # noqa: E402
 
-from loomopt import commands, interrupts  # noqa: E402
+from loomopt import commands, interrupts, study_commands  # noqa: E402
 from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
 from loomopt.errors import BadInput  # noqa: E402
 from loomopt.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded  # noqa: E402
@@ -68,9 +68,7 @@ def solve(
     """Solve a problem and certify the answer."""
     from loomopt import api
 
-    scene = read_scene(problem, sets, on, off)
-    if free:
-        scene = scene.free([name for names in free for name in names.replace(",", " ").split()])
+    scene = read_scene(problem, sets, on, off, free)
     settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
@@ -166,6 +164,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     **commands.FIRST,
     "solve": solve,
     **commands.OF_A_DESIGN,
+    **study_commands.STUDIES,
     "accuracy": accuracy,
     "check": check,
 }

@@ -10,16 +10,21 @@ if TYPE_CHECKING:
 VERSIONED = ("loomopt", "casadi", "numpy")
 
 
+def versions() -> dict[str, str]:
+    """Return the versions that numbers depend on: this package's, CasADi's with its IPOPT, NumPy's."""
+    import importlib.metadata
+
+    return {name: importlib.metadata.version(name) for name in VERSIONED}
+
+
 def provenance(scene: Scene, **more: object) -> dict[str, str]:
     """Return where a table comes from: scene, its hash and effects, versions, date, and what else matters to it."""
     import datetime
-    import importlib.metadata
 
-    versions = {name: importlib.metadata.version(name) for name in VERSIONED}
     today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
     told = {name: str(value) for name, value in more.items()}
     effects = ", ".join(scene.effects) or "none"
-    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **told, **versions, "date": today}
+    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **told, **versions(), "date": today}
 
 
 def csv(frame: "pd.DataFrame") -> str:

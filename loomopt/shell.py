@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
 
-OPTIONS = ("accuracy", "slack", "starts", "target")
+OPTIONS = ("accuracy", "over", "resume", "slack", "starts", "store", "target", "workers")
 """Arguments of the Python functions that are options of the same name here."""
 
 SILENT = 1.0
@@ -63,11 +63,18 @@ class Progress:
             self.timer.cancel()
 
 
-def read_scene(problem: str, sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
+def read_scene(
+    problem: str,
+    sets: list[str] | None,
+    on: list[str] | None,
+    off: list[str] | None,
+    free: list[str] | None = None,
+) -> "Scene":
     """Return a scene with what the command line changes in it."""
     from loomopt.jobs.registry import load
 
-    return changed(load(problem), sets, on, off)
+    scene = changed(load(problem), sets, on, off)
+    return scene.free([name for names in free for name in names.replace(",", " ").split()]) if free else scene
 
 
 def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":

@@ -28,7 +28,7 @@ ROOMS = (
     "scene_document scene_paths scene_tables scene_display packaged entry_points",
     "scenes balance cycle",
     "designs answers",
-    "scene_csv provenance",
+    "scene_csv scene_numbers provenance",
     "program",
     "picture",
     "jobs",
@@ -37,8 +37,8 @@ ROOMS = (
     "tables table_frame",
     "studies",
     "views",
-    "results",
-    "api shell commands cli versions __main__",
+    "results design_study",
+    "api shell commands study_commands cli versions __main__",
 )
 """From the ground up: a room may import from its own floor and from those below."""
 FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}
@@ -54,6 +54,7 @@ WITHOUT_TYPES = {
     "views.dxf",
     "views.layout",
     "views.accuracy_figure",
+    "views.study_figure",
     "picture.equations",
 }
 """Rooms and files at the edge of CasADi, matplotlib, ezdxf, Rich and SymPy, where `Any` may stand."""

@@ -56,7 +56,7 @@ def solve(
     accuracy: float = ACCURACY,
     starts: int | None = None,
     seed: int = 0,
-    near: Solution | None = None,
+    near: Solution | Sequence[Point] | None = None,
     prove: bool = False,
     everywhere: Everywhere | None = None,
     on_iteration: Callable[[int], None] | None = None,
@@ -67,7 +67,8 @@ def solve(
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
     without it a search for the best basin, its designs drawn with `seed`;
-    near: an answer to start warm from (one of another structure is no help and is left alone);
+    near: an answer to start warm from, or where neighbours' solves ended, the best of which counts (one of another
+    structure is no help and is left alone);
     prove: whether to prove every limit of the answer at every crank angle;
     everywhere: to prove that no admissible design is better, and how closely;
     on_iteration: called with each iteration's number;
@@ -88,7 +89,7 @@ def solve(
     program = job.program(scene, target)
     made = time.perf_counter() - begun
     today = {**job.values(program, job.today(scene)), **program.today}
-    warm, before = near.point if near else None, Tally.positions
+    warm, before = _points(near), Tally.positions
     search = solve_program(program, job, settings, starts, seed, warm, on_start, today)
     sold = job.sizes(scene)
     search, bound = _claimed(search, everywhere, sold) if everywhere else (search, None)
@@ -120,21 +121,27 @@ def solve_program(
     settings: Settings,
     starts: int | None = None,
     seed: int = 0,
-    near: Point | None = None,
+    near: Point | Sequence[Point] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     today: Mapping[str, float] | None = None,
 ) -> "Search":
     """Return how far a search for a program's certified optimum comes; no scene is read, nothing is said in words.
 
-    near: where a neighbour's solve ended, to start warm from; one of another structure is left alone; today: today's
+    near: where neighbours' solves ended, to start warm from; one of another structure is left alone; today: today's
     machine by variable, SI, one more place to look for an admissible design from. The rest is as in `solve`. Raises
     KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.solving.search import Search
     from loomopt.solving.strategy import searched
 
-    same = near is not None and near.structure == program.structure
-    return searched(Search(job, program, settings, today or {}), starts, seed, near if same else None, on_start)
+    same = [point for point in _points(near) if point.structure == program.structure]
+    return searched(Search(job, program, settings, today or {}), starts, seed, same, on_start)
+
+
+def _points(near: Solution | Point | Sequence[Point] | None) -> Sequence[Point]:
+    """Return where the solves ended that a solve is to start near."""
+    near = near.point if isinstance(near, Solution) else near
+    return [near] if isinstance(near, Point) else near or []
 
 
 def _proven(scene: Scene, target: str, answer: Solution) -> Solution:

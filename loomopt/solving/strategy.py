@@ -16,15 +16,16 @@ if TYPE_CHECKING:
     from loomopt.solving.screening import Screening
 
 
-def searched(search: Search, count: int | None, seed: int, near: Point | None, on_start: OnStart | None) -> Search:
-    """Return the search after so many starts, or as wide as it takes; after none where `near` leads on.
+def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
+    """Return the search after so many starts, or as wide as it takes; after none where points `near` lead on.
 
     count: the job's own starts and random ones; None for a search of the best basin. More are tried where none is
     certified; where no start leads to a design, only if one is admissible as far as can be seen.
     """
-    if near is not None:
-        search = tried(at(search, "start nearby"), near.x, near)
-        search = judged(search) if search.candidates[-1].point.reached else search
+    for point in near:
+        search = tried(at(search, "start nearby"), point.x, point)
+    if search.reached:
+        search = judged(search)
         if search.passed:
             return replace(search, stayed=True)
     if count is None:

@@ -26,7 +26,7 @@ def outward(value: float, side: int) -> float:
     return float(f"{(math.ceil if side > 0 else math.floor)(value / step) * step:.6g}")
 
 
-def _grouped(unit: str) -> str:
+def grouped(unit: str) -> str:
     """Return a unit that may stand after a stroke."""
     return f"({unit})" if "/" in unit else unit
 
@@ -88,7 +88,7 @@ class Words:
             value=limit.value,
             text=self.limit(limit),
             worth={figure: worth},
-            unit={figure: f"{self.si(figure)}/{_grouped(self.si(limit.name))}"},
+            unit={figure: f"{self.si(figure)}/{grouped(self.si(limit.name))}"},
             reading=f"{amount:.3g}{figure_text} per {per}",
         )
 

@@ -1,0 +1,226 @@
+"""Solve a scene for every combination of some of its numbers: a row each."""
+
+import functools
+import itertools
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from loomopt import designs
+from loomopt.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.nlp.point import Point
+from loomopt.provenance import versions
+from loomopt.quantities import QuantityError
+from loomopt.scene_errors import misread, refusal
+from loomopt.scene_numbers import files, quantity
+from loomopt.scenes import Scene
+from loomopt.solving import engine
+from loomopt.solving.asked import ACCURACY, check_numbers, target_name
+from loomopt.solving.solution import Solution
+from loomopt.studies import ranges, warm
+from loomopt.studies.lattice import Lattice
+from loomopt.studies.rows import Row
+from loomopt.studies.runs import Task
+
+PLAN = 1
+"""Raised when the plan or what a row holds changes: rows of another plan are other rows."""
+Over = Mapping[str, str | Sequence[str | float]]
+"""Dotted key of a scene → "LO:HI:STEP UNIT", or its values as a scene would give them."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A number to be swept: its key, its values as a scene gives them, and in SI; kind: of quantity."""
+
+    key: str
+    texts: tuple[str | float, ...]
+    values: tuple[float, ...]
+    kind: str
+
+    @property
+    def ranks(self) -> tuple[int, ...]:
+        """The place of each value by size."""
+        order = sorted(range(len(self.values)), key=lambda k: (self.values[k], k))
+        return tuple(order.index(k) for k in range(len(self.values)))
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The plan of a sweep: small, and it pickles.
+
+    scene: with the first value of every axis; target: by name; cold: whether every point is solved from scratch, as
+    where each local optimum is the best there is; accuracy, seed: of every solve.
+    """
+
+    scene: Scene
+    target: str
+    axes: tuple[Axis, ...]
+    accuracy: float
+    seed: int
+    cold: bool
+
+    name = "sweep"
+
+    @property
+    def asked(self) -> dict[str, object]:
+        """What is asked of every row, for people."""
+        ends = ((axis.key, axis.texts[0], axis.texts[-1], len(axis.texts)) for axis in self.axes)
+        over = "; ".join(f"{key} = {first} ... {last}, {count} values" for key, first, last, count in ends)
+        return {"over": over, "accuracy": self.accuracy, "seed": self.seed}
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """What its rows depend on, as JSON data."""
+        over = [[axis.key, list(axis.values)] for axis in self.axes]
+        return {
+            "study": f"{self.name} {PLAN}",
+            "scene": self.scene.hash,
+            "units": dict(self.scene.units),
+            "files": files(self.scene),
+            "target": self.target,
+            "over": over,
+            "accuracy": self.accuracy,
+            "seed": self.seed,
+            "cold": self.cold,
+            **versions(),
+        }
+
+    @functools.cached_property
+    def key(self) -> str:
+        """A hash of all that its rows depend on."""
+        import hashlib
+
+        return hashlib.sha256(json.dumps(self.settings, sort_keys=True).encode()).hexdigest()[:32]
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Key of each axis → kind of quantity."""
+        return {axis.key: axis.kind for axis in self.axes}
+
+    @property
+    def size(self) -> int:
+        """How many points there are."""
+        return self.lattice.size
+
+    @functools.cached_property
+    def lattice(self) -> Lattice:
+        """Its points."""
+        return Lattice(tuple(axis.ranks for axis in self.axes))
+
+    def batch(self, rows: Sequence[Row]) -> list[Task]:
+        """Return the tasks of the next round, from all rows of earlier ones."""
+        rounds = [list(range(self.size))] if self.cold else self.lattice.rounds
+        done = list(itertools.accumulate(map(len, rounds), initial=0)).index(len(rows))
+        known = {row.point: row for row in rows if row.warm}
+        usable = sorted(known)
+        return [self._task(point, usable, known) for point in (rounds[done] if done < len(rounds) else ())]
+
+    def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> Task:
+        places = zip(self.axes, self.lattice.places(point), strict=True)
+        parent, *beyond = self.lattice.neighbours(point, usable) if usable else [None]
+        ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
+        return Task(point, parent, {axis.key: axis.values[k] for axis, k in places}, ask)
+
+    def scene_at(self, point: int) -> Scene:
+        """Return the scene of a point. Raises BadInput for a combination that is none."""
+        places = zip(self.axes, self.lattice.places(point), strict=True)
+        return self.scene.update({axis.key: axis.texts[k] for axis, k in places})
+
+    def solve(self, task: Task, parent: Row | None) -> Solution:
+        """Return the answer of a task. Raises BadInput for a combination that is no scene."""
+        scene = self.scene_at(task.point)
+        program = registry.of(scene).program(scene, self.target)
+        starts = [parent.warm if parent else {}, *task.ask["beyond"]]
+        near: list[Point] = [point for data in starts if (point := warm.read(data, program))]
+        return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
+
+    def _warm(self, task: Task, answer: Solution) -> dict[str, object]:
+        """Return what a neighbour can start from."""
+        scene = self.scene_at(task.point)
+        return warm.written(answer.point, registry.of(scene).program(scene, self.target))
+
+    def solved(self, task: Task, parent: Row | None) -> Row:
+        """Return the row of a task. Raises BadInput for a combination that is no scene."""
+        answer = self.solve(task, parent)
+        passed = answer.certificate is not None and answer.certificate.passed
+        leads = passed and not self.cold
+        return Row(
+            point=task.point,
+            place=task.place,
+            parent=task.parent,
+            status=answer.status,
+            reason=None if answer.status == "optimal" else _reason(answer),
+            design=designs.flat(answer.design),
+            figures={name: _finite(value) for name, value in answer.figures.items()},
+            multipliers=multipliers(answer),
+            reached=answer.reached,
+            certified=passed,
+            seconds=answer.time["total_s"],
+            warm=self._warm(task, answer) if leads else {},
+        )
+
+
+def multipliers(answer: Solution) -> dict[str, float]:
+    """Return what each limit that binds costs: the figure that it moves, the limit and its side → worth, SI."""
+    return {
+        priced(figure, each.limit, each.side): worth for each in answer.binding for figure, worth in each.worth.items()
+    }
+
+
+def priced(figure: str, limit: str, side: str) -> str:
+    """Return the name of a multiplier."""
+    return f"{figure} per {limit} {side}"
+
+
+def _reason(answer: Solution) -> str:
+    clash = f"limits that clash: {', '.join(answer.clash)}" if answer.clash else answer.message
+    return f"{clash}; {answer.explanation}" if answer.explanation else clash
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0) -> Sweep:
+    """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
+    name = target_name(scene, target)
+    check_numbers(accuracy, None)
+    if not over:
+        remedy = 'Name a number and its values: --over "operation.speed=300:600:50 rpm"'
+        raise refusal("there is nothing to sweep over", scene.origin, "over", remedy=remedy)
+    listed = {key: ranges.values(given, key) if isinstance(given, str) else list(given) for key, given in over.items()}
+    for key, texts in listed.items():
+        if not texts:
+            raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give one at least")
+    if math.prod(map(len, listed.values())) > ranges.MOST_VALUES:
+        remedy = "Sweep over fewer values at a time"
+        raise refusal(f"these are more than {ranges.MOST_VALUES} combinations", scene.origin, "over", remedy=remedy)
+    ends = [{key: texts[k] for key, texts in listed.items()} for k in (0, -1)]
+    base = scene.update(ends[0])
+    axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
+    job = registry.of(base)
+    job.demand(base, name)
+    return Sweep(base, name, axes, accuracy, seed, bool(job.program(base, name).single))
+
+
+def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]) -> Axis:
+    """Return an axis, each of whose values makes a scene with the first or the last values of the others.
+
+    Raises BadInput.
+    """
+    kind = quantity(base, key)
+    values = []
+    for text in texts:
+        try:
+            values.append(kind.validate(text))
+        except QuantityError as error:
+            raise misread(error, base.origin, key, text) from None
+        try:
+            base.set(key, text)
+        except BadInput:
+            if len(ends[0]) == 1:
+                raise
+            base.update({**ends[-1], key: text})
+    return Axis(key, tuple(texts), tuple(values), kind.kind)

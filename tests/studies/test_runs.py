@@ -1,0 +1,123 @@
+"""Running studies: the same rows whoever computes them, whatever dies; nothing finished is lost or done twice."""
+
+import json
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from multiprocessing import get_context
+
+import pytest
+from made_up_study import Chain
+
+from loomopt.errors import BadInput
+from loomopt.studies import executors, runs, workers
+from loomopt.studies.rows import Row, digest
+from loomopt.studies.store import Store
+
+
+@pytest.fixture
+def chain(tmp_path):
+    return Chain(tmp_path / "log")
+
+
+def values(rows):
+    return [row.figures.get("value") for row in rows]
+
+
+def test_rows_come_in_the_order_of_points_each_after_its_parent(chain):
+    seen: list[Row] = []
+    rows = runs.run(chain, on_row=seen.append)
+    assert [row.point for row in rows] == list(range(24))
+    assert [row.parent for row in rows] == [None] * 8 + list(range(16))
+    assert values(rows)[16] == 0.1 * 16 + (0.1 * 8 + 0.0)
+    assert tuple(seen) == rows
+    assert chain.solves() == list(range(24))
+
+
+def test_threads_and_processes_give_the_same_digest(chain):
+    expected = digest(runs.run(chain))
+    with ThreadPoolExecutor(3) as threads:
+        assert digest(runs.run(chain, threads)) == expected
+    with ProcessPoolExecutor(2, get_context("spawn")) as processes:
+        assert digest(runs.run(chain, processes)) == expected
+        assert processes.submit(int, 7).result() == 7, "a caller's executor goes on living"
+    assert digest(runs.run(chain, executors.workers(2))) == expected
+
+
+def test_a_point_that_fails_is_a_row_with_its_reason_and_the_others_go_on(chain):
+    rows = runs.run(replace(chain, raises=(3,)))
+    assert (rows[3].status, rows[3].reason, rows[3].certified) == ("failed", "no such point", False)
+    assert {row.status for row in rows if row.point != 3} == {"optimal"}
+    assert rows[11].parent == 3
+
+
+def test_a_worker_that_dies_costs_a_new_pool_and_no_row(chain):
+    expected = digest(runs.run(replace(chain, log=chain.log.with_name("other"))))
+    dying = replace(chain, kills_once=(2, 13))
+    assert digest(runs.run(dying, executors.workers(2))) == expected
+    assert dying.solves().count(2) == dying.solves().count(13) == 2
+
+
+def test_a_point_that_kills_three_workers_is_a_failed_row(chain):
+    lethal = replace(chain, kills=(5,))
+    rows = runs.run(lethal, executors.workers(2))
+    assert lethal.solves().count(5) == 3
+    assert (rows[5].status, rows[5].reason) == ("failed", workers.DIED)
+    assert {row.status for row in rows if row.point != 5} == {"optimal"}
+
+
+def test_a_broken_executor_of_the_callers_is_told(chain):
+    with ProcessPoolExecutor(1, get_context("spawn")) as processes, pytest.raises(BrokenProcessPool):
+        runs.run(replace(chain, kills=(0,)), processes)
+
+
+@pytest.mark.parametrize("make", [None, ThreadPoolExecutor], ids=["serial", "threads"])
+def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_nothing(chain, tmp_path, make):
+    expected = digest(runs.run(replace(chain, log=tmp_path / "other")))
+
+    def stop(row):
+        if row.point == 11:
+            raise KeyboardInterrupt
+
+    with Store(tmp_path / "s.db") as store:
+        store.begin(chain.key, {})
+        with pytest.raises(KeyboardInterrupt):
+            runs.run(chain, make and make(1), store, stop)
+        kept = [row.point for row in store.rows(chain.key)]
+        assert set(range(12)) <= set(kept)
+    with Store(tmp_path / "s.db") as store:
+        assert digest(runs.run(chain, None, store)) == expected
+    assert sorted({*chain.solves()}) == list(range(24))
+    assert all(chain.solves().count(point) == 1 for point in kept)
+
+
+def test_tasks_are_told_again_from_rows(chain):
+    rows = runs.run(chain)
+    again = list(runs.tasks(chain, rows))
+    assert [task.point for task, _ in again] == list(range(24))
+    assert all(parent == (rows[task.parent] if task.parent is not None else None) for task, parent in again)
+    assert len(list(runs.tasks(chain, rows[:10]))) == 10
+
+
+def test_a_digest_leaves_out_seconds_and_order_and_nothing_else():
+    row = Row(0, {"a": 0.1}, None, "optimal", None, figures={"f": 1 / 3}, warm={"x": [0.1]})
+    other = Row(1, {"a": 0.2}, 0, "optimal", None)
+    assert digest([row, other]) == digest([other, replace(row, seconds=7.0)])
+    for change in ({"warm": {"x": [0.2]}}, {"figures": {"f": 0.3333333333333333 + 1e-16}}, {"parent": 1}):
+        assert digest([row, other]) != digest([replace(row, **change), other])
+
+
+def test_a_row_is_the_same_through_json():
+    row = Row(
+        3, {"a": 0.1}, 1, "failed", "why", {"l": 1e-300}, {"f": None, "g": 5e-324}, {"f per l min": -0.0}, {"f": True}
+    )
+    assert Row.from_dict(json.loads(json.dumps(row.as_dict()))) == row
+    assert "warm" not in row.told()
+    with pytest.raises(TypeError):
+        row.as_dict()["figures"]["f"] = 1.0
+
+
+@pytest.mark.parametrize("count", [0, -1, 5000])
+def test_a_number_of_workers_that_cannot_be_is_refused(count):
+    with pytest.raises(BadInput, match="1 to 1024"):
+        executors.workers(count)
