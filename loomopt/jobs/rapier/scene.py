@@ -14,7 +14,7 @@ from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, Po
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target
+from loomopt.schema import Axis, Figure, Table, Target
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""
@@ -95,6 +95,20 @@ FIGURES = {
     )
 }
 
+AXES = {
+    axis.name: axis
+    for axis in (
+        Axis("stroke", "length"),
+        Axis("dwell", "angle", senses=("most",)),
+        Axis("dwell_after", "angle", senses=("most",)),
+        Axis("dwell_before", "angle", senses=("most",)),
+        Axis("rms_jerk", "travel jerk", ("jerk_mean_square",), senses=("least",), power=2),
+        Axis("match_rms", "length", ("match_mean_square",), senses=("least",), power=2),
+        Axis("mu_min", "angle", ("obliquity",), "peak", ("most",), -1, math.pi / 2),
+        Axis("sley_mu_min", "angle", ("sley_mu_near", "sley_mu_far"), senses=("most",)),
+    )
+}
+
 STROKE = ("stroke", "s_dwell", "dwell_after", "dwell_before")
 """Numbers of the operation that a target keeps."""
 TARGETS = {
@@ -151,6 +165,7 @@ SCHEMA = SceneSchema(
     default_target="stroke-dwell",
     check=check,
     fault=rapier_faults.named,
+    own_axes=AXES,
     own_margins=dict.fromkeys(SLEY_MARGINS, "length") | dict.fromkeys(CLOSES, "number"),
     groups={"sley": SLEY},
 )
