@@ -17,7 +17,7 @@ Asked = Mapping[str, Sense]
 
 @dataclass(frozen=True)
 class Traded:
-    """An axis and the end of it that is sought: figure = offset + sign · value^(1/power), the least value being sought."""
+    """An axis and the end of it that is sought: the least value, of which figure = offset + sign · value^(1/power)."""
 
     axis: Axis
     sense: Sense
@@ -94,7 +94,7 @@ def with_axes(
         if opposed:
             program = replace(program, model=opposing(program.model, rows))
             rows = tuple(map(opposite, rows))
-        objective = Objective(name, rows[0], form, size(name), axis.power, rows[1:])  # type: ignore[arg-type]
+        objective = Objective(name, rows[0], form, size(name), axis.power, rows[1:])
         found.append(Traded(axis, sense, objective))
     levels = (*program.objectives, *(traded.objective for traded in found))
     return replace(program, objectives=levels), tuple(found)

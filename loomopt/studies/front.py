@@ -29,6 +29,8 @@ SEARCHED = 3
 """Of the first round, so many points spread over it are searched for beyond their neighbours' basins."""
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""
+DIVERGED = "Diverging_Iterates"
+"""IPOPT's word for an objective that falls without end."""
 Ranges = Mapping[str, tuple[float, float]]
 
 
@@ -74,8 +76,8 @@ class Trade:
         if not rows:
             return [Task(end, None, {}, {"end": end}) for end in ENDS]
         by_point = {row.point: row for row in rows}
+        self._refuse(by_point)
         if not all(by_point[end].certified for end in ENDS):
-            self._refuse(by_point)
             return []
         scale = self.scale(rows)
         if not all(scale.width):
@@ -97,16 +99,18 @@ class Trade:
         return front_plan.scaled({row.point: row for row in rows}, self.axes, self.signs, (first, second))
 
     def _refuse(self, rows: Mapping[int, Row]) -> None:
-        """Raise BadInput where an end has no least value: then the search runs away."""
+        """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
         for end, name, other in zip(ENDS, self.axes, self.axes[::-1], strict=True):
-            if rows[end].status in ("failed", "uncertified"):
-                sense = self.senses[end]
+            row, sense = rows[end], self.senses[end]
+            away = self.solver.runaway(row.warm["point"]["x"]) if "point" in row.warm else ""
+            if away or row.reason == DIVERGED:
+                why = f"{away} grows without end towards it" if away else "the search runs away from any design"
                 raise BadInput(
-                    f"the {sense} {name} has no certified design: {rows[end].reason}",
+                    f"the {sense} {name} is not reached: {why}",
                     file=self.scene.origin,
                     key=name,
-                    allowed=f"an axis that has a {sense} value, such as one whose range is given",
-                    remedy=f"Give --range of {name} or of {other}.",
+                    allowed=f"a {sense} {name} that some design has",
+                    remedy=f"Give --range of {name} or of {other}, or bound {away or 'every variable'}.",
                 )
 
     def solved(self, task: Task, parent: Row | None) -> Row:
@@ -148,9 +152,8 @@ class Trade:
 
     def _end(self, end: int) -> tuple[Reached, dict[str, float]]:
         """Return an end of the front, and what was asked there: the axis' least, but not beyond its range."""
-        other = 1 - end
-        caps = (self._cap(0), None) if end == 1 else (None, self._cap(1))
-        found = self.solver.solve(Asking(end, caps), (), True)  # type: ignore[arg-type]
+        asking = Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
+        found = self.solver.solve(asking, (), True)
         least = self._cap(end, best=True)
         if least is None:
             return found, {}
@@ -160,8 +163,8 @@ class Trade:
             reached = sought.value(found.warm["axes"][self.axes[end]])
         if reached is not None and reached >= least:
             return found, {}
-        caps = (caps[0], least) if end == 1 else (least, caps[1])
-        capped = self.solver.solve(Asking(other, caps), (), True)  # type: ignore[arg-type]
+        asking = Asking(0, (asking.caps[0], least)) if end else Asking(1, (least, asking.caps[1]))
+        capped = self.solver.solve(asking, (), True)
         return capped, {self.axes[end]: sought.figure(least)}
 
 

@@ -5,6 +5,7 @@ is limited, a of the axis that is sought. A function of finished rows alone.
 """
 
 import heapq
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ BENT = 0.01
 STOPS = 0.1
 """Share of its mean slope that a front must have where it ends, for a kink: beyond it nothing changes any more."""
 MOST_MORE = 3
-"""Times the points asked for that rows may come to with those that narrow changes down and those that were dominated."""
+"""Times the points asked for that rows may come to, with those that narrow changes down and those once dominated."""
 
 
 class Spot(NamedTuple):
@@ -61,7 +62,7 @@ class Scale(NamedTuple):
 
 
 class Next(NamedTuple):
-    """A point to come: at most so much of b; near: rows to start from, the first one its parent; again: of which row."""
+    """A point to come, at most at b; near: rows to start from, the first one its parent; again: which row it redoes."""
 
     b: float
     near: tuple[int, ...]
@@ -99,7 +100,7 @@ def _spot(row: Row, scale: Scale) -> Spot:
 
 
 def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
-    """Return the next batch: what is dominated again, then the widest gaps until there are enough points, then changes."""
+    """Return the next batch: what is dominated again, the widest gaps until there are enough points, then changes."""
     front, worse = spots(rows, scale)
     if len(rows) >= MOST_MORE * points:
         return []
@@ -119,7 +120,7 @@ def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
 def _halved(front: Sequence[Spot], missed: Sequence[float], room: int) -> list[float]:
     """Return the middles of the widest gaps, each halved again as if its halves were alike."""
     heap = []
-    for left, right in zip(front, front[1:], strict=False):
+    for left, right in itertools.pairwise(front):
         for low, high in _open(left, right, missed):
             share = (high - low) / (right.b - left.empty)
             heap.append((-max(high - low, share * (left.a - right.a)), low, high))
@@ -139,7 +140,7 @@ def _open(left: Spot, right: Spot, missed: Sequence[float]) -> Iterator[tuple[fl
     """Yield the stretches between two points that are wide enough, parted by what was asked in vain."""
     inner = sorted(b for b in missed if left.empty < b < right.b)
     ends = (left.empty, *inner, right.b)
-    yield from ((low, high) for low, high in zip(ends, ends[1:], strict=False) if high - low > NARROW)
+    yield from ((low, high) for low, high in itertools.pairwise(ends) if high - low > NARROW)
 
 
 def _narrowed(front: Sequence[Spot], missed: Sequence[float]) -> list[float]:
@@ -148,7 +149,7 @@ def _narrowed(front: Sequence[Spot], missed: Sequence[float]) -> list[float]:
     At an end what stops the front takes the place of the limit on b: that is no change.
     """
     wide = []
-    for left, right in zip(front, front[1:], strict=False):
+    for left, right in itertools.pairwise(front):
         end = left is front[0] or right is front[-1]
         for low, high in _open(left, right, missed):
             if len(_changing(left, right)) > end:
@@ -162,7 +163,7 @@ def _changing(left: Spot, right: Spot) -> set[str]:
 
 
 def _between(front: Sequence[Spot], b: float) -> Next:
-    """Return a point with its parent, the nearest of lower index, and the other neighbour where that is another kind."""
+    """Return a point with its parent, the nearest (of two the lower), and the other neighbour if it touches others."""
     left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b)
     right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b)
     near, other = sorted((left, right), key=lambda spot: (abs(spot.b - b), spot.point))
@@ -181,7 +182,7 @@ def told(front: Sequence[Spot], scale: Scale) -> tuple[list[dict[str, Any]], lis
     """Return what changes along the front, and the stretches of b where nothing is better, SI, in the order of b."""
     changes, gaps = [], []
     ends = set(scale.names)
-    for left, right in zip(front, front[1:], strict=False):
+    for left, right in itertools.pairwise(front):
         jumps = right.b - left.b > NARROW and right.b - left.empty <= 2 * NARROW and left.empty > left.b + NARROW
         jumps = jumps or (right.b - left.b <= 2 * NARROW and left.a - right.a > 100 * NARROW + 2 * _fall(left, right))
         if jumps:
@@ -212,7 +213,9 @@ def _fall(left: Spot, right: Spot) -> float:
     return max(abs(left.slope), abs(right.slope)) * (right.b - left.b)
 
 
-def scaled(rows: Mapping[int, Row], names: tuple[str, str], signs: tuple[int, int], sizes: tuple[float, float]) -> Scale:
+def scaled(
+    rows: Mapping[int, Row], names: tuple[str, str], signs: tuple[int, int], sizes: tuple[float, float]
+) -> Scale:
     """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI."""
     ends = [[signs[k] * value(rows[row], names[k]) for k in (0, 1)] for row in (0, 1)]
     widths = [abs(one - other) for one, other in zip(*ends, strict=True)]

@@ -1,13 +1,12 @@
 """One point of a front: the least of one axis with the other at most so much, then the least of the other."""
 
-import time
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 from loomopt.jobs import registry
-from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
 from loomopt.program.axes import Asked, Traded
@@ -24,6 +23,8 @@ from loomopt.tolerances import FEASIBLE
 
 CAPPED = " at most as asked"
 """What the limit on an axis is called, after the axis."""
+RUNAWAY = 100.0
+"""Natural sizes beyond which a variable without a bound has no end: no machine is so far from today's."""
 SIDES = {-1: "min", 0: "fixed", 1: "max"}
 
 
@@ -74,6 +75,11 @@ class Solver:
     def held(self) -> int:
         """How many levels come before the axes."""
         return len(self.base.objectives) - 2
+
+    def runaway(self, x: Mapping[str, float]) -> str:
+        """Return which variable without a bound is out of all proportion at x (SI); "" for none."""
+        loose = (v for v in self.base.variables if not math.isfinite(v.upper if x[v.name] > 0 else v.lower))
+        return next((v.called for v in loose if abs(x[v.name]) > RUNAWAY * v.scale), "")
 
     def program(self, asking: Asking) -> Program:
         """Return a program of the front: caps are limits whose values are parameters of what is built."""
@@ -142,16 +148,20 @@ class Solver:
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
         status = "optimal" if certified else "infeasible" if held else "uncertified"
-        told = {"structure": asking.structure, "point": warm.packed(best.candidate.point, best.x)}
-        told["active"] = self._active(program, best.x)
-        told["axes"] = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
-        told["held"] = list(objectives(program, best.x)[: self.held])
+        axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
+        told = {
+            "structure": asking.structure,
+            "point": warm.packed(best.candidate.point, best.x),
+            "active": self._active(program, best.x),
+            "axes": axes,
+            "held": list(objectives(program, best.x)[: self.held]),
+        }
         return Reached(
             status,
             None if certified else reason,
             dict(here.design),
             dict(here.figures),
-            self._multipliers(best, told["axes"]),
+            self._multipliers(best, axes),
             dict(here.reached),
             told,
         )
@@ -169,7 +179,7 @@ class Solver:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
         return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
 
-    def _multipliers(self, best: Judged, figures: Mapping[str, Any]) -> dict[str, float]:
+    def _multipliers(self, best: Judged, figures: Mapping[str, float]) -> dict[str, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
         sought, paid = self.axes
         found: dict[str, float] = {}

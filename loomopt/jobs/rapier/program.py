@@ -40,11 +40,12 @@ def model(scene: Scene, asked: Collection[str] = (), read: bool = True) -> JobMo
 
     asked: the target, or what is traded.
     """
-    means = (jerk_mean(),) if {"smooth", "rms_jerk"} & set(asked) else ()
-    means += (match_mean(*match_table(scene)),) if {"match", "match_rms"} & set(asked) else ()
+    read_too = {*asked, *scene.limits}
+    means = [jerk_mean()] if {"smooth", "rms_jerk"} & read_too else []
+    means += [match_mean(*match_table(scene))] if {"match", "match_rms"} & read_too else []
     known = {*numbers(scene), *(("phi_stroke",) if asked else ()), *((DWELL,) if DWELL in asked else ())}
     effects = scene.active if read else ()
-    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, asked), means)
+    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, asked), tuple(means))
 
 
 def _arcs(scene: Scene, asked: Collection[str]) -> tuple[tuple[float, str], ...]:
@@ -127,7 +128,9 @@ def _reads_effects(scene: Scene, asked: Collection[str]) -> bool:
     """Say whether the program reads anything that effects give: then they are in it, else they are not."""
     checks = [effect for effect in scene.active if isinstance(effect, Check)]
     given = {name for check in checks for name in (*check.quantities, *check.rows)}
-    return bool((given | set(LOADED)) & {*scene.limits, *asked}) or any(check.demands or check.least for check in checks)
+    return bool((given | set(LOADED)) & {*scene.limits, *asked}) or any(
+        check.demands or check.least for check in checks
+    )
 
 
 def _demand_figures(scene: Scene, traded: Collection[str]) -> None:
@@ -189,7 +192,7 @@ def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
         size = sampler.peak(name) or 1.0
         return [Limit(name, sign, name, value, size, "cycle") for sign, value in sides]
     rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
-    size = 1.0
+    size = sampler.single(name) if name == "rms_jerk" else 1.0
     return [Limit(name, sign, row, value, size, "static") for sign, value in sides for row in rows]
 
 

@@ -83,7 +83,7 @@ FIGURES = {
         Figure("dwell", "angle", "the lesser of both dwells", sides=()),
         Figure("peak_acceleration", "travel acceleration", "peak |S''| over the cycle", sides=("max",)),
         Figure("peak_jerk", "travel jerk", "peak |S'''| over the cycle", sides=("max",)),
-        Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=()),
+        Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=("max",)),
         Figure("mu_min", "angle", "least transmission angle at D", sides=("min",)),
         Figure("phi_stroke", "angle", "crank angle of the hand-over, where the stroke is reached"),
         Figure("swing", "angle", "sley swing"),
