@@ -21,7 +21,8 @@ from loomopt.solving.words import Words
 from loomopt.studies import front_plan
 from loomopt.studies.front_plan import Next, Scale
 from loomopt.studies.front_solve import Asking, Reached, Solver
-from loomopt.studies.rows import Row, Task
+from loomopt.studies.rows import Row
+from loomopt.studies.runs import Task
 from loomopt.units import SI_UNIT
 
 POINTS, FEWEST = 40, 3
@@ -90,7 +91,8 @@ class Trade:
     def _task(self, point: int, each: Next, scale: Scale, rows: Mapping[int, Row], wide: bool) -> Task:
         others = [rows[other].warm for other in each.near[1:]]
         held = rows[ENDS[0]].warm["held"]
-        ask = {"also": others, "held": held, "wide": wide, "again": each.again}
+        ask = {"also": others, "held": held, "wide": wide}
+        ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
         return Task(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask)
 
     def scale(self, rows: Sequence[Row]) -> Scale:
@@ -126,7 +128,7 @@ class Trade:
             found = _kept(found, task.ask["held"])
         else:
             found, place = self._end(int(end))
-        told = {**found.warm, "again": task.ask.get("again")}
+        told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near")}}
         return Row(
             task.point,
             place,

@@ -62,11 +62,15 @@ class Scale(NamedTuple):
 
 
 class Next(NamedTuple):
-    """A point to come, at most at b; near: rows to start from, the first one its parent; again: which row it redoes."""
+    """A point to come, at most at b.
+
+    near: rows to start from, the first one its parent; again: which row it redoes; fine: whether it narrows a change.
+    """
 
     b: float
     near: tuple[int, ...]
     again: int | None = None
+    fine: bool = False
 
 
 def value(row: Row, axis: str) -> float:
@@ -95,25 +99,45 @@ def _spot(row: Row, scale: Scale) -> Spot:
     b, a = scale.position(1, value(row, scale.names[1])), scale.position(0, value(row, scale.names[0]))
     asked = row.place.get(scale.names[1])
     empty = b if asked is None else max(b, scale.position(1, asked))
-    slope = row.multipliers.get(scale.names[1], 0.0) * scale.width[1] / scale.width[0]
+    slope = row.multipliers[" per ".join(scale.names)] * scale.width[1] / scale.width[0]
     return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], tuple(map(tuple, row.warm["active"])))
 
 
 def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
-    """Return the next batch: what is dominated again, the widest gaps until there are enough points, then changes."""
+    """Return the next batch: what is dominated again, the widest gaps until there are enough points, then changes.
+
+    Before these are narrowed down, either side of each is solved from the other: its basin may be the better one there.
+    """
     front, worse = spots(rows, scale)
     if len(rows) >= MOST_MORE * points:
         return []
+    by_point = {row.point: row for row in rows}
+    redone = {(row.warm["again"], row.parent) for row in rows}
     missed = [scale.position(1, row.place[scale.names[1]]) for row in rows if not row.certified and row.place]
-    tried = {(row.warm.get("again"), row.point) for row in rows}
-    done = {again for again, _ in tried if again is not None}
-    again = [(row, by) for row, by in worse if row.place and row.point not in done and row.warm.get("again") is None]
+    # Each row is redone from one that dominates it once, and from each neighbour that touches others once.
+    done = {point for point, _ in redone}
+    pairs = [(row.point, by) for row, by in worse if row.point not in done]
+    room = points - len(front) - len(missed)
+    if room <= 0 and not pairs and not any(row.warm["fine"] for row in rows):
+        pairs = [
+            (point, by)
+            for point, by in _crossed(front)
+            if (point, by) not in redone and by not in (by_point[point].warm["near"] or ())
+        ]
+    asked = [(by_point[point], by) for point, by in pairs]
+    again = [(row, by) for row, by in asked if row.place and row.warm["again"] is None]
     found = [Next(scale.position(1, row.place[scale.names[1]]), (by,), row.point) for row, by in again][:BATCH]
-    room = min(BATCH - len(found), points - len(front) - len(missed))
-    if room > 0:
-        found += [_between(front, b) for b in _halved(front, missed, room)]
-    if not found:
-        found = [_between(front, b) for b in _narrowed(front, missed)]
+    if room > 0 and len(found) < BATCH:
+        found += [_between(front, b) for b in _halved(front, missed, min(BATCH - len(found), room))]
+    return found or [_between(front, b)._replace(fine=True) for b in _narrowed(front, missed)]
+
+
+def _crossed(front: Sequence[Spot]) -> list[tuple[int, int]]:
+    """Return the points whose neighbour touches others, each with that neighbour."""
+    found = []
+    for left, right in itertools.pairwise(front):
+        if len(_changing(left, right)) > (left is front[0] or right is front[-1]):
+            found += [(left.point, right.point), (right.point, left.point)]
     return found
 
 

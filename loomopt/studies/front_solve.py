@@ -39,11 +39,6 @@ class Asking(NamedTuple):
     caps: tuple[float | None, float | None]
     levels: Literal[1, 2] = 1
 
-    @property
-    def structure(self) -> str:
-        """Equal where built programs are."""
-        return f"{self.first}{self.levels}{''.join('-' if cap is None else '+' for cap in self.caps)}"
-
 
 @dataclass(frozen=True)
 class Reached:
@@ -70,6 +65,11 @@ class Solver:
         self.scene, self.accuracy, self.job = scene, accuracy, registry.of(scene)
         self.base, axes = self.job.traded(scene, target, asked)
         self.axes: tuple[Traded, Traded] = (axes[0], axes[1])
+
+    @property
+    def slope(self) -> str:
+        """What a row calls the slope of the first axis over the second."""
+        return f"{self.axes[0].axis.name} per {self.axes[1].axis.name}"
 
     @property
     def held(self) -> int:
@@ -119,8 +119,8 @@ class Solver:
         search = self._begun(asking)
         program = search.program
         for data in near:
-            if data.get("structure") == asking.structure:
-                point = warm.unpacked(data["point"], program.structure)
+            point = warm.read(data["point"], program)
+            if point:
                 search = tried(search, point.x, point)
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
@@ -150,8 +150,7 @@ class Solver:
         status = "optimal" if certified else "infeasible" if held else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
-            "structure": asking.structure,
-            "point": warm.packed(best.candidate.point, best.x),
+            "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
@@ -188,10 +187,10 @@ class Solver:
             if price.limit.name == cap:
                 slope -= price.worth if price.objective.figure == sought.axis.name else 0.0
             elif not price.limit.name.endswith(CAPPED):
-                name = f"{price.limit.name} {SIDES[price.side]}"
+                name = f"{price.objective.figure} per {price.limit.name} {SIDES[price.side]}"
                 found[name] = found.get(name, 0.0) + price.worth
         here = figures[paid.axis.name]
-        return {paid.axis.name: sought.sign * slope * paid.slope(here) + 0.0, **found}
+        return {self.slope: sought.sign * slope * paid.slope(here) + 0.0, **found}
 
     def _active(self, program: Program, x: Mapping[str, float]) -> list[list[Any]]:
         """Return what is touched, and where the first axis stands highest: label, place, how often."""

@@ -1,17 +1,23 @@
-"""A row of a study, and a task that a row is solved from: plain data, exact through JSON."""
+"""The rows of a study: plain records that are the same numbers in memory, in a store and in a worker process."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any
+
+from loomopt.frozen import freeze
+
+UNTIMED = "seconds"
+"""The one part of a row that is not the same each time."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One point of a study, SI and rad.
+    """What came of one point of a study; numbers SI.
 
-    point: its number in the plan; place: what was asked, scene key or axis → value; parent: the point it started warm
-    from, None for cold; status, reason: as of an answer; multipliers: what limits are worth, and slopes; warm: plain
-    JSON from which a neighbour starts.
+    point: its number in the plan; place: what was asked, by scene key or axis; parent: the point that it started warm
+    from, None for one that started cold; status: as of a solve; reason: why it is not optimal; multipliers: "FIGURE per
+    LIMIT SIDE" → fall of the figure per unit the limit is loosened; reached: goals of the target, met or not; warm:
+    JSON data from which a neighbour can start.
     """
 
     point: int
@@ -19,29 +25,37 @@ class Row:
     parent: int | None
     status: str
     reason: str | None
-    design: Mapping[str, float]
-    figures: Mapping[str, float | None]
-    multipliers: Mapping[str, float]
-    reached: Mapping[str, bool]
-    certified: bool
-    seconds: float
-    warm: Mapping[str, Any]
+    design: Mapping[str, float] = field(default_factory=dict)
+    figures: Mapping[str, float | None] = field(default_factory=dict)
+    multipliers: Mapping[str, float] = field(default_factory=dict)
+    reached: Mapping[str, bool] = field(default_factory=dict)
+    certified: bool = False
+    seconds: float = 0.0
+    warm: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "place", "design", "figures", "multipliers", "reached", "warm")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return asdict(self)
+        """Return it as JSON data from which `from_dict` makes the same row, bit by bit."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Row":
-        """Return the row of `as_dict`."""
+        """Return the row that JSON data say."""
         return cls(**data)
 
+    def told(self) -> dict[str, Any]:
+        """Return what `--json` prints of it: all but what only a neighbour needs."""
+        return {name: value for name, value in self.as_dict().items() if name != "warm"}
 
-@dataclass(frozen=True)
-class Task:
-    """A point to solve; ask: plain JSON data."""
 
-    point: int
-    parent: int | None
-    place: Mapping[str, float]
-    ask: Mapping[str, Any]
+def digest(rows: Iterable[Row]) -> str:
+    """Return 64 hex digits that are the same for the same rows, whatever their order; the seconds apart."""
+    import hashlib
+    import json
+
+    ordered = sorted(rows, key=lambda row: row.point)
+    data = [{name: value for name, value in row.as_dict().items() if name != UNTIMED} for row in ordered]
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

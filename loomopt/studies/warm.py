@@ -1,37 +1,47 @@
-"""Where a solve ended as plain JSON, exact, so that a neighbour starts from a row as from the solve itself."""
+"""Where a solve ended as JSON data, and back: what a neighbour starts from is the same whoever solved it."""
 
-from collections.abc import Hashable, Mapping
+import hashlib
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from loomopt.nlp.point import Point
+from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 
 
-def packed(point: Point, x: Mapping[str, float]) -> dict[str, Any]:
-    """Return a point as JSON data; x: the design that came of it, SI."""
+def written(point: Point, program: Program) -> dict[str, Any]:
+    """Return a point that a solve of a program ended in as JSON data."""
     return {
-        "x": {name: float(value) for name, value in x.items()},
-        "status": point.status,
-        "nodes": _listed(point.nodes),
-        "binding": _listed(point.binding),
-        "raw": {name: np.asarray(values).ravel().tolist() for name, values in point.raw.items()},
+        "task": _task(program),
+        "x": dict(point.x),
+        "nodes": [[list(node) for node in family] for family in point.nodes],
+        "binding": [[list(node) for node in family] for family in point.binding],
+        "raw": {name: values.tolist() for name, values in point.raw.items()},
     }
 
 
-def unpacked(data: Mapping[str, Any], structure: Hashable) -> Point:
-    """Return the point of JSON data, as one of a program's structure."""
-    raw = {name: np.array(values) for name, values in data["raw"].items()}
-    nodes, binding = _read(data["nodes"]), _read(data["binding"])
-    return Point(dict(data["x"]), data["status"], True, 0, nodes, raw=raw, binding=binding, structure=structure)
+def read(data: Mapping[str, Any], program: Program) -> Point | None:
+    """Return the point that data say, as a start for a program; None where they are of another structure, or none."""
+    if not data or data["task"] != _task(program):
+        return None
+    raw = {name: np.array(values, dtype=np.float64) for name, values in data["raw"].items()}
+    nodes, binding = _nodes(data["nodes"]), _nodes(data["binding"])
+    return Point(
+        dict(data["x"]), "Solve_Succeeded", True, nodes=nodes, raw=raw, binding=binding, structure=program.structure
+    )
 
 
-def _listed(nodes: Nodes) -> list[list[list[Any]]]:
-    return [[[int(e.piece), float(e.u), float(e.value), bool(e.signed)] for e in of] for of in nodes]
+def _nodes(families: list[list[list[Any]]]) -> Nodes:
+    return tuple(tuple(Extreme(*node) for node in family) for family in families)
 
 
-def _read(nodes: list[list[list[Any]]]) -> Nodes:
-    return tuple(tuple(Extreme(*e) for e in of) for of in nodes)
+def _task(program: Program) -> str:
+    """Return what is alike in programs of one structure and in every process: names, no formulas."""
+    objectives = [(each.rows, each.form, each.combine) for each in program.objectives]
+    limits = [limit.structure for limit in program.limits]
+    names = [variable.name for variable in program.variables], list(program.parameters)
+    return hashlib.sha256(repr((names, limits, objectives)).encode()).hexdigest()[:16]

@@ -1,0 +1,87 @@
+"""Run a study: its batches in turn, each row kept as soon as it is there; the same rows whoever computes them."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from loomopt.studies import workers
+from loomopt.studies.rows import Row
+
+if TYPE_CHECKING:
+    from loomopt.studies.store import Store
+
+
+@dataclass(frozen=True)
+class Task:
+    """One point to be solved.
+
+    place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
+    ask: what else is asked, as JSON data.
+    """
+
+    point: int
+    parent: int | None
+    place: Mapping[str, float]
+    ask: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Study(Protocol):
+    """A plan of points: small, and it pickles; the same study has the same key, and the same rows."""
+
+    @property
+    def key(self) -> str:
+        """A hash of all that its rows depend on."""
+
+    def batch(self, rows: Sequence[Row]) -> Sequence[Task]:
+        """Return the next tasks, from all rows of earlier batches and from nothing else; none at the end."""
+
+    def solved(self, task: Task, parent: Row | None) -> Row:
+        """Return the row of a task, from its arguments and from nothing else."""
+
+
+OnRow = Callable[[Row], None]
+
+
+def run(
+    study: Study,
+    executor: Executor | workers.Making | None = None,
+    store: "Store | None" = None,
+    on_row: OnRow | None = None,
+) -> tuple[Row, ...]:
+    """Return the rows of a study in the order of its points, the same whatever the executor.
+
+    executor: any of `concurrent.futures`, or a function that makes one, so that a broken one is built again; one task
+    after the other here without it. store: where each row is written as it comes, and from which rows that are there
+    are taken. on_row: called with each row, read or computed, as it is there. Raises KeyboardInterrupt on Ctrl-C.
+    """
+    known = {row.point: row for row in store.rows(study.key)} if store else {}
+    rows: dict[int, Row] = {}
+
+    def kept(row: Row, fresh: bool = True) -> None:
+        if store and fresh:
+            store.add(study.key, row)
+        rows[row.point] = row
+        if on_row:
+            on_row(row)
+
+    with workers.Crew(study, executor) as crew:
+        while tasks := study.batch(list(rows.values())):
+            there = [known.pop(task.point) for task in tasks if task.point in known]
+            for row in there:
+                kept(row, fresh=False)
+            left = [task for task in tasks if task.point not in rows]
+            crew.work([(task, None if task.parent is None else rows[task.parent]) for task in left], kept)
+            rows = dict(sorted(rows.items()))
+    return tuple(rows.values())
+
+
+def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[Task, Row | None]]:
+    """Yield every task of a study that was run, with the row of its parent."""
+    known, done = {row.point: row for row in rows}, dict[int, Row]()
+    while batch := study.batch(list(done.values())):
+        for task in batch:
+            if task.point not in known:
+                return
+            yield task, None if task.parent is None else known[task.parent]
+        done = dict(sorted({**done, **{task.point: known[task.point] for task in batch}}.items()))

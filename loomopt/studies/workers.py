@@ -1,0 +1,149 @@
+"""Who computes the rows of a study: this process, or workers of any executor; a worker may die, a pool may break."""
+
+import functools
+import pickle
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from loomopt.studies.rows import Row
+    from loomopt.studies.runs import Study, Task
+
+    Work = tuple[Task, Row | None]
+    """A task with the row of its parent."""
+
+Making = Callable[[], Executor]
+"""Makes an executor, again where the one before has broken."""
+MOST_DEATHS = 3
+"""Worker processes that may die of one point."""
+IN_FLIGHT = 256
+"""Tasks that an executor is given at a time, where it does not say how many it wants (`in_flight`)."""
+KILLED = "KilledWorker"
+"""What Dask raises for a task of which worker after worker has died."""
+DIED = f"the process that solved it died {MOST_DEATHS} times: out of memory?"
+
+_ALONE = threading.Lock()
+"""Solvers and samples are kept for the next solve, so that one process does one at a time."""
+
+
+def solved(study: bytes, task: "Task", parent: "Row | None") -> str:
+    """Return the row of a task as JSON text; what goes wrong is a failed row with its reason."""
+    import json
+
+    with _ALONE:
+        began = time.perf_counter()
+        try:
+            row = _unpickled(study).solved(task, parent)
+        except Exception as error:
+            row = _failed(task, " ".join(f"{error}".split()) or type(error).__name__, time.perf_counter() - began)
+        return json.dumps(row.as_dict())
+
+
+@functools.lru_cache(maxsize=4)
+def _unpickled(study: bytes) -> "Study":
+    found: Study = pickle.loads(study)
+    return found
+
+
+def _read(text: str) -> "Row":
+    import json
+
+    from loomopt.studies.rows import Row
+
+    return Row.from_dict(json.loads(text))
+
+
+def _failed(task: "Task", reason: str, seconds: float = 0.0) -> "Row":
+    from loomopt.studies.rows import Row
+
+    return Row(task.point, task.place, task.parent, "failed", reason, seconds=seconds)
+
+
+class Crew:
+    """Whoever works on a study, from the first task to the last.
+
+    given: an executor of the caller's, or how to make one; None for this process.
+    """
+
+    def __init__(self, study: "Study", given: Executor | Making | None) -> None:
+        self.payload = pickle.dumps(study)
+        self.make = None if isinstance(given, Executor) else given
+        self.executor = given if isinstance(given, Executor) else None
+        self.running: dict[Future[str], Work] = {}
+        self.deaths: Counter[int] = Counter()
+
+    def __enter__(self) -> "Crew":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
+        for future in self.running:
+            future.cancel()
+        self._leave(finished=kind is None)
+
+    def _leave(self, finished: bool) -> None:
+        """End an executor that was made here."""
+        if self.make and self.executor:
+            self.executor.shutdown(wait=finished, cancel_futures=True)
+            self.executor = None
+
+    def work(self, tasks: "Sequence[Work]", kept: "Callable[[Row], None]") -> None:
+        """Have tasks solved; `kept` is handed each row as it comes. Raises KeyboardInterrupt on Ctrl-C."""
+        if self.executor is None and self.make is None:
+            for task, parent in tasks:
+                kept(_read(solved(self.payload, task, parent)))
+            return
+        try:
+            for row in self._rows(deque(tasks)):
+                kept(row)
+        except KeyboardInterrupt:
+            for future in self.running:
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    kept(_read(future.result()))
+            raise
+
+    def _rows(self, waiting: "deque[Work]") -> "Iterator[Row]":
+        """Yield the rows of tasks as they come.
+
+        Where a pool broke nobody knows which task was to blame: each that was at work then has a new pool to itself.
+        """
+        suspects: deque[Work] = deque()
+        while waiting or suspects or self.running:
+            lost = self._hand_out(suspects or waiting, alone=bool(suspects))
+            for future in wait(self.running, return_when=FIRST_COMPLETED).done if self.running else ():
+                work, error = self.running.pop(future), future.exception()
+                if error is None:
+                    yield _read(future.result())
+                elif isinstance(error, BrokenExecutor) and self.make:
+                    lost.append(work)
+                elif type(error).__name__ == KILLED:
+                    yield _failed(work[0], DIED)
+                else:
+                    raise error
+            if lost:
+                lost += self.running.values()
+                self.running.clear()
+                self._leave(finished=False)
+                self.deaths.update(task.point for task, _ in lost)
+                yield from (_failed(task, DIED) for task, _ in lost if self.deaths[task.point] >= MOST_DEATHS)
+                suspects.extend(work for work in lost if self.deaths[work[0].point] < MOST_DEATHS)
+
+    def _hand_out(self, waiting: "deque[Work]", alone: bool) -> "list[Work]":
+        """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
+        if self.executor is None and self.make:
+            self.executor = self.make()
+        assert self.executor
+        most = 1 if alone else getattr(self.executor, "in_flight", IN_FLIGHT)
+        while waiting and len(self.running) < most:
+            task, parent = work = waiting.popleft()
+            try:
+                self.running[self.executor.submit(solved, self.payload, task, parent)] = work
+            except BrokenExecutor:
+                if not self.make:
+                    raise
+                return [work]
+        return []
