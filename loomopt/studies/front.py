@@ -23,6 +23,7 @@ from loomopt.studies.front_plan import Next, Scale
 from loomopt.studies.front_solve import Asking, Reached, Solver
 from loomopt.studies.rows import Row
 from loomopt.studies.runs import Task
+from loomopt.tolerances import SAME_OBJECTIVE
 from loomopt.units import SI_UNIT
 
 POINTS, FEWEST = 40, 3
@@ -155,19 +156,24 @@ class Trade:
     def _end(self, end: int) -> tuple[Reached, dict[str, float]]:
         """Return an end of the front, and what was asked there: the axis' least, but not beyond its range."""
         asking = Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
-        found = self.solver.solve(asking, (), True)
+        found, sought = self.solver.solve(asking, (), True), self.solver.axes[end]
+        reached = sought.value(found.warm["axes"][self.axes[end]]) if found.certified else -math.inf
         least = self._cap(end, best=True)
-        if least is None:
-            return found, {}
-        sought = self.solver.axes[end]
-        reached = None
-        if found.certified:
-            reached = sought.value(found.warm["axes"][self.axes[end]])
-        if reached is not None and reached >= least:
-            return found, {}
+        if least is None or reached >= least:
+            return self._sloped(found) if end and found.certified else found, {}
         asking = Asking(0, (asking.caps[0], least)) if end else Asking(1, (least, asking.caps[1]))
         capped = self.solver.solve(asking, (), True)
         return capped, {self.axes[end]: sought.figure(least)}
+
+    def _sloped(self, found: Reached) -> Reached:
+        """Return the least of the second axis as a point like the others, with its slope, where that is certified."""
+        cap = self.solver.axes[1].value(found.warm["axes"][self.axes[1]])
+        again = self.solver.solve(Asking(0, (self._cap(0), cap)), [found.warm], None)
+        if not again.certified:
+            return found
+        sizes = [axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes]
+        apart = [abs(again.warm["axes"][name] - found.warm["axes"][name]) for name in self.axes]
+        return again if all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, sizes, strict=True)) else found
 
 
 def _kept(found: Reached, held: Sequence[float]) -> Reached:

@@ -21,6 +21,8 @@ BENT = 0.01
 """Share by which slopes on either side of a change must differ for a kink."""
 STOPS = 0.1
 """Share of its mean slope that a front must have where it ends, for a kink: beyond it nothing changes any more."""
+SHEER = 2.0
+"""Times the steeper slope of two points by which a must fall between them for a jump."""
 MOST_MORE = 3
 """Times the points asked for that rows may come to, with those that narrow changes down and those once dominated."""
 
@@ -99,7 +101,7 @@ def _spot(row: Row, scale: Scale) -> Spot:
     b, a = scale.position(1, value(row, scale.names[1])), scale.position(0, value(row, scale.names[0]))
     asked = row.place.get(scale.names[1])
     empty = b if asked is None else max(b, scale.position(1, asked))
-    slope = row.multipliers[" per ".join(scale.names)] * scale.width[1] / scale.width[0]
+    slope = row.multipliers.get(" per ".join(scale.names), 0.0) * scale.width[1] / scale.width[0]
     return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], tuple(map(tuple, row.warm["active"])))
 
 
@@ -176,7 +178,7 @@ def _narrowed(front: Sequence[Spot], missed: Sequence[float]) -> list[float]:
     for left, right in itertools.pairwise(front):
         end = left is front[0] or right is front[-1]
         for low, high in _open(left, right, missed):
-            if len(_changing(left, right)) > end:
+            if len(_changing(left, right)) > end or _sheer(left, right):
                 wide.append((high - low, (low + high) / 2))
     return [b for _, b in sorted(wide, reverse=True)[:BATCH]]
 
@@ -208,7 +210,7 @@ def told(front: Sequence[Spot], scale: Scale) -> tuple[list[dict[str, Any]], lis
     ends = set(scale.names)
     for left, right in itertools.pairwise(front):
         jumps = right.b - left.b > NARROW and right.b - left.empty <= 2 * NARROW and left.empty > left.b + NARROW
-        jumps = jumps or (right.b - left.b <= 2 * NARROW and left.a - right.a > 100 * NARROW + 2 * _fall(left, right))
+        jumps = jumps or (right.b - left.b <= 2 * NARROW and _sheer(left, right))
         if jumps:
             gaps.append((scale.figure(1, left.b), scale.figure(1, right.b)))
         if left is front[0] and len(_changing(left, right)) == 1:
@@ -232,9 +234,10 @@ def _stops(left: Spot, right: Spot, at: float | None) -> bool:
     return at == right.b and abs(2 * secant - left.slope) > STOPS * abs(secant)
 
 
-def _fall(left: Spot, right: Spot) -> float:
-    """Return how far a falls between two points at the steeper of their slopes."""
-    return max(abs(left.slope), abs(right.slope)) * (right.b - left.b)
+def _sheer(left: Spot, right: Spot) -> bool:
+    """Say whether a falls by far more between two points than the steeper of their slopes lets it."""
+    steepest = max(abs(left.slope), abs(right.slope)) * (right.b - left.b)
+    return left.a - right.a > SHEER * steepest + 100 * NARROW
 
 
 def scaled(

@@ -94,8 +94,10 @@ class Solver:
         levels = (*levels[:-2], *pair[: asking.levels])
         return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps))
 
-    def solve(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool) -> Reached:
-        """Return what a program comes to, from neighbours' rows; wide: whether a search goes beyond their basins.
+    def solve(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Reached:
+        """Return what a program comes to, from neighbours' rows.
+
+        wide: whether a search goes beyond their basins; None for none even where they lead nowhere.
 
         Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough.
         """
@@ -114,7 +116,7 @@ class Solver:
         today = {**self.job.values(program, self.job.today(self.scene)), **program.today}
         return Search(self.job, program, Settings(self.accuracy), today)
 
-    def _searched(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool) -> Search:
+    def _searched(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Search:
         """Return the search for the best of a program."""
         search = self._begun(asking)
         program = search.program
@@ -125,7 +127,7 @@ class Solver:
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
         search = judged(search) if search.reached else search
-        if (wide and not program.single) or not search.passed:
+        if (wide and not program.single) or not (search.passed or wide is None):
             search = searched(search, None, 0, None, None)
         return search
 
@@ -160,7 +162,7 @@ class Solver:
             None if certified else reason,
             dict(here.design),
             dict(here.figures),
-            self._multipliers(best, axes),
+            self._multipliers(best, axes, asking),
             dict(here.reached),
             told,
         )
@@ -178,7 +180,7 @@ class Solver:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
         return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
 
-    def _multipliers(self, best: Judged, figures: Mapping[str, float]) -> dict[str, float]:
+    def _multipliers(self, best: Judged, figures: Mapping[str, float], asking: Asking) -> dict[str, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
         sought, paid = self.axes
         found: dict[str, float] = {}
@@ -190,7 +192,8 @@ class Solver:
                 name = f"{price.objective.figure} per {price.limit.name} {SIDES[price.side]}"
                 found[name] = found.get(name, 0.0) + price.worth
         here = figures[paid.axis.name]
-        return {self.slope: sought.sign * slope * paid.slope(here) + 0.0, **found}
+        told = {self.slope: sought.sign * slope * paid.slope(here) + 0.0} if asking.first == 0 else {}
+        return {**told, **found}
 
     def _active(self, program: Program, x: Mapping[str, float]) -> list[list[Any]]:
         """Return what is touched, and where the first axis stands highest: label, place, how often."""
