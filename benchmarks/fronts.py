@@ -14,6 +14,7 @@ from typing import NamedTuple
 import loomopt as lo
 from loomopt.studies import front, front_plan, runs
 from loomopt.studies.front_solve import Asking
+from loomopt.studies.rows import Row
 from loomopt.tolerances import SAME_OBJECTIVE
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
@@ -131,14 +132,14 @@ def told(case: Case, trade: front.Trade, found: front.Front, spent: float) -> No
     print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
 
 
-def asked_at(trade: front.Trade, found: front.Front, value: float) -> runs.Row:
+def asked_at(trade: front.Trade, found: front.Front, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
     return trade.solved(runs.Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
-def trade_value(trade: front.Trade, row: runs.Row) -> float:
+def trade_value(trade: front.Trade, row: Row) -> float:
     """Return the second axis of a row."""
     return front_plan.value(row, trade.axes[1])
 

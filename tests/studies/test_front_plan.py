@@ -30,12 +30,15 @@ def planned(rows, points=40):
 
 def computed(answer, points=40):
     """Return the rows of a front whose answer to so much of b is known: (b, a, slope, active)."""
-    rows = [row(0, *answer(1.0)[:2], 0.0, answer(1.0)[3]), row(1, *answer(0.0))]
+
+    def answered(point, asked, **more):
+        b, a, slope, active = answer(asked)
+        return row(point, b, a, slope if point else 0.0, active, asked=asked, **more)
+
+    rows = [answered(0, 1.0), answered(1, 0.0)]
     while batch := front_plan.following(rows, SCALE, points):
         for each in batch:
-            rows.append(
-                row(len(rows), *answer(each.b), asked=each.b, again=each.again, fine=each.fine, parent=each.near[0])
-            )
+            rows.append(answered(len(rows), each.b, again=each.again, fine=each.fine, parent=each.near[0]))
     return rows
 
 

@@ -87,9 +87,9 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     for name in (name for name in kept if name not in named):
         variables.append(Variable(name, known[name], known[name], _size(name, known), (known[name],) * 2))
         limits.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
-    variables += [_loose(name, known) for name in asked if name in LOOSE and name not in named]
     turn = (0.0, 2 * math.pi)
     variables.append(Variable("phi_stroke", *turn, 1.0, turn))
+    variables += [_loose(name, known) for name in asked if name in LOOSE and name not in named]
     reached = [*kept, *(name for name in asked if name in LOOSE)]
     limits += _kept_limits(_arcs(scene, asked), reached, known)
     limits += _margins(bool(set(SLEY) & named), known)
