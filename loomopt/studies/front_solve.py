@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
-from loomopt.program.axes import Asked, Traded
+from loomopt.program.axes import Asked, Traded, opposite
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scenes import Scene
@@ -92,7 +92,10 @@ class Solver:
             for limit in axis.limits(axis.axis.name + CAPPED, cap)
         ]
         levels = (*levels[:-2], *pair[: asking.levels])
-        return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps))
+        # What is traded is not left to the least change from today.
+        traded = {row for level in pair for row in level.rows}
+        moves = tuple(move for move in self.base.moves if not traded & {*move.along, *map(opposite, move.along)})
+        return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps), moves=moves)
 
     def solve(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Reached:
         """Return what a program comes to, from neighbours' rows.
