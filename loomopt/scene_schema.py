@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from loomopt.effects.kinds import Effect
-from loomopt.schema import Figure, Table, Target
+from loomopt.schema import Axis, Figure, Sense, Table, Target
 from loomopt.units import Shown
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ class SceneSchema:
     groups: name → bounds that --free frees together.
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
+    own_axes: axes that are read otherwise than under their own name.
     """
 
     name: str
@@ -44,11 +45,23 @@ class SceneSchema:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)
     partly_known: bool = False
+    own_axes: Mapping[str, Axis] = field(default_factory=dict)
 
     @property
     def figures(self) -> dict[str, Figure]:
         """Figures of the job, then those of its effects."""
         return {**self.own_figures, **{f.name: f for effect in self.effects.values() for f in effect.figures}}
+
+    @property
+    def axes(self) -> dict[str, Axis]:
+        """What can be traded: variables, and every figure that can be limited; a job's own axes say it their way."""
+        ends: dict[str, tuple[Sense, ...]] = {"min": ("most",), "max": ("least",)}
+        found = {name: Axis(name, kind) for name, kind in self.variables.items()}
+        for figure in self.figures.values():
+            senses = tuple(sense for side in figure.sides for sense in ends[side])
+            if senses and figure.name not in found:
+                found[figure.name] = Axis(figure.name, figure.kind, senses=senses[::-1])
+        return {**found, **self.own_axes}
 
     @property
     def margins(self) -> dict[str, str]:

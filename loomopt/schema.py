@@ -1,7 +1,7 @@
 """What tables of a scene are made of, and what a designer reads and asks: figures and targets."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
@@ -38,3 +38,26 @@ class Target(NamedTuple):
     own: type[Table]
     needs: tuple[str, ...] = ()
     needs_effects: tuple[str, ...] = ()
+
+
+Sense = Literal["least", "most"]
+"""Which end of an axis is sought."""
+BOTH: tuple[Sense, ...] = ("least", "most")
+
+
+class Axis(NamedTuple):
+    """What can be traded against something else: a figure or a number of the design, and how a program reads it.
+
+    rows: rows, or one whole-cycle quantity, that it is read from, itself without any; form: one smooth "value" (of
+    several rows the worst), a "magnitude", or the "peak" of a quantity; "" for a peak where the model has a quantity of
+    its name, else a value. senses: the ends that can be sought. The figure is offset + sign · value^(1/power).
+    """
+
+    name: str
+    kind: str
+    rows: tuple[str, ...] = ()
+    form: Literal["", "value", "magnitude", "peak"] = ""
+    senses: tuple[Sense, ...] = BOTH
+    sign: int = 1
+    offset: float = 0.0
+    power: int = 1

@@ -1,16 +1,19 @@
 """All that the rest of the house knows of a job: one object. What few jobs need has a default here."""
 
 import abc
+import functools
 import importlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
-from loomopt.program import numbers
+from loomopt.program import axes, numbers
+from loomopt.program.axes import Asked, Traded
 from loomopt.program.curves import STEPS, Columns, curves, tops
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
@@ -120,6 +123,28 @@ class Job(abc.ABC):
         sampled = self.sampler(scene, design)
         found: dict[str, float | None] = {name: sampled.figures.get(name) for name in scene.schema.figures}
         return found | {name: sampled.peak(quantity) for name, quantity in self.peaks(sampled.model).items()}
+
+    def traded(self, scene: Scene, target: str | None, asked: Asked) -> tuple[Program, tuple[Traded, ...]]:
+        """Return the task whose levels are axes, after what a target holds (None: nothing), and the axes.
+
+        Raises BadInput.
+        """
+        bounded = [name for name, bound in scene.bounds.items() if bound.free and bound.min < bound.max]
+        known = axes.asked_of(scene.schema.axes, bounded, asked, scene.origin)
+        if target:
+            self.demand(scene, target)
+        program, size = self.held(scene, target or "", tuple(asked))
+        return axes.with_axes(program, known, asked, scene.full, size)
+
+    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
+        """Return what a target ("" for none) demands of all that is traded, as a program whose levels are held.
+
+        With the natural size, SI, of what is sought the least of, by axis. traded: axes; what a target asks of them
+        falls away. Raises BadInput.
+        """
+        program = self.program(scene, target or scene.schema.default_target)
+        today = sampled(program.model, {**program.parameters, **self.values(program, self.today(scene))})
+        return replace(program, objectives=(), goals=()), functools.partial(numbers.size, program, today)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Return the NLP's variables of a design."""

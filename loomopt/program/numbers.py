@@ -9,7 +9,7 @@ from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
 from loomopt.owned import label, owned
 from loomopt.program.model import JobModel
-from loomopt.program.program import Limit, Move, Objective, Variable, Wish
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
@@ -73,6 +73,14 @@ def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
     if low is not None and low == high:
         return [(0, low)]
     return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
+
+
+def size(program: Program, today: Sampler, name: str) -> float:
+    """Return the natural size, SI, of a variable, or of a figure by today's machine."""
+    own = next((v.scale for v in program.variables if name in (v.name, v.called)), 0.0)
+    if own:
+        return own
+    return (today.peak(name) if today.model.has_quantity(name) else abs(today.single(name))) or 1.0
 
 
 def figure_limits(scene: Scene, sampler: Sampler) -> list[Limit]:

@@ -17,7 +17,7 @@ from loomopt.studies.rows import Row
 from loomopt.studies.study_table import Column
 from loomopt.studies.sweep import Sweep
 from loomopt.views import outputs, study_files
-from loomopt.views.figure import _COLOURS, _append, _figure, _own_style, save
+from loomopt.views.figure import COLOURS, _append, _figure, _own_style, save
 
 MOST_PANELS, MOST_LINES = 5, 7
 WIDTH, HIGH, SKETCH = 10.0, 1.7, 3.2
@@ -58,7 +58,7 @@ def _drawn(study: Sweep, rows: Sequence[Row], chosen: Sequence[Row]) -> Any:
         shared: Any = None
         for place, panel in enumerate(panels):
             shared = axes = left.add_subplot(len(panels), 1, place + 1, sharex=shared)
-            _panel(axes, panel, places, rows, chosen, _COLOURS[place % len(_COLOURS)])
+            _panel(axes, panel, places, rows, chosen, COLOURS[place % len(COLOURS)])
             axes.tick_params(labelbottom=place == len(panels) - 1)
         axes.set_xlabel(places[0].heading, parse_math=False)
         if len(places) > 1:
@@ -92,7 +92,7 @@ def _panel(
         own.sort(key=lambda k: first.shown[k] or 0.0)
         x, y = ([column.shown[k] for k in own] for column in (first, panel))
         y = [value if rows[k].certified and value is not None else math.nan for k, value in zip(own, y, strict=True)]
-        own_colour = _COLOURS[place % len(_COLOURS)] if others else colour
+        own_colour = COLOURS[place % len(COLOURS)] if others else colour
         axes.plot(x, y, ".-", color=own_colour, linewidth=1.2, markersize=4, label=label)
     for letter, row in zip(LETTERS, chosen, strict=False):
         at = first.shown[rows.index(row)], panel.shown[rows.index(row)]

@@ -1,5 +1,7 @@
 """The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24]."""
 
+from collections.abc import Callable, Collection
+
 import numpy as np
 
 from loomopt.jobs.base import Figures, Job
@@ -29,6 +31,10 @@ class Beatup(Job):
     def program(self, scene: Scene, target: str) -> Program:
         """Return a target as a task. Raises BadInput."""
         return programs.program(scene, target)
+
+    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
+        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
+        return programs.held(scene, target, traded)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""

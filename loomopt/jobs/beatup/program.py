@@ -1,7 +1,8 @@
 """From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
@@ -33,10 +34,13 @@ MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 
 
-def model(scene: Scene, known: Mapping[str, float] | None = None, target: str = "") -> JobModel:
-    """Return the mechanism with the effects the scene calls for; known: its numbers, where they are at hand."""
+def model(scene: Scene, known: Mapping[str, float] | None = None, changes: bool = False) -> JobModel:
+    """Return the mechanism with the effects the scene calls for; known: its numbers, where they are at hand.
+
+    changes: whether the change from today is read.
+    """
     names = frozenset(known or numbers(scene))
-    changing = tuple(VARIABLES) if target == "retrofit" else ()
+    changing = tuple(VARIABLES) if changes else ()
     return beatup.model(scene.active, scene_numbers.words(scene), names, RESISTED, changing)
 
 
@@ -47,11 +51,17 @@ def numbers(scene: Scene) -> dict[str, float]:
 
 def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
+    return held(scene, target, None)[0]
+
+
+def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Program, Callable[[str], float]]:
+    """Return the program of a target, or what it ("" for none) demands of all that is traded; natural sizes of axes."""
     known = numbers(scene)
     limited = scene_numbers.bounds(scene, known)
-    physics = model(scene, known, target)
+    changes = target == "retrofit" or "change" in (traded or ())
+    physics = model(scene, known, changes)
     sizes = _Sizes(scene, known, limited)
-    direct = _reads_counterweight(scene, target, limited)
+    direct = traded is not None or _reads_counterweight(scene, target, limited)
     variables = _variables(scene, sizes, limited, direct)
     demand_figures(scene, physics, ROWS, "Take the limit off, or add what {name} needs.")
     limits = [limit for v in variables if v.called in scene.bounds for limit in bound_limits(v, False)]
@@ -60,17 +70,28 @@ def program(scene: Scene, target: str) -> Program:
     limits += demanded(scene, physics.checks, known, {})
     margins = physics.kinematics.groups[""].margins
     limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in margins]
-    asked = _target_limits(scene, target, sizes)
+    fallen = "M3_fdc" in (traded or ())
+    asked = [] if fallen else _target_limits(scene, target, sizes)
     limits += asked
     taken = {variable.name for variable in variables} | {"m4e"}
     parameters = {name: value for name, value in known.items() if name not in taken}
-    if target == "retrofit":
+    if changes:
         parameters |= _change_parameters(scene, known, limited)
     starts = _starts(variables, known, direct, target == "retrofit")
     moves = (*_moves(variables, known, limited, sizes.most), *scene_numbers.axis_moves(scene, known, limited))
     objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
+    if traded is not None:
+        objectives = objectives[:1] if target == "balance" and not fallen else ()
     task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves
-    return Program(*task, goals=(BALANCE,) if target == "balance" else goals(asked))
+    reached = goals(asked) if target != "balance" else () if fallen else (BALANCE,)
+    return Program(*task, goals=reached), functools.partial(_axis_size, sizes, variables)
+
+
+def _axis_size(sizes: "_Sizes", variables: Sequence[Variable], name: str) -> float:
+    """Return the natural size, SI, of what of an axis is sought the least of."""
+    if name not in sizes.scene.schema.figures:
+        return next(v.scale for v in variables if name in (v.name, v.called))
+    return {"change": 1.0, "pulse_rms": sizes.mean_square}.get(name) or sizes.figure(name)
 
 
 class _Sizes:
@@ -253,4 +274,4 @@ def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
         "torque": (peak,),
         "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.mean_square, power=2),),
         "retrofit": (Objective("change", "change", "value", 1.0),),
-    }[target]
+    }.get(target, ())

@@ -13,7 +13,7 @@ from loomopt.program import drive
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target
+from loomopt.schema import Axis, Figure, Table, Target
 from loomopt.units import Shown, usual
 
 
@@ -77,6 +77,16 @@ FIGURES = {
     )
 }
 
+AXES = {
+    axis.name: axis
+    for axis in (
+        Axis("M3_fdc", "torque", form="magnitude", senses=("least",)),
+        Axis("mu_min", "angle", ("mu_near", "mu_far"), senses=("most",)),
+        Axis("pulse_rms", "torque", ("pulse_mean_square",), senses=("least",), power=2),
+        Axis("change", "number", senses=("least",)),
+    )
+}
+
 TARGETS = {
     target.name: target
     for target in (
@@ -120,5 +130,6 @@ SCHEMA = SceneSchema(
     default_target="balance",
     check=check,
     fault=fault,
+    own_axes=AXES,
     own_margins=dict.fromkeys(CrankRocker().groups[""].margins, "length"),
 )

@@ -8,7 +8,6 @@ from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
-from loomopt.picture.units import told
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
@@ -23,12 +22,14 @@ class BeatupViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
         """Return the crank-rocker in both dead centres at full scale. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
+        from loomopt.picture.units import told
 
         return drawing.linkage(_numbers(scene, design), scene.name, told(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints and centres of mass as CSV. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
+        from loomopt.picture.units import told
 
         return drawing.joints_csv(_numbers(scene, design), told(scene))
 

@@ -1,6 +1,7 @@
 """The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17]."""
 
 import math
+from collections.abc import Callable, Collection
 
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.rapier import design as designs
@@ -29,6 +30,10 @@ class Rapier(Job):
     def program(self, scene: Scene, target: str) -> Program:
         """Return a target as a task. Raises BadInput."""
         return programs.program(scene, target)
+
+    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
+        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
+        return programs.held(scene, target, traded)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""

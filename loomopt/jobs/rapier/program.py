@@ -1,7 +1,8 @@
 """From a rapier scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
+import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from loomopt.effects.kinds import Check
 from loomopt.errors import BadInput
@@ -10,7 +11,7 @@ from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
-from loomopt.jobs.rapier.scene import FIGURES, match_table
+from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_drive, rapier_faults
 from loomopt.program import numbers as scene_numbers
@@ -18,6 +19,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import bound_limits, demanded, distinct, ends, inside, numbers
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
 from loomopt.program.sampling import Sampler, sampled
+from loomopt.scene_errors import refusal
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
 
@@ -26,23 +28,30 @@ REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
 ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far")}
 """Figures that are the least of several smooth rows."""
+LOOSE = frozenset((DWELL, "dwell_after", "dwell_before", "stroke"))
+"""What is a number of its own where it is sought."""
 TOPS = Frozen(phi_stroke="S")
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
 
 
-def model(scene: Scene, target: str = "", read: bool = True) -> JobModel:
-    """Return the drive with the effects the scene calls for and what the target reads; read: whether effects are."""
-    means = (jerk_mean(),) if target == "smooth" else (match_mean(*match_table(scene)),) if target == "match" else ()
-    known = {*numbers(scene), *(("phi_stroke",) if target else ()), *((DWELL,) if target == DWELL else ())}
+def model(scene: Scene, asked: Collection[str] = (), read: bool = True) -> JobModel:
+    """Return the drive with the effects the scene calls for and what is asked; read: whether effects are.
+
+    asked: the target, or what is traded.
+    """
+    read_too = {*asked, *scene.limits}
+    means = [jerk_mean()] if {"smooth", "rms_jerk"} & read_too else []
+    means += [match_mean(*match_table(scene))] if {"match", "match_rms"} & read_too else []
+    known = {*numbers(scene), *(("phi_stroke",) if asked else ()), *((DWELL,) if DWELL in asked else ())}
     effects = scene.active if read else ()
-    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, target), means)
+    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, asked), tuple(means))
 
 
-def _arcs(scene: Scene, target: str) -> tuple[tuple[float, str], ...]:
+def _arcs(scene: Scene, asked: Collection[str]) -> tuple[tuple[float, str], ...]:
     """Return the sides on which there is a dwell, each with the value that it is."""
     named = {BEFORE: "dwell_before", AFTER: "dwell_after"}
-    if target == DWELL:
+    if DWELL in asked:
         return tuple((side, DWELL) for side in named)
     return tuple((side, name) for side, name in named.items() if name in scene.operation)
 
@@ -56,11 +65,19 @@ def demand(scene: Scene, target: str) -> None:
 
 def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
+    return held(scene, target, None)[0]
+
+
+def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Program, Callable[[str], float]]:
+    """Return the program of a target, or what it ("" for none) demands of all that is traded; natural sizes of axes."""
     known = numbers(scene)
     limited = scene_numbers.bounds(scene, known)
-    _demand_figures(scene)
-    physics = model(scene, target, _reads_effects(scene))
-    kept = [name for name in scene.schema.targets[target].needs if name in known]
+    _demand_figures(scene, traded or ())
+    asked = (target,) if traded is None else tuple(traded)
+    physics = model(scene, asked, _reads_effects(scene, asked))
+    fallen = {DWELL: ("dwell_after", "dwell_before")}
+    free_ends = {end for name in traded or () for end in fallen.get(name, (name,))}
+    kept = [n for n in (scene.schema.targets[target].needs if target else ()) if n in known and n not in free_ends]
     sampler = sampled(physics, {DWELL: 1.0, "phi_stroke": 0.0, **known})
     labels = scene_numbers.labels(scene)
     free = {scene.full(name): bound.free for name, bound in scene.bounds.items()}
@@ -72,9 +89,9 @@ def program(scene: Scene, target: str) -> Program:
         limits.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
     turn = (0.0, 2 * math.pi)
     variables.append(Variable("phi_stroke", *turn, 1.0, turn))
-    if target == DWELL:
-        variables.append(Variable(DWELL, 1e-3, math.pi, 1.0, (1e-3, math.pi)))
-    limits += _kept_limits(_arcs(scene, target), kept, known)
+    variables += [_loose(name, known) for name in asked if name in LOOSE and name not in named]
+    reached = [*kept, *(name for name in asked if name in LOOSE)]
+    limits += _kept_limits(_arcs(scene, asked), reached, known)
     limits += _margins(bool(set(SLEY) & named), known)
     limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sampler)]
     limits += demanded(scene, physics.checks, known, {})
@@ -85,21 +102,42 @@ def program(scene: Scene, target: str) -> Program:
         scene_numbers.scale_move(name, along, known, limited) for name, along in scales if taken >= set(along)
     ]
     moves += scene_numbers.axis_moves(scene, known, limited)
-    objectives = (*_objectives(target, sampler, read(sampler).stroke), *scene_numbers.least(sampler))
+    levels = () if traded is not None else _objectives(target, sampler, read(sampler).stroke)
+    objectives = (*levels, *(scene_numbers.least(sampler) if traded is None else ()))
     starts = _starts(variables, known)
     task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS
-    return Program(*task, goals=goals(limit for limit in limits if limit.name in kept and limit.name in FIGURES))
+    found = Program(*task, goals=goals(limit for limit in limits if limit.name in kept and limit.name in FIGURES))
+    return found, functools.partial(_axis_size, found, sampler)
 
 
-def _reads_effects(scene: Scene) -> bool:
+def _loose(name: str, known: Mapping[str, float]) -> Variable:
+    """Return a number of the operation that is free."""
+    ends = {"stroke": (0.0, math.inf)}.get(name, (1e-3, math.pi))
+    around = (0.5 * known[name], 1.5 * known[name]) if name == "stroke" else ends
+    return Variable(name, *ends, _size(name, known), around)
+
+
+def _axis_size(program: Program, today: Sampler, name: str) -> float:
+    """Return the natural size, SI, of what of an axis is sought the least of."""
+    peak, stroke = today.peak("peak_acceleration") or 1.0, read(today).stroke or 1.0
+    known = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
+    return known.get(name) or scene_numbers.size(program, today, name)
+
+
+def _reads_effects(scene: Scene, asked: Collection[str]) -> bool:
     """Say whether the program reads anything that effects give: then they are in it, else they are not."""
     checks = [effect for effect in scene.active if isinstance(effect, Check)]
     given = {name for check in checks for name in (*check.quantities, *check.rows)}
-    return bool((given | set(LOADED)) & set(scene.limits)) or any(check.demands or check.least for check in checks)
+    return bool((given | set(LOADED)) & {*scene.limits, *asked}) or any(
+        check.demands or check.least for check in checks
+    )
 
 
-def _demand_figures(scene: Scene) -> None:
-    """Raise BadInput for a limit on a figure that nothing in the scene gives."""
+def _demand_figures(scene: Scene, traded: Collection[str]) -> None:
+    """Raise BadInput for a limit on a figure, or a dwell to trade, that nothing in the scene gives."""
+    absent = [name for name in (*STROKE[1:2], *traded) if name in STROKE and name not in scene.operation]
+    if set(traded) & LOOSE and absent:
+        raise refusal(f"to trade {', '.join(traded)} needs {absent[0]}", scene.origin, f"operation.{absent[0]}")
     full = model(scene)
     missing = [name for name in LOADED if name in scene.limits and not full.has_quantity(name)]
     if missing:
@@ -157,7 +195,7 @@ def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
         size = sampler.peak(name) or 1.0
         return [Limit(name, sign, name, value, size, "cycle") for sign, value in sides]
     rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
-    size = 1.0
+    size = sampler.single(name) if name == "rms_jerk" else 1.0
     return [Limit(name, sign, row, value, size, "static") for sign, value in sides for row in rows]
 
 

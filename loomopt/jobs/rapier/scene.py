@@ -15,7 +15,7 @@ from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, Po
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target
+from loomopt.schema import Axis, Figure, Table, Target
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""
@@ -84,7 +84,7 @@ FIGURES = {
         Figure("dwell", "angle", "the lesser of both dwells", sides=()),
         Figure("peak_acceleration", "travel acceleration", "peak |S''| over the cycle", sides=("max",)),
         Figure("peak_jerk", "travel jerk", "peak |S'''| over the cycle", sides=("max",)),
-        Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=()),
+        Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=("max",)),
         Figure("mu_min", "angle", "least transmission angle at D", sides=("min",)),
         Figure("phi_stroke", "angle", "crank angle of the hand-over, where the stroke is reached"),
         Figure("swing", "angle", "sley swing"),
@@ -93,6 +93,20 @@ FIGURES = {
         Figure("tape_force", "force", "peak tape force over the cycle", sides=("max",)),
         *drive.FIGURES,
         Figure("match_rms", "length", "rms distance from the target's table", sides=()),
+    )
+}
+
+AXES = {
+    axis.name: axis
+    for axis in (
+        Axis("stroke", "length"),
+        Axis("dwell", "angle", senses=("most",)),
+        Axis("dwell_after", "angle", senses=("most",)),
+        Axis("dwell_before", "angle", senses=("most",)),
+        Axis("rms_jerk", "travel jerk", ("jerk_mean_square",), senses=("least",), power=2),
+        Axis("match_rms", "length", ("match_mean_square",), senses=("least",), power=2),
+        Axis("mu_min", "angle", ("obliquity",), "peak", ("most",), -1, math.pi / 2),
+        Axis("sley_mu_min", "angle", ("sley_mu_near", "sley_mu_far"), senses=("most",)),
     )
 }
 
@@ -152,6 +166,7 @@ SCHEMA = SceneSchema(
     default_target="stroke-dwell",
     check=check,
     fault=rapier_faults.named,
+    own_axes=AXES,
     own_margins=dict.fromkeys(SLEY_MARGINS, "length") | dict.fromkeys(CLOSES, "number"),
     groups={"sley": SLEY},
 )

@@ -8,7 +8,6 @@ from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
-from loomopt.picture.units import told
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
@@ -25,12 +24,14 @@ class RapierViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
         """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
+        from loomopt.picture.units import told
 
         return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, told(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints as CSV. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
+        from loomopt.picture.units import told
 
         return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), told(scene))
 

@@ -1,6 +1,6 @@
 """The shedding job: the least return spring that keeps the roller on the cam [Qiu21]."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from loomopt.jobs.base import Figures, Job
@@ -32,6 +32,10 @@ class Shedding(Job):
     def program(self, scene: Scene, target: str) -> Program:
         """Return a target as a task. Raises BadInput."""
         return programs.program(scene, target)
+
+    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
+        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
+        return programs.held(scene, target, traded)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""

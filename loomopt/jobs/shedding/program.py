@@ -1,7 +1,8 @@
 """From a shedding scene and a target to the program: variables, limits, objectives and starts."""
 
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,10 @@ SPARE = 1.1
 LEAST_STRETCH = 1e-3
 """Share of the largest elongation below which a spring is as good as slack."""
 MEGA = 1e6
+FASTER = frozenset(("speed", "contact_speed"))
+"""What is traded with the speed free."""
+LINEAR = FASTER | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
+"""What is linear, or a quotient of what is, in K1, K1 X0 and the speed's square."""
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -78,11 +83,25 @@ def program(scene: Scene, target: str) -> Program:
     return _Task(scene, target).program()
 
 
+def held(scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
+    """Return what a target ("" for none) demands of all that is traded; natural sizes of axes."""
+    task = _Task(scene, target, traded)
+    found = task.program()
+    return replace(found, objectives=()), functools.partial(_axis_size, task, found)
+
+
+def _axis_size(task: "_Task", program: Program, name: str) -> float:
+    """Return the natural size, SI, of what of an axis is sought the least of."""
+    if name in CYCLE:
+        return task.sizes.figure(name, CYCLE[name], 0.0)
+    return scene_numbers.size(program, task.sampler, "speed" if name == "contact_speed" else name)
+
+
 class _Task:
     """One scene and target on the way to a program."""
 
-    def __init__(self, scene: Scene, target: str) -> None:
-        self.scene, self.target, self.known = scene, target, numbers(scene)
+    def __init__(self, scene: Scene, target: str, traded: Collection[str] = ()) -> None:
+        self.scene, self.target, self.traded, self.known = scene, target, frozenset(traded), numbers(scene)
         self.law: Spline | None = None
         if target == "law":
             own = scene.table(LawTarget)
@@ -100,7 +119,7 @@ class _Task:
         self.tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
-        if target == "speed":
+        if target == "speed" or self.traded & FASTER:
             fastest = _survived(scene)
             self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
@@ -115,7 +134,9 @@ class _Task:
         # law any stiffer spring keeps contact too, and the laws that do for one stiffness are convex.
         free = {v.name for v in variables if v.lower < v.upper} - set(self.law.names if self.law else ())
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
-        linear = not self.checks and (spring or (free == {"speed"} and drive.POWER not in self.scene.limits))
+        traded = self.traded and self.traded <= LINEAR and free <= {"K1", "X0", "speed"}
+        told = spring or bool(traded) or free == {"speed"}
+        linear = not self.checks and told and (spring or drive.POWER not in self.scene.limits)
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
         today = (
             named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
@@ -134,6 +155,7 @@ class _Task:
             given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
             ends |= {name: (known[name],) * 2 for name in ends if name in given}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.tied else {"K1": (known["K1"],) * 2})
+        if self.target == "speed" or self.traded & FASTER:
             ends["speed"] = self.limited.get("speed", (1e-3 * self.fastest, math.inf))
         for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))

@@ -28,7 +28,7 @@ from loomopt.quantities import (
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target
+from loomopt.schema import Axis, Figure, Table, Target
 from loomopt.tolerances import NARROWEST, SAME_ANGLE
 from loomopt.units import Shown, usual
 
@@ -120,6 +120,19 @@ FIGURES = {
         Figure("pressure_angle_max", "angle", "largest pressure angle", sides=("max",)),
         Figure("curvature_min", "curvature", "least signed curvature of the roller centre's curve", sides=("min",)),
         Figure("curvature_max", "curvature", "largest one; undercut where it exceeds 1/roller_radius", sides=("max",)),
+    )
+}
+
+AXES = {
+    axis.name: axis
+    for axis in (
+        Axis("speed", "angular speed"),
+        Axis("contact_speed", "angular speed", ("speed",), senses=("most",)),
+        Axis("travel", "length"),
+        Axis("contact_min", "force", ("lift",), "peak", ("most",), -1),
+        Axis("contact_max", "force", ("cam_force",), "peak", ("least",)),
+        Axis("pressure_angle_max", "angle", ("pressure_angle",), "peak", ("least",)),
+        Axis("curvature_min", "curvature", ("concavity",), "peak", ("most",), -1),
     )
 }
 
@@ -245,6 +258,7 @@ SCHEMA = SceneSchema(
     default_target="stiffness",
     check=check,
     fault=fault,
+    own_axes=AXES,
     groups={"rise": SEGMENTS},
     lists={"law": "number"},
     partly_known=True,

@@ -1,0 +1,133 @@
+"""Axes of a scene as objectives of a program: what is traded, which way, and what of it a limit says."""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from loomopt.errors import BadInput
+from loomopt.maths import Number
+from loomopt.program.instant import Formula, Instant, Row
+from loomopt.program.model import JobModel
+from loomopt.program.program import Limit, Objective, Program
+from loomopt.schema import Axis, Sense
+
+Asked = Mapping[str, Sense]
+"""Axis → which end of it is sought."""
+
+
+@dataclass(frozen=True)
+class Traded:
+    """An axis and the end of it that is sought: the least value, of which figure = offset + sign · value^(1/power)."""
+
+    axis: Axis
+    sense: Sense
+    objective: Objective
+
+    @property
+    def sign(self) -> int:
+        """Whether the figure grows with the value."""
+        return 1 if self.sense == "least" else -1
+
+    def figure(self, value: float) -> float:
+        """Return the figure, SI, of a value."""
+        root = max(value, 0.0) ** (1 / self.axis.power) if self.axis.power != 1 else value
+        return self.axis.offset + self.sign * root
+
+    def value(self, figure: float) -> float:
+        """Return the value that is sought the least of, of a figure, SI."""
+        return float((self.sign * (figure - self.axis.offset)) ** self.axis.power)
+
+    def slope(self, figure: float) -> float:
+        """Return d value / d figure at a figure, SI."""
+        root = self.sign * (figure - self.axis.offset)
+        return float(self.sign * self.axis.power * root ** (self.axis.power - 1))
+
+    def limits(self, name: str, value: float) -> list[Limit]:
+        """Return what keeps the value at most at `value`, as limits of a name: a magnitude on both sides, always."""
+        family = "cycle" if self.objective.form == "peak" else "static"
+        sides = ((1, value), (-1, -value)) if self.objective.form == "magnitude" else ((1, value),)
+        scale = self.objective.scale
+        return [
+            Limit(name, sign, row, bound, scale, family)  # type: ignore[arg-type]
+            for row in self.objective.rows
+            for sign, bound in sides
+        ]
+
+
+def asked_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Asked, origin: str) -> dict[str, Axis]:
+    """Return the axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
+
+    Raises BadInput for a name that is no axis, and for an end that is not offered.
+    """
+    known = {name: Axis(name, "") for name in numbers} | dict(axes)
+    for name, sense in asked.items():
+        if name not in known:
+            raise BadInput(
+                f"{name} is no axis",
+                file=origin,
+                key=name,
+                allowed=", ".join(known),
+                remedy="Name one of them, or give a number of the scene min and max in [bounds].",
+            )
+        if sense not in known[name].senses:
+            other = "least" if sense == "most" else "most"
+            problem = f"of {name} the {other} can be sought, not the {sense}"
+            raise BadInput(problem, file=origin, key=name, remedy="Ask for its other end.")
+    return {name: known[name] for name in asked}
+
+
+def with_axes(
+    program: Program, axes: Mapping[str, Axis], asked: Asked, full: Callable[[str], str], size: Callable[[str], float]
+) -> tuple[Program, tuple[Traded, ...]]:
+    """Return a program whose last levels are the axes in the order asked for, and what they are.
+
+    program: its objectives are what is held before them; full: name among the model's values; size: natural one of a
+    value, SI. Raises BadInput for an axis that nothing in the scene gives.
+    """
+    found = []
+    for name, sense in asked.items():
+        axis, rows = axes[name], axes[name].rows or (full(name),)
+        _demand(program, name, rows)
+        peak = axis.form == "peak" or (not axis.form and program.model.has_quantity(rows[0]))
+        form = "peak" if peak else axis.form or "value"
+        opposed = not peak and axis.sign * (1 if sense == "least" else -1) < 0
+        if opposed:
+            program = replace(program, model=opposing(program.model, rows))
+            rows = tuple(map(opposite, rows))
+        objective = Objective(name, rows[0], form, size(name), axis.power, rows[1:])
+        found.append(Traded(axis, sense, objective))
+    levels = (*program.objectives, *(traded.objective for traded in found))
+    return replace(program, objectives=levels), tuple(found)
+
+
+def _demand(program: Program, name: str, rows: Sequence[str]) -> None:
+    model, numbers = program.model, {*program.parameters, *(v.name for v in program.variables)}
+    if not all(model.has_quantity(row) or model.has_row(row) or row in numbers for row in rows):
+        remedy = "Trade another axis, or add the numbers and effects that it needs."
+        raise BadInput(f"nothing in the scene gives {name}", key=name, remedy=remedy)
+
+
+def opposite(row: str) -> str:
+    """Return the name of a row's opposite, the least of which is the row's most."""
+    return f"-{row}"
+
+
+@functools.lru_cache(maxsize=64)
+def opposing(model: JobModel, rows: tuple[str, ...]) -> JobModel:
+    """Return a model with the opposites of rows or numbers beside its own rows."""
+    return replace(model, own_rows={**model.own_rows, **{opposite(row): _opposed(model, row) for row in rows}})
+
+
+def _opposed(model: JobModel, name: str) -> Row:
+    own = model.own_rows.get(name) or Row(functools.partial(_read, name), () if model.has_row(name) else (name,))
+    return own._replace(formula=functools.partial(_negative, own.formula))
+
+
+def _read(name: str, at: Instant) -> Number:
+    """Return a row that stands at no event, or a number."""
+    known = at.model.static(at.maths, at.given, {}, (name,))
+    return known[name] if name in known else at.values[name]
+
+
+def _negative(formula: Formula, at: Instant) -> Number:
+    return -formula(at)

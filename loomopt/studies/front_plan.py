@@ -1,0 +1,250 @@
+"""Which points of a front come next: the widest gaps halved, what is dominated again, what changes narrowed down.
+
+All positions are figures turned so that less is better, divided by the distance of the front's ends: b of the axis that
+is limited, a of the axis that is sought. A function of finished rows alone.
+"""
+
+import heapq
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from loomopt.studies.rows import Row
+
+BATCH = 8
+"""Points of a round."""
+NARROW = 1e-5
+"""Share of the front within which a change is told, and a gap is not halved any more."""
+ALIKE = 1e-7
+"""Share of the front by which two points may differ and be one: ten times the usual accuracy."""
+BENT = 0.01
+"""Share by which slopes on either side of a change must differ for a kink."""
+STOPS = 0.1
+"""Share of its mean slope that a front must have where it ends, for a kink: beyond it nothing changes any more."""
+SHEER = 2.0
+"""Times the steeper slope of two points by which a must fall between them for a jump."""
+MOST_MORE = 3
+"""Times the points asked for that rows may come to, with those that narrow changes down and those once dominated."""
+
+
+class Spot(NamedTuple):
+    """A point of the front. point: its row's; b, a: its place; empty: up to where b may grow and nothing is better.
+
+    slope: da/db; active: what is touched there.
+    """
+
+    point: int
+    b: float
+    a: float
+    empty: float
+    slope: float
+    active: tuple[tuple[Any, ...], ...]
+
+    @property
+    def labels(self) -> set[str]:
+        """What is touched, by its own name."""
+        return {str(label) for label, *_ in self.active}
+
+
+class Scale(NamedTuple):
+    """From figures to positions: sign and the ends' distance of either axis (a, b), SI."""
+
+    names: tuple[str, str]
+    signs: tuple[int, int]
+    origin: tuple[float, float]
+    width: tuple[float, float]
+
+    def position(self, axis: int, figure: float) -> float:
+        """Return the position of a figure."""
+        return (self.signs[axis] * figure - self.origin[axis]) / self.width[axis]
+
+    def figure(self, axis: int, position: float) -> float:
+        """Return the figure of a position, SI."""
+        return self.signs[axis] * (self.origin[axis] + self.width[axis] * position)
+
+
+class Next(NamedTuple):
+    """A point to come, at most at b.
+
+    near: rows to start from, the first one its parent; again: which row it redoes; fine: whether it narrows a change.
+    """
+
+    b: float
+    near: tuple[int, ...]
+    again: int | None = None
+    fine: bool = False
+
+
+def value(row: Row, axis: str) -> float:
+    """Return an axis of a certified row, SI; of a magnitude without its sign."""
+    return float(row.warm["axes"][axis])
+
+
+def spots(rows: Sequence[Row], scale: Scale) -> tuple[list[Spot], list[tuple[Row, int]]]:
+    """Return the front's points by b, and the rows that another dominates, each with the one that does."""
+    known = [row for row in rows if row.certified]
+    found = sorted((_spot(row, scale) for row in known), key=lambda spot: (spot.b, spot.a, spot.point))
+    front: list[Spot] = []
+    worse: list[tuple[Row, int]] = []
+    by_point = {row.point: row for row in known}
+    for spot in found:
+        if not front or spot.a < front[-1].a - ALIKE:
+            front.append(spot)
+            continue
+        if spot.a > front[-1].a + ALIKE:
+            worse.append((by_point[spot.point], front[-1].point))
+        front[-1] = front[-1]._replace(empty=max(front[-1].empty, spot.empty))
+    return front, worse
+
+
+def _spot(row: Row, scale: Scale) -> Spot:
+    b, a = scale.position(1, value(row, scale.names[1])), scale.position(0, value(row, scale.names[0]))
+    asked = row.place.get(scale.names[1])
+    empty = b if asked is None else max(b, scale.position(1, asked))
+    slope = row.multipliers.get(" per ".join(scale.names), 0.0) * scale.width[1] / scale.width[0]
+    return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], tuple(map(tuple, row.warm["active"])))
+
+
+def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
+    """Return the next batch: what is dominated again, the widest gaps until there are enough points, then changes.
+
+    Before these are narrowed down, either side of each is solved from the other: its basin may be the better one there.
+    """
+    front, worse = spots(rows, scale)
+    if len(rows) >= MOST_MORE * points:
+        return []
+    by_point = {row.point: row for row in rows}
+    redone = {(row.warm["again"], row.parent) for row in rows}
+    missed = [scale.position(1, row.place[scale.names[1]]) for row in rows if not row.certified and row.place]
+    # Each row is redone from one that dominates it once, and from each neighbour that touches others once.
+    done = {point for point, _ in redone}
+    pairs = [(row.point, by) for row, by in worse if row.point not in done]
+    room = points - len(front) - len(missed)
+    if room <= 0 and not pairs and not any(row.warm["fine"] for row in rows):
+        pairs = [
+            (point, by)
+            for point, by in _crossed(front)
+            if (point, by) not in redone and by not in (by_point[point].warm["near"] or ())
+        ]
+    asked = [(by_point[point], by) for point, by in pairs]
+    again = [(row, by) for row, by in asked if row.place and row.warm["again"] is None]
+    found = [Next(scale.position(1, row.place[scale.names[1]]), (by,), row.point) for row, by in again][:BATCH]
+    if room > 0 and len(found) < BATCH:
+        found += [_between(front, b) for b in _halved(front, missed, min(BATCH - len(found), room))]
+    return found or [_between(front, b)._replace(fine=True) for b in _narrowed(front, missed)]
+
+
+def _crossed(front: Sequence[Spot]) -> list[tuple[int, int]]:
+    """Return the points whose neighbour touches others, each with that neighbour."""
+    found = []
+    for left, right in itertools.pairwise(front):
+        if len(_changing(left, right)) > (left is front[0] or right is front[-1]):
+            found += [(left.point, right.point), (right.point, left.point)]
+    return found
+
+
+def _halved(front: Sequence[Spot], missed: Sequence[float], room: int) -> list[float]:
+    """Return the middles of the widest gaps, each halved again as if its halves were alike."""
+    heap = []
+    for left, right in itertools.pairwise(front):
+        for low, high in _open(left, right, missed):
+            share = (high - low) / (right.b - left.empty)
+            heap.append((-max(high - low, share * (left.a - right.a)), low, high))
+    heapq.heapify(heap)
+    found: list[float] = []
+    while heap and len(found) < room:
+        width, low, high = heapq.heappop(heap)
+        middle = (low + high) / 2
+        found.append(middle)
+        if (high - low) / 2 > NARROW:
+            for end in ((low, middle), (middle, high)):
+                heapq.heappush(heap, (width / 2, *end))
+    return sorted(found)
+
+
+def _open(left: Spot, right: Spot, missed: Sequence[float]) -> Iterator[tuple[float, float]]:
+    """Yield the stretches between two points that are wide enough, parted by what was asked in vain."""
+    inner = sorted(b for b in missed if left.empty < b < right.b)
+    ends = (left.empty, *inner, right.b)
+    yield from ((low, high) for low, high in itertools.pairwise(ends) if high - low > NARROW)
+
+
+def _narrowed(front: Sequence[Spot], missed: Sequence[float]) -> list[float]:
+    """Return where the stretches in which the active set changes are halved, the widest first.
+
+    At an end what stops the front takes the place of the limit on b: that is no change.
+    """
+    wide = []
+    for left, right in itertools.pairwise(front):
+        end = left is front[0] or right is front[-1]
+        for low, high in _open(left, right, missed):
+            if len(_changing(left, right)) > end or _sheer(left, right):
+                wide.append((high - low, (low + high) / 2))
+    return [b for _, b in sorted(wide, reverse=True)[:BATCH]]
+
+
+def _changing(left: Spot, right: Spot) -> set[str]:
+    """Return the names of what is touched at one of two points only, or elsewhere or otherwise often."""
+    return {str(label).rsplit(" ", 1)[0] for label, *_ in set(left.active) ^ set(right.active)}
+
+
+def _between(front: Sequence[Spot], b: float) -> Next:
+    """Return a point with its parent, the nearest (of two the lower), and the other neighbour if it touches others."""
+    left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b)
+    right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b)
+    near, other = sorted((left, right), key=lambda spot: (abs(spot.b - b), spot.point))
+    return Next(b, (near.point, other.point) if near.active != other.active else (near.point,))
+
+
+def crossing(left: Spot, right: Spot) -> float | None:
+    """Return where the tangents of two points cross, None where they are alike or cross outside."""
+    if abs(left.slope - right.slope) <= BENT * max(abs(left.slope), abs(right.slope)):
+        return None
+    found = (right.a - left.a + left.slope * left.b - right.slope * right.b) / (left.slope - right.slope)
+    return found if left.b < found < right.b else None
+
+
+def told(front: Sequence[Spot], scale: Scale) -> tuple[list[dict[str, Any]], list[tuple[float, float]]]:
+    """Return what changes along the front, and the stretches of b where nothing is better, SI, in the order of b."""
+    changes, gaps = [], []
+    ends = set(scale.names)
+    for left, right in itertools.pairwise(front):
+        jumps = right.b - left.b > NARROW and right.b - left.empty <= 2 * NARROW and left.empty > left.b + NARROW
+        jumps = jumps or (right.b - left.b <= 2 * NARROW and _sheer(left, right))
+        if jumps:
+            gaps.append((scale.figure(1, left.b), scale.figure(1, right.b)))
+        if left is front[0] and len(_changing(left, right)) == 1:
+            continue
+        moved = {str(label) for label, *_ in set(left.active) ^ set(right.active)}
+        limits = sorted(label for label in moved if label.rsplit(" ", 1)[0] not in ends or label.endswith(" peak"))
+        if not jumps and not limits:
+            continue
+        at = right.b if right is front[-1] and len(_changing(left, right)) == 1 else crossing(left, right)
+        narrow = right.b - left.b <= 2 * NARROW
+        kind = "jump" if jumps else "kink" if (narrow and at is not None) or _stops(left, right, at) else "active set"
+        place = right.b if jumps else (left.b + right.b) / 2 if at is None else at
+        between = [scale.figure(1, left.b), scale.figure(1, right.b)]
+        changes.append({"at": scale.figure(1, place), "kind": kind, "limits": limits, "between": between})
+    return changes, gaps
+
+
+def _stops(left: Spot, right: Spot, at: float | None) -> bool:
+    """Say whether the front ends in a slope: by the parabola through two points and the slope at the first."""
+    secant = (right.a - left.a) / (right.b - left.b)
+    return at == right.b and abs(2 * secant - left.slope) > STOPS * abs(secant)
+
+
+def _sheer(left: Spot, right: Spot) -> bool:
+    """Say whether a falls by far more between two points than the steeper of their slopes lets it."""
+    steepest = max(abs(left.slope), abs(right.slope)) * (right.b - left.b)
+    return left.a - right.a > SHEER * steepest + 100 * NARROW
+
+
+def scaled(
+    rows: Mapping[int, Row], names: tuple[str, str], signs: tuple[int, int], sizes: tuple[float, float]
+) -> Scale:
+    """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI."""
+    ends = [[signs[k] * value(rows[row], names[k]) for k in (0, 1)] for row in (0, 1)]
+    widths = [abs(one - other) for one, other in zip(*ends, strict=True)]
+    wide = tuple(width if width > ALIKE * size else 0.0 for width, size in zip(widths, sizes, strict=True))
+    return Scale(names, signs, (ends[0][0], ends[1][1]), (wide[0], wide[1]))

@@ -1,0 +1,221 @@
+"""One point of a front: the least of one axis with the other at most so much, then the least of the other."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple
+
+from loomopt.jobs import registry
+from loomopt.nlp import exchange
+from loomopt.nlp.point import Settings
+from loomopt.program.axes import Asked, Traded, opposite
+from loomopt.program.program import Program
+from loomopt.program.sampling import Sampler, sampled
+from loomopt.scenes import Scene
+from loomopt.solving import change, report
+from loomopt.solving.rows import Row as Touched
+from loomopt.solving.rows import active_set
+from loomopt.solving.search import Judged, Search, judged, objectives, tried
+from loomopt.solving.strategy import searched
+from loomopt.studies import warm
+from loomopt.tolerances import FEASIBLE
+
+CAPPED = " at most as asked"
+"""What the limit on an axis is called, after the axis."""
+RUNAWAY = 100.0
+"""Natural sizes beyond which a variable without a bound has no end: no machine is so far from today's."""
+SIDES = {-1: "min", 0: "fixed", 1: "max"}
+
+
+class Asking(NamedTuple):
+    """One program of a front.
+
+    first: which axis comes first, 0 or 1; caps: the largest value of each axis, None for no limit; levels: 1 for the
+    first axis alone, 2 for the other after it.
+    """
+
+    first: Literal[0, 1]
+    caps: tuple[float | None, float | None]
+    levels: Literal[1, 2] = 1
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What a point came to: status, reason and, where there is a design, its figures, prices and where it stood."""
+
+    status: str
+    reason: str | None
+    design: Mapping[str, Any] = field(default_factory=dict)
+    figures: Mapping[str, float | None] = field(default_factory=dict)
+    multipliers: Mapping[str, float] = field(default_factory=dict)
+    reached: Mapping[str, bool] = field(default_factory=dict)
+    warm: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is as good as an answer."""
+        return self.status == "optimal"
+
+
+class Solver:
+    """The programs of one front, and how they are solved; axes: the first is sought, the second is what it costs."""
+
+    def __init__(self, scene: Scene, target: str | None, asked: Asked, accuracy: float) -> None:
+        self.scene, self.accuracy, self.job = scene, accuracy, registry.of(scene)
+        self.base, axes = self.job.traded(scene, target, asked)
+        self.axes: tuple[Traded, Traded] = (axes[0], axes[1])
+
+    @property
+    def slope(self) -> str:
+        """What a row calls the slope of the first axis over the second."""
+        return f"{self.axes[0].axis.name} per {self.axes[1].axis.name}"
+
+    @property
+    def held(self) -> int:
+        """How many levels come before the axes."""
+        return len(self.base.objectives) - 2
+
+    def runaway(self, x: Mapping[str, float]) -> str:
+        """Return which variable without a bound is out of all proportion at x (SI); "" for none."""
+        loose = (v for v in self.base.variables if not math.isfinite(v.upper if x[v.name] > 0 else v.lower))
+        return next((v.called for v in loose if abs(x[v.name]) > RUNAWAY * v.scale), "")
+
+    def program(self, asking: Asking) -> Program:
+        """Return a program of the front: caps are limits whose values are parameters of what is built."""
+        levels = self.base.objectives
+        pair = levels[-2:] if asking.first == 0 else levels[:-3:-1]
+        caps = [
+            limit
+            for axis, cap in zip(self.axes, asking.caps, strict=True)
+            if cap is not None
+            for limit in axis.limits(axis.axis.name + CAPPED, cap)
+        ]
+        levels = (*levels[:-2], *pair[: asking.levels])
+        # What is traded is not left to the least change from today.
+        traded = {row for level in pair for row in level.rows}
+        moves = tuple(move for move in self.base.moves if not traded & {*move.along, *map(opposite, move.along)})
+        return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps), moves=moves)
+
+    def solve(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Reached:
+        """Return what a program comes to, from neighbours' rows.
+
+        wide: whether a search goes beyond their basins; None for none even where they lead nowhere.
+
+        Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough.
+        """
+        search = self._searched(asking, near, wide)
+        if search.passed and not self._priced(search, asking):
+            asking = asking._replace(levels=2)
+            found = self._begun(asking)
+            best = search.ranked[0].point
+            after = tried(found, best.x)
+            after = judged(after) if after.reached else after
+            search = after if after.passed else searched(found, None, 0, (), None)
+        return self._told(change.with_least_change(search), asking)
+
+    def _begun(self, asking: Asking) -> Search:
+        program = self.program(asking)
+        today = {**self.job.values(program, self.job.today(self.scene)), **program.today}
+        return Search(self.job, program, Settings(self.accuracy), today)
+
+    def _searched(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Search:
+        """Return the search for the best of a program."""
+        search = self._begun(asking)
+        program = search.program
+        for data in near:
+            point = warm.read(data["point"], program)
+            if point:
+                search = tried(search, point.x, point)
+            elif start := exchange.started(program, data["point"]["x"]):
+                search = tried(search, start)
+        search = judged(search) if search.reached else search
+        if (wide and not program.single) or not (search.passed or wide is None):
+            search = searched(search, None, 0, (), None)
+        return search
+
+    def _priced(self, search: Search, asking: Asking) -> bool:
+        """Say whether the limit on the other axis has a price at the level of the first."""
+        sought, paid = self.axes[asking.first], self.axes[1 - asking.first]
+        prices = search.best.certificate.binding if search.best else ()
+        cap, figure = paid.axis.name + CAPPED, sought.axis.name
+        return any(price.limit.name == cap and price.objective.figure == figure for price in prices)
+
+    def _told(self, search: Search, asking: Asking) -> Reached:
+        best = search.best
+        if best is None:
+            status = "infeasible" if search.clashes else "failed"
+            last = search.candidates[-1].point.status if search.candidates else "no start assembles"
+            return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
+        program = search.program
+        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        held = self._held(search, best, asking)
+        certified = best.certificate.passed and here.admissible and not held
+        reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
+        status = "optimal" if certified else "infeasible" if held else "uncertified"
+        axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
+        told = {
+            "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
+            "active": self._active(program, best.x),
+            "axes": axes,
+            "held": list(objectives(program, best.x)[: self.held]),
+        }
+        return Reached(
+            status,
+            None if certified else reason,
+            dict(here.design),
+            dict(here.figures),
+            self._multipliers(best, axes, asking),
+            dict(here.reached),
+            told,
+        )
+
+    def _held(self, search: Search, best: Judged, asking: Asking) -> str:
+        """Return why the point does not count: an axis is above its cap; "" where it does."""
+        sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
+        for axis, cap in zip(self.axes, asking.caps, strict=True):
+            size = axis.objective.scale
+            if cap is not None and sampler.merit(axis.objective) / size > cap / size + FEASIBLE:
+                return f"{axis.axis.name} cannot be kept as asked"
+        return ""
+
+    def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:
+        """Return an axis at variables x (SI): of a magnitude without its sign."""
+        return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
+
+    def _multipliers(self, best: Judged, figures: Mapping[str, float], asking: Asking) -> dict[str, float]:
+        """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
+        sought, paid = self.axes
+        found: dict[str, float] = {}
+        slope, cap = 0.0, paid.axis.name + CAPPED
+        for price in best.certificate.binding:
+            if price.limit.name == cap:
+                slope -= price.worth if price.objective.figure == sought.axis.name else 0.0
+            elif not price.limit.name.endswith(CAPPED):
+                name = f"{price.objective.figure} per {price.limit.name} {SIDES[price.side]}"
+                found[name] = found.get(name, 0.0) + price.worth
+        here = figures[paid.axis.name]
+        told = {self.slope: sought.sign * slope * paid.slope(here) + 0.0} if asking.first == 0 else {}
+        return {**told, **found}
+
+    def _active(self, program: Program, x: Mapping[str, float]) -> list[list[Any]]:
+        """Return what is touched, and where the first axis stands highest: label, place, how often."""
+        sampler = sampled(program.model, {**program.parameters, **x})
+        found = active_set(replace(program, objectives=(self.axes[0].objective,)), sampler)
+        own = {f"{axis.axis.name}{more}" for axis in self.axes for more in (CAPPED, "")}
+        count: Counter[tuple[str, str]] = Counter()
+        for row in found.rows[: found.limits]:
+            limit = row.limit
+            if limit and limit.name not in own and limit.row not in program.fixed:
+                count[f"{limit.name} {SIDES[limit.sign]}", _place(sampler, row)] += 1
+        for k in found.pieces(0):
+            count[f"{self.axes[0].axis.name} peak", _place(sampler, found.rows[k])] += 1
+        return sorted([label, place, times] for (label, place), times in count.items())
+
+
+def _place(sampler: Sampler, row: Touched) -> str:
+    """Return where in the cycle a row stands, by the switches there and its sign; "" for a row of no angle."""
+    if row.node is None:
+        return f"{row.reads} {row.sign:+g}"
+    switch = sampler.cycle.switch(row.node.piece)
+    return f"{row.reads} {row.sign:+g} {[float(value) for value in switch.values()]}"

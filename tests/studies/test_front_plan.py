@@ -1,0 +1,157 @@
+"""The plan of a front on rows made by hand: gaps, jumps, kinks, what is dominated, what is missed."""
+
+import itertools
+import math
+
+import pytest
+
+from loomopt.studies import front_plan
+from loomopt.studies.front_plan import NARROW, Scale
+from loomopt.studies.rows import Row
+
+SCALE = Scale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
+
+
+def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True, again=None, fine=False, parent=None):
+    """Return a row at (b, a); asked: how much of b it might have had."""
+    warm = {"axes": {"a": a, "b": b}, "active": [[label, "", 1] for label in active]}
+    warm |= {"again": again, "fine": fine, "near": None}
+    status = "optimal" if certified else "failed"
+    place = {} if point < 2 else {"b": b if asked is None else asked}
+    return Row(point, place, parent, status, None, {}, {}, {"a per b": slope}, {}, certified, 0.0, warm)
+
+
+ENDS = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0)]
+
+
+def planned(rows, points=40):
+    return [each.b for each in front_plan.following(rows, SCALE, points)]
+
+
+def computed(answer, points=40):
+    """Return the rows of a front whose answer to so much of b is known: (b, a, slope, active)."""
+
+    def answered(point, asked, **more):
+        b, a, slope, active = answer(asked)
+        return row(point, b, a, slope if point else 0.0, active, asked=asked, **more)
+
+    rows = [answered(0, 1.0), answered(1, 0.0)]
+    while batch := front_plan.following(rows, SCALE, points):
+        for each in batch:
+            rows.append(answered(len(rows), each.b, again=each.again, fine=each.fine, parent=each.near[0]))
+    return rows
+
+
+def told(rows):
+    return front_plan.told(front_plan.spots(rows, SCALE)[0], SCALE)
+
+
+def test_the_first_round_is_spread_evenly_over_one_gap():
+    found = planned(ENDS)
+    assert len(found) == front_plan.BATCH
+    assert found == sorted(found)
+    assert max(b - a for a, b in itertools.pairwise([0.0, *found, 1.0])) <= 0.25
+
+
+def test_the_widest_gap_in_either_axis_is_halved_first():
+    rows = [*ENDS, row(2, 0.1, 0.1), row(3, 0.5, 0.05)]
+    assert planned(rows, points=5) == [pytest.approx(0.05)]
+    rows = [*ENDS, row(2, 0.1, 0.9), row(3, 0.2, 0.1)]
+    assert planned(rows, points=6) == [pytest.approx(0.15), pytest.approx(0.6)]
+
+
+def test_what_another_dominates_is_solved_again_from_it_once():
+    rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.6, 0.45)]
+    first = front_plan.following(rows, SCALE, 40)[0]
+    assert (first.again, first.near, first.b) == (3, (2,), 0.6)
+    rows.append(row(4, 0.6, 0.3, again=3, parent=2))
+    assert all(each.again is None for each in front_plan.following(rows, SCALE, 40))
+    assert [spot.point for spot in front_plan.spots(rows, SCALE)[0]] == [1, 2, 4, 0]
+
+
+def test_a_point_that_was_missed_is_not_asked_for_again():
+    rows = [*ENDS, row(2, 0.5, 0.5, certified=False)]
+    assert 0.5 not in planned(rows)
+    assert planned(rows, points=4) == [0.25]
+
+
+def test_both_neighbours_lend_their_designs_where_they_touch_others():
+    rows = [*ENDS, row(2, 0.5, 0.5, active=("l2 max",)), row(3, 0.25, 0.75)]
+    near = {each.b: each.near for each in front_plan.following(rows, SCALE, 8)}
+    assert near[0.375] == (2, 3)
+    assert near[0.75] == (0, 2)
+
+
+def test_either_side_of_a_change_is_solved_from_the_other_before_it_is_narrowed_down():
+    first = row(0, 1.0, 0.0, 0.0, active=("l2 max",))
+    rows = [
+        first,
+        ENDS[1],
+        row(2, 0.3, 0.7),
+        row(3, 0.6, 0.4, active=("l2 max",)),
+        row(4, 0.8, 0.2, active=("l2 max",)),
+    ]
+    found = front_plan.following(rows, SCALE, 5)
+    assert [(each.again, each.near, each.fine) for each in found] == [(2, (3,), False), (3, (2,), False)]
+    rows += [row(5, 0.3, 0.7, again=2, parent=3), row(6, 0.6, 0.4, active=("l2 max",), again=3, parent=2)]
+    (middle,) = front_plan.following(rows, SCALE, 5)
+    assert middle.fine
+    assert middle.b == pytest.approx(0.45)
+
+
+def test_a_kink_is_found_where_it_is():
+    def answer(b):
+        return (b, 1 - 2 * b, -2.0, ("l1 min",)) if b < 0.3 else (b, 0.4 * (1 - b) / 0.7, -0.4 / 0.7, ("l2 max",))
+
+    (change,), gaps = told(computed(answer))
+    assert change["kind"] == "kink"
+    assert change["limits"] == ["l1 min", "l2 max"]
+    assert change["at"] == pytest.approx(0.3, abs=1e-9)
+    assert gaps == []
+
+
+def test_a_change_without_a_corner_is_an_active_set():
+    def answer(b):
+        slope = -1.5 if b < 0.3 else -1.5 + 1.5 * (b - 0.3)
+        past = max(b - 0.3, 0.0)
+        return b, 1 - 1.5 * b + 0.75 * past**2, slope, ("l1 min",) if b < 0.3 else ()
+
+    (change,), _ = told(computed(answer))
+    assert change["kind"] == "active set"
+    assert change["limits"] == ["l1 min"]
+    assert change["at"] == pytest.approx(0.3, abs=NARROW)
+
+
+def test_a_stretch_where_nothing_is_better_is_a_gap_with_a_jump_at_its_end():
+    def answer(b):
+        if b < 0.2:
+            return b, 1 - b, -1.0, ("l1 min",)
+        # Up to 0.6 more of b is of no use.
+        return (0.2, 0.8, 0.0, ("l1 min",)) if b < 0.6 else (b, 0.5 * (1 - b) / 0.4, -1.25, ("l2 max",))
+
+    rows = computed(answer)
+    changes, gaps = told(rows)
+    jump = next(change for change in changes if change["kind"] == "jump")
+    assert jump["at"] == pytest.approx(0.6, abs=2 * NARROW)
+    assert gaps == [(pytest.approx(0.2), pytest.approx(0.6, abs=2 * NARROW))]
+
+
+def test_a_sheer_fall_is_a_jump():
+    def answer(b):
+        return (b, 1 - 0.1 * b, -0.1, ("l1 min",)) if b < 0.4 else (b, 0.2 * (1 - b), -0.2, ("l1 min",))
+
+    (change,), _ = told(computed(answer))
+    assert change["kind"] == "jump"
+    assert change["at"] == pytest.approx(0.4, abs=2 * NARROW)
+
+
+def test_a_plan_ends():
+    def answer(b):
+        return b, 1 - b, -1.0, (f"l{math.floor(1000 * b)} min",)
+
+    assert len(computed(answer, points=10)) <= front_plan.MOST_MORE * 10 + front_plan.BATCH
+
+
+def test_ends_that_are_one_have_no_width():
+    rows = {0: row(0, 0.3, 0.5), 1: row(1, 0.3 + 1e-9, 0.5)}
+    assert front_plan.scaled(rows, ("a", "b"), (1, 1), (1.0, 1.0)).width == (0.0, 0.0)
