@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.cycle import Floats
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
-from loomopt.program import axes, numbers
-from loomopt.program.axes import Asked, Traded
+from loomopt.program import numbers
 from loomopt.program.curves import STEPS, Columns, curves, tops
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
@@ -25,6 +24,8 @@ from loomopt.units import SI_UNIT
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
+
+    from loomopt.program.axes import Asked, Traded
 
 Figures = Mapping[str, float | None]
 
@@ -124,11 +125,13 @@ class Job(abc.ABC):
         found: dict[str, float | None] = {name: sampled.figures.get(name) for name in scene.schema.figures}
         return found | {name: sampled.peak(quantity) for name, quantity in self.peaks(sampled.model).items()}
 
-    def traded(self, scene: Scene, target: str | None, asked: Asked) -> tuple[Program, tuple[Traded, ...]]:
+    def traded(self, scene: Scene, target: str | None, asked: "Asked") -> "tuple[Program, tuple[Traded, ...]]":
         """Return the task whose levels are axes, after what a target holds (None: nothing), and the axes.
 
         Raises BadInput.
         """
+        from loomopt.program import axes
+
         bounded = [name for name, bound in scene.bounds.items() if bound.free and bound.min < bound.max]
         known = axes.asked_of(scene.schema.axes, bounded, asked, scene.origin)
         if target:
