@@ -37,11 +37,19 @@ HIGH, HIGH_WIDE, WIDTHS = 1.15, 1.9, (7.0, 11.0)
 
 
 class Turn(NamedTuple):
-    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and the marks' angles, rad."""
+    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and the marks' angles, rad.
+
+    unit: in which a person sees crank angles.
+    """
 
     angles: Floats
     columns: "pd.DataFrame"
     marks: Mapping[str, float]
+    unit: str = "deg"
+
+    def told(self, angle: float) -> str:
+        """Return a crank angle, deg, as text."""
+        return f"{angle:.2f} deg" if self.unit == "deg" else show(math.radians(angle), self.unit, 5)
 
     def of(self, column: str) -> Floats:
         """Return a column, SI, as long as the angles."""
@@ -57,12 +65,13 @@ def curves(
     panels: Sequence[Panel] = (),
     today: tuple["pd.DataFrame", Mapping[str, float]] | None = None,
     angle: str = "crank angle",
+    unit: str = "deg",
 ) -> Any:
-    """Return small diagrams over `phi [rad]`, in degrees; written as PNG, PDF or SVG where there is a path.
+    """Return small diagrams over `phi [rad]`; written as PNG, PDF or SVG where there is a path.
 
     marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
     is shaded. panels: what to show, one panel per column with its unit without them. today: curves and marks of
-    today's machine, drawn dashed beside a design's. angle: what phi is.
+    today's machine, drawn dashed beside a design's. angle: what phi is; unit: in which it is shown.
     Raises BadInput for another suffix, and ValueError where there is no column.
     """
     if path:
@@ -70,7 +79,7 @@ def curves(
     panels = panels or each(tuple(frame.columns))
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
-    design, before = _turn(frame, marks or {}), _turn(*today) if today else None
+    design, before = _turn(frame, marks or {}, unit), _turn(*today, unit) if today else None
     with figure._own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
         page, cells = _grid(panels)
         entries = [_panel(cell.axes, panel, design, before) for cell, panel in cells]
@@ -80,17 +89,17 @@ def curves(
             names = _mark(cell.axes, design.marks)
             heads[cell.axes] = head(cell.axes, f"{panel.title}{_bracketed(panel)}", shown, names if cell.first else ())
         stack(page, [cell for cell, _ in cells], heads)
-        _entitle(page, title, f"{angle} phi [deg]", both=before is not None)
+        _entitle(page, title, f"{angle} phi [{unit}]", both=before is not None)
     if path:
         figure.save(page, path)
     return page
 
 
-def _turn(frame: "pd.DataFrame", marks: Mapping[str, float]) -> Turn:
+def _turn(frame: "pd.DataFrame", marks: Mapping[str, float], unit: str) -> Turn:
     """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
-    return Turn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks)
+    return Turn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
 
 
 def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
@@ -153,16 +162,17 @@ def _panel(axes: Any, panel: Panel, design: Turn, before: Turn | None) -> list[E
         axes.plot(before.angles, values, color=colour, linewidth=1.1, linestyle=DASHED, label=label, zorder=2.1)
     for turn, colour, said in ((design, COLOURS[0], ""), (before, TODAY, "today: ")):
         entries += _points(axes, panel, turn, colour, said) if turn else []
-    _frame(axes, np.concatenate([*drawn, *old]), design.angles)
+    _frame(axes, np.concatenate([*drawn, *old]), design)
     if panel.si == "m/s^2":
         _in_g(axes, size)
     return entries + _levels(axes, panel, size)
 
 
-def _frame(axes: Any, values: Floats, angles: Floats) -> None:
+def _frame(axes: Any, values: Floats, turn: Turn) -> None:
     """Give axes their ticks, their grid and a zero where curves pass it."""
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
+    size = math.degrees(factor(turn.unit))
     some = values[np.isfinite(values)]
     low, high = (float(some.min()), float(some.max())) if some.size else (0.0, 0.0)
     if high - low <= ROUNDING * max(abs(low), abs(high)):
@@ -170,9 +180,9 @@ def _frame(axes: Any, values: Floats, angles: Floats) -> None:
         axes.set_ylim(low - room, high + room)
     if low < 0 < high:
         axes.axhline(0.0, color="#9ca3af", linewidth=0.6, zorder=1)
-    axes.set_xlim(angles.min(), angles.max())
+    axes.set_xlim(turn.angles.min(), turn.angles.max())
     axes.xaxis.set_major_locator(MultipleLocator(45))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x if 0 <= x <= 360 else x % 360:g}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{(x if 0 <= x <= 360 else x % 360) / size:.4g}"))
     axes.yaxis.set_major_formatter(FuncFormatter(_tick))  # no common power that stands in the way
     axes.grid(color="#e5e7eb", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
@@ -199,7 +209,7 @@ def _points(axes: Any, panel: Panel, turn: Turn, colour: str, said: str) -> list
         if row is not None:
             angle, value = float(turn.angles[row]), float(values[row])
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
-            where = f" at {angle:.2f} deg" if how in WORDS else ""
+            where = f" at {turn.told(angle)}" if how in WORDS else ""
             (dot,) = axes.plot(angle, value / factor(unit), "o", color=colour, markersize=4.0, zorder=3)
             entries.append((dot, f"{said}{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"))
     return entries

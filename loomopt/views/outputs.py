@@ -178,7 +178,8 @@ def plotted(
     subject = (f"design for {target}" if target else GIVEN) if design else TODAY
     name, broken, _ = said.partition(BROKEN)
     title = f"{scene.name}: {name or subject}{', limits not held' if broken else ''}, curves over the cycle"
-    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle)
+    unit = scene.shown_in("angle")
+    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
 
 

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.text import Text
 
 import loomopt as lo
 from loomopt import packaged, tables
@@ -245,3 +246,13 @@ def test_a_table_without_curves_is_refused(tmp_path, frame):
     for empty in (frame[["phi [rad]"]], frame[["psi [rad]"]]):
         with pytest.raises(ValueError, match="phi"):
             curve_figure.curves(empty, tmp_path / "a.png", "t")
+
+
+def test_crank_angles_are_in_the_unit_of_all_angles():
+    scene = lo.load("beatup").set("display.angle", "rad")
+    figure = outputs.plotted(tables.curves(scene, {}), scene, {})
+    assert overlaps.found(figure) == []
+    said = [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+    assert [text for text in said if "phi [" in text] == ["crank angle phi [rad]"]
+    assert "6.283" in said
+    assert not [text for text in said if "deg" in text]
