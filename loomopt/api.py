@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
 from loomopt import designs, results
@@ -15,6 +14,8 @@ from loomopt.solving.asked import ACCURACY, GAP, SECONDS, Everywhere, check_numb
 from loomopt.tolerances import SLACK
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import pandas as pd
 
     from loomopt.design_study import DesignStudy
@@ -121,7 +122,7 @@ def sweep(
     scene: Given,
     over: "Over",
     target: str | None = None,
-    executor: Executor | Callable[[], Executor] | None = None,
+    executor: "Executor | Callable[[], Executor] | None" = None,
     *,
     workers: int | None = None,
     store: str | os.PathLike[str] | None = None,

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -12,6 +11,8 @@ from loomopt.commands import Free, Json, Problem, Set, With, Without
 from loomopt.shell import Progress, read_number, read_scene, remark
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from loomopt.design_study import DesignStudy
     from loomopt.studies.rows import Row
     from loomopt.studies.sweep import Sweep
@@ -118,7 +119,7 @@ def carried_out(study: "Sweep", how: Run) -> int:
 
 
 @contextlib.contextmanager
-def _executor(dask: str | None) -> Iterator[Executor | None]:
+def _executor(dask: str | None) -> "Iterator[Executor | None]":
     """Yield the executor of a Dask cluster, where one is named."""
     if dask is None:
         yield None
