@@ -1,14 +1,17 @@
-# make solve: balance the packaged loom.   make test: the whole suite.   Both make .venv themselves.
+# make solve: balance the packaged loom.   make test: the suite; make slow: its slow studies.   All make .venv themselves.
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: solve test lint types docs notebooks benchmark clean
+.PHONY: solve test slow lint types docs notebooks benchmark clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
 
 test: .venv/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile --durations 10
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --durations 10
+
+slow: .venv/installed-test
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow --durations 10
 
 lint: .venv/installed-test
 	$(BIN)/ruff check .

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import loomopt as lo
 from loomopt.studies import front, front_plan, runs
 from loomopt.studies.front_solve import Asking
+from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 from loomopt.tolerances import SAME_OBJECTIVE
 
@@ -136,7 +137,7 @@ def asked_at(trade: front.Trade, found: front.Front, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
-    return trade.solved(runs.Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
+    return trade.solved(Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
 def trade_value(trade: front.Trade, row: Row) -> float:

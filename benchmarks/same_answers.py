@@ -239,9 +239,9 @@ def main() -> None:
                 worker.send(each)
             here, there = (worker.receive() for worker in pair)
             told = list(differences(here, there))
-            if not told and here["status"] != "refused":
+            if here["status"] == there["status"] != "refused":
                 off, which = farthest(here["figures"], there["figures"])
-                told = [f"note: figure {which} differs by {off:.2g}"] if off > asked.figures else []
+                told += [f"note: figure {which} differs by {off:.2g}"] if off > asked.figures else []
             rows += [{"case": name_of(each), "exception": text} for text in told]
             for text in told:
                 print(f"{name_of(each)}: {text}", file=sys.stderr)

@@ -6,8 +6,9 @@
 
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
-    from loomopt.api import Answer, Evaluation, evaluate, load, prove, scene, simulate, solve, sweep
+    from loomopt.api import Answer, Evaluation, effects, evaluate, load, pareto, prove, scene, simulate, solve, sweep
     from loomopt.design_study import DesignStudy
+    from loomopt.effects_study import EffectsStudy
     from loomopt.errors import BadInput
     from loomopt.scenes import Scene
     from loomopt.solving.proof import Proofs
@@ -18,11 +19,14 @@ _HOMES = {
     "Answer": "loomopt.api",
     "BadInput": "loomopt.errors",
     "DesignStudy": "loomopt.design_study",
+    "EffectsStudy": "loomopt.effects_study",
     "Evaluation": "loomopt.api",
     "Proofs": "loomopt.solving.proof",
     "Scene": "loomopt.scenes",
+    "effects": "loomopt.api",
     "evaluate": "loomopt.api",
     "load": "loomopt.api",
+    "pareto": "loomopt.api",
     "prove": "loomopt.api",
     "scene": "loomopt.api",
     "simulate": "loomopt.api",
@@ -34,11 +38,14 @@ __all__ = [
     "Answer",
     "BadInput",
     "DesignStudy",
+    "EffectsStudy",
     "Evaluation",
     "Proofs",
     "Scene",
+    "effects",
     "evaluate",
     "load",
+    "pareto",
     "prove",
     "scene",
     "simulate",

@@ -67,7 +67,7 @@ def changes(scene: Scene, own: Scene) -> list[str]:
     """Return what an answer's own scene has otherwise than `scene`, in words; nothing where both are the same."""
     told = [f"{name} on" for name in own.effects if name not in scene.effects]
     told += [f"{name} off" for name in scene.effects if name not in own.effects]
-    before, after = dict(_values(scene.document)), dict(_values(own.document))
+    before, after = dict(values(scene.document)), dict(values(own.document))
     for key in dict.fromkeys([*before, *after]):
         if before.get(key) == after.get(key):
             continue
@@ -81,7 +81,7 @@ def _text(value: object) -> str:
     return clean(value, 80) if isinstance(value, str) else shown(value)
 
 
-def _values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
+def values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]:
     """Yield what decides an answer, and how it is shown, by dotted key; values of effects that are on or off alike."""
     if (name := looked_up(document, ("problem", "name"))) is not None:
         yield "problem.name", name

@@ -1,7 +1,7 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from loomopt import designs, results
@@ -10,7 +10,7 @@ from loomopt.jobs.registry import load, scene
 from loomopt.results import Answer, Evaluation
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
-from loomopt.solving.asked import ACCURACY, GAP, SECONDS, Everywhere, check_numbers, target_name
+from loomopt.solving.asked import ACCURACY, GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
 from loomopt.tolerances import SLACK
 
 if TYPE_CHECKING:
@@ -19,14 +19,29 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.design_study import DesignStudy
+    from loomopt.effects_study import EffectsStudy
     from loomopt.solving.proof import Proofs
+    from loomopt.studies.front import Given as Ranges
     from loomopt.studies.rows import Row
     from loomopt.studies.sweep import Over
 
 Given = Scene | str | os.PathLike[str]
 """A scene, or what `load` takes: a packaged name or a path."""
 
-__all__ = ["Answer", "Evaluation", "Scene", "evaluate", "load", "prove", "scene", "simulate", "solve", "sweep"]
+__all__ = [
+    "Answer",
+    "Evaluation",
+    "Scene",
+    "effects",
+    "evaluate",
+    "load",
+    "pareto",
+    "prove",
+    "scene",
+    "simulate",
+    "solve",
+    "sweep",
+]
 
 
 def solve(
@@ -142,6 +157,64 @@ def sweep(
     from loomopt.studies.sweep import planned
 
     study = planned(_scene(scene), over, target, accuracy=accuracy, seed=seed)
+    return conducted(study, executor, workers, store, resume, on_row)
+
+
+def effects(
+    scene: Given,
+    target: str | None = None,
+    tolerance: float = OMITTED,
+    executor: "Executor | Callable[[], Executor] | None" = None,
+    *,
+    workers: int | None = None,
+    accuracy: float = ACCURACY,
+    seed: int = 0,
+    on_row: "Callable[[Row], None] | None" = None,
+) -> "EffectsStudy":
+    """Return what each effect is worth for a target (the job's default without one), and what may be left out.
+
+    The reference has all effects of [effects] and [available] on that combine. tolerance: share of each objective's
+    natural size that leaving an effect out may change. executor, workers: as in `sweep`; the study is the same whoever
+    computes it. accuracy, seed: as in `solve`. on_row(row): called as each solve is there. Raises BadInput, and
+    KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.effects_study import conducted
+    from loomopt.studies.effects import planned
+
+    study = planned(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
+    return conducted(study, executor, workers, on_row)
+
+
+def pareto(
+    scene: Given,
+    axes: Sequence[str],
+    target: str | None = None,
+    executor: "Executor | Callable[[], Executor] | None" = None,
+    *,
+    maximise: Sequence[str] = (),
+    ranges: "Ranges | None" = None,
+    points: int | None = None,
+    workers: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    accuracy: float = ACCURACY,
+    on_row: "Callable[[Row], None] | None" = None,
+) -> "DesignStudy":
+    """Return the front of two axes: what the first costs of the second, every point certified.
+
+    axes: figures or numbers that the scene bounds; M3_fdc counts by magnitude. target: whose demands hold at every
+    point, the scene's limits alone without one. maximise: axes of which the most is sought; of the others it is the
+    least, but of one that offers its most alone, such as a dwell, the most. ranges: axis → "LO:HI UNIT", or both ends
+    in SI, beyond which the front does not go. points: how many are asked for, 40 without; those that narrow changes
+    down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value, and
+    KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.design_study import conducted
+    from loomopt.studies import front
+
+    own = _scene(scene)
+    asked = front.si(own, ranges or {})
+    study = front.trade(own, axes, target, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
     return conducted(study, executor, workers, store, resume, on_row)
 
 

@@ -6,7 +6,7 @@
 Only loads that stand in the scene are in the sums. Each term is written in its effect's own file.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from loomopt.effects.kinds import Load, Motion, State
 from loomopt.maths import Maths, Number
 from loomopt.schema import Values
 
-Acting = Load[Any] | State[Any]
+Acting = Load[Any] | State
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,33 @@ class Given(NamedTuple):
 
 
 def terms(
-    maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
+    maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values, gone: Collection[str] = ()
 ) -> Iterator[tuple[Acting, Number]]:
-    """Yield each load with its term; switch: by a load's name, which of its formulas holds (see `Load.switch`)."""
+    """Yield each load with its term, but those `gone`; switch: by a load's name, which of its formulas holds.
+
+    See `Load.switch`.
+    """
     for load in loads:
-        yield load, load.force(maths, pose, given.values, given.own[load.name], switch.get(load.name, 0))
+        if load.name in gone:
+            continue
+        own = given.own[load.name]
+        if isinstance(load, State):
+            yield load, load.force(maths, pose, given.values, own, replied(maths, load, loads, pose, given, switch))
+        else:
+            yield load, load.force(maths, pose, given.values, own, switch.get(load.name, 0))
+
+
+def replied(
+    maths: Maths, state: State, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values
+) -> tuple[Number, Number]:
+    """Return z and z˙ in answer to the loads with corners that a state carries."""
+    found = []
+    for load in loads:
+        if isinstance(load, Load) and load.name in state.carries and load.response:
+            oscillator = state.oscillator(maths, given.values, given.own[state.name])
+            own = given.own[load.name]
+            found.append(load.response(maths, oscillator, pose, given.values, own, switch.get(load.name, 0)))
+    return total([position for position, _ in found]), total([rate for _, rate in found])
 
 
 def total(numbers: Sequence[Number]) -> Number:
@@ -72,15 +94,13 @@ def carried(loads: Sequence[Acting]) -> frozenset[str]:
 
 def output_force(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
     """Return Q, N or N·m: what the mechanism must supply at its output."""
-    gone = carried(loads)
-    acting = [load for load in loads if load.acts == "output" and load.name not in gone]
-    return total([term for _, term in terms(maths, acting, pose, given, switch)])
+    gone = carried(loads) | {load.name for load in loads if load.acts != "output"}
+    return total([term for _, term in terms(maths, loads, pose, given, switch, gone)])
 
 
 def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Given, switch: Values) -> Number:
     """Return the torque on the crank, N·m: Q q' and the drive's own terms."""
-    gone = carried(loads)
-    found = list(terms(maths, [load for load in loads if load.name not in gone], pose, given, switch))
+    found = list(terms(maths, loads, pose, given, switch, carried(loads)))
     output = [term for load, term in found if load.acts == "output"]
     drive = [term for load, term in found if load.acts == "drive"]
     return total([total(output) * pose.q1, *drive] if output else drive)

@@ -195,6 +195,7 @@ def simulate(
         remark(f"Wrote {path}")
     if not out:
         layout.show(*scene_view.curves(scene, given, layout.width()))
+    remarked(scene, given)
 
 
 def export(

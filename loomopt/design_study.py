@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from loomopt.lazy import lazy
 from loomopt.results import Answer, solved
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.studies import executors, runs, study_table, workers
+from loomopt.studies.findings import Findings, SceneStudy, counted
 from loomopt.studies.rows import Row, digest
 from loomopt.studies.store import Store
-from loomopt.studies.sweep import Sweep
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,10 +23,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class DesignStudy:
-    """The rows of a study in the order of its points; SI inside, the units of its scene where a person reads it."""
+    """A study with what came of it; SI inside, the units of its scene where a person reads it.
 
-    study: Sweep
-    rows: tuple[Row, ...]
+    solved: the rows of all points that were solved, in their order; of a front some are dominated by others.
+    """
+
+    study: SceneStudy
+    solved: tuple[Row, ...]
+
+    @lazy
+    def findings(self) -> Findings:
+        """What the rows come to."""
+        return self.study.read(self.solved)
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows that count: of a sweep in the order of its points, of a front in that of its second axis."""
+        return self.findings.rows
 
     @property
     def scene(self) -> Scene:
@@ -35,18 +49,18 @@ class DesignStudy:
     @property
     def digest(self) -> str:
         """64 hex digits that are the same for the same rows, their seconds apart."""
-        return digest(self.rows)
+        return digest(self.solved)
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
-        """Return one line per point, units in the column names; si: in SI, else in the scene's own units."""
+        """Return one line per row, units in the column names; si: in SI, else in the scene's own units."""
         return study_table.frame(self.study, self.rows, si)
 
     def answer(self, point: int) -> Answer:
         """Return the whole answer of a row: its solve is repeated, to the same digits. Raises BadInput."""
-        for task, parent in runs.tasks(self.study, self.rows):
+        for task, parent in runs.tasks(self.study, self.solved):
             if task.point == point:
                 return solved(self.study.solve(task, parent), self.study.scene_at(point))
-        allowed = ", ".join(str(row.point) for row in self.rows[:20])
+        allowed = ", ".join(str(row.point) for row in self.solved[:20])
         raise refusal("the study has no such point", key="point", origin="", value=point, allowed=allowed)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
@@ -56,7 +70,7 @@ class DesignStudy:
         """
         from loomopt.views import study_figure
 
-        drawn: Figure = study_figure.plot(self.study, self.rows, None if path is None else Path(path))
+        drawn: Figure = study_figure.plot(self.study, self.solved, None if path is None else Path(path))
         return drawn
 
     def as_dict(self) -> dict[str, object]:
@@ -64,10 +78,11 @@ class DesignStudy:
         return {
             "problem": self.study.scene.name,
             "target": self.study.target,
-            "rows": [row.told() for row in self.rows],
+            **({"message": self.findings.message} if self.findings.message else {}),
+            "rows": [self.study.told(row) for row in self.rows],
             "units": study_table.units(self.study, self.rows),
-            "changes": [change._asdict() for change in study_table.changes(self.study, self.rows)],
-            "gaps": study_table.gaps(self.study, self.rows),
+            "changes": [change.as_dict() for change in self.findings.changes],
+            "gaps": list(self.findings.gaps),
             "provenance": study_table.told(self.study),
         }
 
@@ -76,8 +91,8 @@ class DesignStudy:
 
     def __repr__(self) -> str:
         certified = sum(row.certified for row in self.rows)
-        name = f"{self.study.name} of {self.study.scene.name}, {self.study.target}"
-        return f"<DesignStudy {name}: {len(self.rows)} of {self.study.size} points, {certified} certified>"
+        count = counted(self.study, len(self.rows))
+        return f"<DesignStudy {self.study.name} of {self.study.heading}: {count}, {certified} certified>"
 
     def _repr_html_(self) -> str | None:
         table = self.table()
@@ -85,7 +100,7 @@ class DesignStudy:
 
 
 def conducted(
-    study: Sweep,
+    study: SceneStudy,
     executor: Executor | workers.Making | None = None,
     count: int | None = None,
     store: str | os.PathLike[str] | None = None,
@@ -97,10 +112,7 @@ def conducted(
     count: of worker processes, where there is no executor; store: file that each row is written to as it comes; resume:
     whether rows that are there are taken. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    if executor is not None and count is not None:
-        remedy = "Give one of them"
-        raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)
-    executor = executors.workers(count) if count is not None else executor
+    executor = who(executor, count)
     if store is None:
         if resume:
             raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
@@ -108,14 +120,22 @@ def conducted(
     with Store(Path(store)) as opened:
         known = len(opened.rows(study.key))
         if known and not resume:
-            problem = f"it holds {known} of the {study.size} points of this study already"
+            problem = f"it holds {counted(study, known, 'of the')} of this study already"
             remedy = "Resume (--resume, or resume=True), or name another file"
             raise refusal(problem, str(store), "store", remedy=remedy)
         opened.begin(study.key, told(study))
         return DesignStudy(study, runs.run(study, executor, opened, on_row))
 
 
-def told(study: Sweep) -> Mapping[str, object]:
+def who(executor: Executor | workers.Making | None, count: int | None) -> Executor | workers.Making | None:
+    """Return who computes a study: an executor, or so many processes, not both. Raises BadInput."""
+    if executor is not None and count is not None:
+        remedy = "Give one of them"
+        raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)
+    return executors.workers(count) if count is not None else executor
+
+
+def told(study: SceneStudy) -> Mapping[str, object]:
     """Return what a store says of a study: what its key is made of, and the scene that makes it again."""
     from loomopt.scene_document import copied
 

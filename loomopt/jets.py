@@ -5,7 +5,7 @@ Derivatives, 2nd ed., chapter 3 and section 13.2]: exact but for rounding, no st
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -183,6 +183,7 @@ def lifted(
 
 sin = lifted(np.sin, lambda x, sine: (np.cos(x), -sine))
 cos = lifted(np.cos, lambda x, cosine: (-np.sin(x), -cosine))
+exp = lifted(np.exp, lambda x, power: (power, power))
 sqrt = lifted(np.sqrt, lambda x, root: (0.5 / root, -0.25 / (root * x)))
 
 
@@ -217,6 +218,23 @@ def stacked(values: Sequence[Number]) -> Number:
     jets = [value if isinstance(value, Jet) else Jet(value, none, flat) for value in values]
     h = None if flat is None else np.array([np.broadcast_to(jet.curvature, flat.shape) for jet in jets])
     return Jet(np.array([jet.v for jet in jets], dtype=np.float64), np.array([jet.g for jet in jets]), h)
+
+
+def spread(numbers: Sequence[float], beside: Iterable[Number]) -> Floats:
+    """Return floats as an array of shape (count, 1 ...) that broadcasts with all that stands beside it."""
+    axes = max((np.ndim(each.v if isinstance(each, Jet) else each) for each in beside), default=0)
+    return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
+
+
+def weighted(weights: Sequence[Sequence[float]], values: Number) -> list[Number]:
+    """Return the sums Σ weights[k][i] values[i] over the values' first axis."""
+    table = np.asarray(weights, dtype=np.float64)
+    if not isinstance(values, Jet):
+        return list(np.tensordot(table, values, axes=1))
+    whole = values.whole()
+    v, g = (np.tensordot(table, each, axes=1) for each in (whole.v, whole.g))
+    h = None if whole.h is None else np.tensordot(table, whole.h, axes=1)
+    return [Jet(v[k], g[k], None if h is None else h[k]) for k in range(len(table))]
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:

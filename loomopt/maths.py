@@ -1,14 +1,14 @@
 """The number systems formulas run in: float, NumPy arrays, jets, CasADi, mpmath, SymPy, balls, boxes, recordings.
 
-A formula takes a `Maths` as its first argument and uses nothing but its `sin cos sqrt atan2 pi choose`, operators and
-integers, so it is written once. Each system is imported only when it is asked for.
+A formula takes a `Maths` as its first argument and uses nothing but its `sin cos exp sqrt atan2 pi choose`, operators
+and integers, so it is written once. Each system is imported only when it is asked for.
 """
 
 import functools
 import importlib
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -26,10 +26,12 @@ def _as_it_is(x: Number) -> Number:
 class Maths:
     """One number system.
 
-    sin, cos, sqrt: functions of one number; atan2(y, x): angle in (−π, π]; pi: the system's own π.
+    sin, cos, exp, sqrt: functions of one number; atan2(y, x): angle in (−π, π]; pi: the system's own π.
     number(x): the system's own copy of a float64, exact in every system.
     choose(place, values): the value at a place that is data of a node (0, 1, 2 ... as numbers), never of the design.
     constant(x): a scalar in the form in which arithmetic with what varies is quickest; the results are the same bits.
+    spread(numbers, beside): numbers as one array, over which `arrays` runs a formula at once, beside numbers that may
+    be arrays themselves. weighted(weights, values): a list of the sums Σ weights[k][i] values[i] over such an array.
     """
 
     name: str
@@ -40,6 +42,9 @@ class Maths:
     pi: Number
     number: Callable[[float], Number]
     choose: Callable[[Number, Sequence[Number]], Number]
+    exp: Callable[[Number], Number]
+    spread: Callable[[Sequence[Number], Iterable[Number]], Number]
+    weighted: Callable[[Sequence[Sequence[Number]], Number], list[Number]]
     constant: Callable[[Number], Number] = _as_it_is
 
 
@@ -47,8 +52,62 @@ def _chosen(place: Number, values: Sequence[Number]) -> Number:
     return values[int(place)]
 
 
-FLOAT = Maths("float", math.sin, math.cos, math.sqrt, math.atan2, math.pi, float, _chosen)
+def _spread_floats(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+    import numpy as np
+
+    axes = max((np.ndim(number) for number in beside), default=0)
+    return np.array(numbers, dtype=np.float64).reshape(-1, *(1,) * axes)
+
+
+def _weighted_floats(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+    import numpy as np
+
+    found = np.tensordot(np.asarray(weights), values, axes=1)
+    return found.tolist() if found.ndim == 1 else list(found)
+
+
+def _spread_objects(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+    import numpy as np
+
+    found = np.empty(len(numbers), dtype=object)
+    found[:] = numbers
+    return found
+
+
+def _weighted_objects(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+    return [sum((w * v for w, v in zip(row[1:], values[1:], strict=True)), row[0] * values[0]) for row in weights]
+
+
+FLOAT = Maths(
+    "float",
+    math.sin,
+    math.cos,
+    math.sqrt,
+    math.atan2,
+    math.pi,
+    float,
+    _chosen,
+    math.exp,
+    _spread_floats,
+    _weighted_floats,
+)
 """Plain float64 scalars: several times faster than NumPy on one angle."""
+
+
+def arrays(system: Maths) -> Maths:
+    """Return the system in which a formula runs over an array of another's numbers, as its `spread` makes one."""
+    if system is FLOAT:
+        return numpy()
+    return system if system.spread is not _spread_objects else _elementwise(system)
+
+
+@functools.cache
+def _elementwise(system: Maths) -> Maths:
+    """Return a system of scalars whose functions take arrays of objects, element by element."""
+    import numpy as np
+
+    sin, cos, sqrt, exp = (np.frompyfunc(each, 1, 1) for each in (system.sin, system.cos, system.sqrt, system.exp))
+    return replace(system, sin=sin, cos=cos, sqrt=sqrt, exp=exp, atan2=np.frompyfunc(system.atan2, 2, 1))
 
 
 FEW, CHOICES = 1024, 16
@@ -76,7 +135,8 @@ def numpy() -> Maths:
         # An array without axes saves NumPy the conversion of a scalar in every operation: half the time of a short one.
         return np.asarray(x, dtype=np.float64) if isinstance(x, int | float) else x
 
-    return Maths("numpy", np.sin, np.cos, np.sqrt, np.arctan2, math.pi, np.float64, choose, constant)
+    functions = np.sin, np.cos, np.sqrt, np.arctan2
+    return Maths("numpy", *functions, math.pi, np.float64, choose, np.exp, _spread_floats, _weighted_floats, constant)
 
 
 @functools.cache
@@ -84,7 +144,8 @@ def jets() -> Maths:
     """Forward derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
     from loomopt import jets
 
-    return Maths("jets", jets.sin, jets.cos, jets.sqrt, jets.atan2, math.pi, float, jets.chosen)
+    functions = jets.sin, jets.cos, jets.sqrt, jets.atan2
+    return Maths("jets", *functions, math.pi, float, jets.chosen, jets.exp, jets.spread, jets.weighted)
 
 
 def recorded(tape: "Tape", system: int = 0) -> Maths:
@@ -93,9 +154,16 @@ def recorded(tape: "Tape", system: int = 0) -> Maths:
     def function(name: str) -> Callable[..., Number]:
         return functools.partial(tape.call, system, name)
 
-    sin, cos, sqrt, atan2, number = map(function, ("sin", "cos", "sqrt", "atan2", "number"))
-    pi = tape.record(f"pi_{system}")
-    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, functools.partial(tape.choose, system))
+    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+        return tape.call(system, "spread", tape.listed(numbers), tape.listed(beside))
+
+    def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+        found = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)
+        return [tape.record("{0}[{1}]", found, k) for k in range(len(weights))]
+
+    sin, cos, sqrt, atan2, number, exp = map(function, ("sin", "cos", "sqrt", "atan2", "number", "exp"))
+    pi, choose = tape.record(f"pi_{system}"), functools.partial(tape.choose, system)
+    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, choose, exp, spread, weighted)
 
 
 @functools.cache
@@ -108,7 +176,14 @@ def casadi() -> Maths:
             return values[int(place)]
         return sum((place == k) * value for k, value in enumerate(values))
 
-    return Maths("casadi", ca.sin, ca.cos, ca.sqrt, ca.atan2, math.pi, float, choose)
+    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+        return ca.SX(ca.DM(numbers))
+
+    def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+        return list(ca.vertsplit(ca.mtimes(ca.DM(weights), values)))
+
+    functions = ca.sin, ca.cos, ca.sqrt, ca.atan2
+    return Maths("casadi", *functions, math.pi, float, choose, ca.exp, spread, weighted)
 
 
 @functools.cache
@@ -119,7 +194,8 @@ def mpmath(digits: int = 40) -> Maths:
     """
     mp = importlib.import_module("mpmath").MPContext()
     mp.dps = digits
-    return Maths("mpmath", mp.sin, mp.cos, mp.sqrt, mp.atan2, +mp.pi, mp.mpf, _chosen)
+    functions = mp.sin, mp.cos, mp.sqrt, mp.atan2
+    return Maths("mpmath", *functions, +mp.pi, mp.mpf, _chosen, mp.exp, _spread_objects, _weighted_objects)
 
 
 ORDER = 3
@@ -158,6 +234,9 @@ def balls() -> Maths:
         arb.pi(),
         arb,
         lambda place, values: values[int(float(place))],
+        lambda x: x.exp(),
+        _spread_objects,
+        _weighted_objects,
         constant,
     )
 
@@ -168,12 +247,17 @@ def ball_series(centre: float, half: float) -> Number:
     return flint.arb_series([flint.arb(centre, half), 1], ORDER)
 
 
+def _unserved(*operands: Number) -> Number:
+    raise ValueError("a motion of its own is not enclosed over boxes of designs")
+
+
 @functools.cache
 def boxes() -> Maths:
     """Intervals rounded outward, and their slopes, over arrays of boxes: every result encloses the true one."""
     from loomopt import boxes
 
-    return Maths("boxes", boxes.sin, boxes.cos, boxes.sqrt, boxes.atan2, boxes.PI, boxes.interval, boxes.chosen)
+    functions = boxes.sin, boxes.cos, boxes.sqrt, boxes.atan2
+    return Maths("boxes", *functions, boxes.PI, boxes.interval, boxes.chosen, _unserved, _unserved, _unserved)
 
 
 @functools.cache
@@ -182,11 +266,13 @@ def box_series() -> Maths:
     from loomopt import box_series, boxes
 
     own = box_series
-    return Maths("box series", own.sin, own.cos, own.sqrt, own.atan2, boxes.PI, boxes.interval, own.chosen)
+    functions = own.sin, own.cos, own.sqrt, own.atan2
+    return Maths("box series", *functions, boxes.PI, boxes.interval, own.chosen, _unserved, _unserved, _unserved)
 
 
 @functools.cache
 def sympy() -> Maths:
     """SymPy expressions: equations to print and to derive from."""
     sp = importlib.import_module("sympy")
-    return Maths("sympy", sp.sin, sp.cos, sp.sqrt, sp.atan2, sp.pi, sp.Float, _chosen)
+    functions = sp.sin, sp.cos, sp.sqrt, sp.atan2
+    return Maths("sympy", *functions, sp.pi, sp.Float, _chosen, sp.exp, _spread_objects, _weighted_objects)

@@ -45,7 +45,7 @@ class Evaluation(solution.Evaluation, showing.Shown):
         """
         from loomopt import tables
 
-        return tables.row(self, self.scene, self.target, self._outcome, si=si)
+        return tables.row(self, self.scene, self.sought, self._outcome, si=si)
 
     def curves(self) -> "pd.DataFrame":
         """Return the curves of the design over the cycle, SI, units in the column names."""
@@ -78,7 +78,10 @@ class Evaluation(solution.Evaluation, showing.Shown):
 
     def evaluate(self) -> "Evaluation":
         """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
-        return evaluated(self.scene, designs.checked(self.design, self.scene), self.target)
+        design = designs.checked(self.design, self.scene)
+        if self.terms:
+            return _judged(self.terms.evaluation(design), self.scene, self.target)
+        return evaluated(self.scene, design, self.target)
 
     def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
         """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`. Raises BadInput."""
@@ -92,7 +95,13 @@ class Evaluation(solution.Evaluation, showing.Shown):
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
         from loomopt.solving import proof
 
-        return proof.prove(self.scene, designs.checked(self.design, self.scene), self.target, slack)
+        design = designs.checked(self.design, self.scene)
+        return self.terms.proofs(design, slack) if self.terms else proof.prove(self.scene, design, self.target, slack)
+
+    @property
+    def sought(self) -> str:
+        """What it answers, or was judged by: its target, or what its terms say."""
+        return self.terms.said if self.terms else self.target
 
     @property
     def _outcome(self) -> str:
@@ -105,13 +114,16 @@ class Evaluation(solution.Evaluation, showing.Shown):
         from loomopt.jobs import registry
         from loomopt.solving.words import Words
 
-        objectives = registry.of(self.scene).program(self.scene, self.target).objectives
-        known = {each.figure: self.figures.get(each.figure) for each in objectives}
-        words = Words(self.scene)
+        if self.terms:
+            asked = list(self.terms.axes)
+        else:
+            asked = [each.figure for each in registry.of(self.scene).program(self.scene, self.target).objectives]
+        words, all_of = Words(self.scene), {**self.design, **self.figures}
+        known = {name: all_of.get(name) for name in asked}
         return ", ".join(f"{name} {words.shown(name, value)}" for name, value in known.items() if value is not None)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.problem}, {self.target}: {self._outcome}; {self._told}>"
+        return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._told}>"
 
 
 @dataclass(frozen=True, repr=False)

@@ -119,6 +119,8 @@ def _completed(own: Mapping[str, str]) -> dict[str, str]:
             continue
         if kind == "pressure":
             found[kind] = _pressure(bases)
+        elif kind == "energy":
+            found[kind] = si if _is_decimal(found["torque"]) else found["torque"]
         elif kind != "torque" and si.startswith(torque):
             found[kind] = si.replace(torque, found["torque"], 1)
         else:

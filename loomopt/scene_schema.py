@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from loomopt.effects.kinds import Effect
-from loomopt.schema import Axis, Figure, Sense, Table, Target
+from loomopt.lazy import lazy
+from loomopt.schema import Axis, Conflict, Figure, Sense, Table, Target
 from loomopt.units import Shown
 
 if TYPE_CHECKING:
@@ -25,8 +26,10 @@ class SceneSchema:
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
     groups: name → bounds that --free frees together.
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
+    parts: whether the job honours effects by which the output may part from the mechanism.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
     own_axes: axes that are read otherwise than under their own name.
+    conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
     """
 
     name: str
@@ -45,9 +48,11 @@ class SceneSchema:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)
     partly_known: bool = False
+    parts: bool = False
     own_axes: Mapping[str, Axis] = field(default_factory=dict)
+    conflict: Conflict | None = None
 
-    @property
+    @lazy
     def figures(self) -> dict[str, Figure]:
         """Figures of the job, then those of its effects."""
         return {**self.own_figures, **{f.name: f for effect in self.effects.values() for f in effect.figures}}

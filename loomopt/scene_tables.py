@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
-from loomopt.effects.kinds import UNBUILT, Check, Effect, Load, instance
+from loomopt.effects.kinds import Check, Effect, Event, Load, Speed, instance
 from loomopt.owned import label
 from loomopt.quantities import Quantity, quantity_of, unit_of
 from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
@@ -114,8 +114,8 @@ def effects(raw: object, schema: SceneSchema, origin: str, path: str) -> dict[Ef
     for name, effect in schema.effects.items():
         if name not in inner:
             continue
-        if isinstance(effect, UNBUILT):
-            problem = f"effect {name} changes the motion itself, which no scene can ask for yet"
+        if isinstance(effect, Event) and not schema.parts:
+            problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
             raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
         if not effect.many:
             found[effect] = checked(effect.own, inner[name], origin, f"{path}.{name}")
@@ -133,11 +133,23 @@ def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Eff
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
             raise missing(type(tables[path]), origin, path, name, f"{who} needs it")
+    if any(effect.beside or effect.clashes for effect in active):
+        _combined(active, origin)
     for effect, own in active.items():
         words = {key: value for key, value in own if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
             raise refusal(problem, origin, f"effects.{effect.name}", remedy="Take it off, or choose other values")
+
+
+def _combined(active: Mapping[Effect, Table], origin: str) -> None:
+    """Raise BadInput where effects cannot be on together."""
+    from loomopt.effects.combining import faults
+
+    for fault in faults(active):
+        remedy = f"Add [effects.{fault.other}], or take {fault.effect.name} off"
+        remedy = remedy if fault.missing else f"Take one of them off (--without {fault.other})"
+        raise refusal(fault.problem, origin, f"effects.{fault.effect.name}", remedy=remedy)
 
 
 def places(
@@ -232,7 +244,7 @@ def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: s
         if name not in limitable:
             raise unknown("figure to limit", name, limitable, origin, f"limits.{name}")
         for other, effect in schema.effects.items():
-            given = isinstance(effect, Check) and name in {*effect.quantities, *effect.rows}
+            given = isinstance(effect, Check | Speed) and name in {*getattr(effect, "quantities", ()), *effect.rows}
             if given and other not in on:
                 remedy = f"Put {other} on, or take the limit out"
                 raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)

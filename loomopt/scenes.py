@@ -135,6 +135,16 @@ class Scene(Shown):
         A key of an effect that is off puts it on, with the other values from [available]. A bound that is one
         value becomes a range once its min and max are set.
         """
+        return self.change(values)
+
+    def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
+        """Return the scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
+        document = self._off(self._on(self._set(values), on), off)
+        if document is self.document:
+            return self
+        return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
+
+    def _set(self, values: Mapping[str, object]) -> Mapping[str, Any]:
         document = self.document
         for key, value in values.items():
             parts = self._path(key)
@@ -146,28 +156,39 @@ class Scene(Shown):
             if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
                 document = replaced(document, own, {}, self.origin, key)
             document = replaced(document, parts, value, self.origin, key)
-        return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
+        return document
 
-    def with_effect(self, name: str) -> "Scene":
-        """Return the scene with an effect put on, its values from [available.NAME]."""
-        parts = self._effect_path(name)
-        if name in self.effects:
-            return self
+    def with_effect(self, *names: str) -> "Scene":
+        """Return the scene with effects put on together, their values from [available.NAME]."""
+        return self.change({}, on=names)
+
+    def _on(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
+        for name in names:
+            parts = self._effect_path(name)
+            if looked_up(document, ("effects", *parts)) is None:
+                self._demand_values(document, name, parts)
+                document = _put_on(document, *parts)
+        return document
+
+    def _demand_values(self, document: Mapping[str, Any], name: str, parts: list[str]) -> None:
+        """Raise BadInput for an effect that is off and has no table in [available]."""
         fields = self._effect(name).own.model_fields
         keys = [f"effects.{name}.{key}" for key, info in fields.items() if info.is_required()]
-        if keys and looked_up(self.document, ("available", *parts)) is None:
+        if keys and looked_up(document, ("available", *parts)) is None:
             remedy = f"Set {', '.join(keys)} instead, which puts it on, or add the table [available.{name}]"
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
-        return self._rebuilt(_put_on(self.document, *parts))
 
-    def without_effect(self, name: str) -> "Scene":
-        """Return the scene with an effect taken off; its values stay in [available.NAME]."""
-        parts = self._effect_path(name)
-        if name not in self.effects:
-            return self
-        document = removed(self.document, ("effects", *parts))
-        own, key = looked_up(self.document, ("effects", *parts)), f"available.{name}"
-        return self._rebuilt(replaced(document, ("available", *parts), own, self.origin, key))
+    def without_effect(self, *names: str) -> "Scene":
+        """Return the scene with effects taken off together; their values stay in [available.NAME]."""
+        return self.change({}, off=names)
+
+    def _off(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
+        for name, parts in [(name, self._effect_path(name)) for name in names]:
+            own = looked_up(document, ("effects", *parts))
+            if own is not None:
+                document = removed(document, ("effects", *parts))
+                document = replaced(document, ("available", *parts), own, self.origin, f"available.{name}")
+        return document
 
     def free(self, names: Iterable[str] | str) -> "Scene":
         """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
@@ -209,9 +230,6 @@ class Scene(Shown):
         problem = f"unknown table {shown(key)}" if len(parts) == 1 else "a name in the key is empty"
         remedy = "Name the table and the key, such as operation.M0"
         raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
-
-    def _rebuilt(self, document: Mapping[str, Any]) -> "Scene":
-        return build(document, self.jobs, self.origin, self.paths)
 
     def _effect(self, name: str) -> Effect:
         """Return a declared effect; of an instance, its kind."""

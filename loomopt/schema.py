@@ -45,6 +45,17 @@ Sense = Literal["least", "most"]
 BOTH: tuple[Sense, ...] = ("least", "most")
 
 
+class Conflict(NamedTuple):
+    """Two axes of a job that cost each other, the first one sought; target: whose demands hold, None for none.
+
+    maximise: axes of which the most is sought.
+    """
+
+    axes: tuple[str, str]
+    target: str | None = None
+    maximise: tuple[str, ...] = ()
+
+
 class Axis(NamedTuple):
     """What can be traded against something else: a figure or a number of the design, and how a program reads it.
 

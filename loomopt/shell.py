@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
 
-OPTIONS = ("accuracy", "over", "resume", "slack", "starts", "store", "target", "workers")
+OPTIONS = ("accuracy", "over", "points", "resume", "slack", "starts", "store", "target", "tolerance", "workers")
 """Arguments of the Python functions that are options of the same name here."""
 
 SILENT = 1.0
@@ -78,11 +78,10 @@ def read_scene(
 
 
 def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
-    """Return a scene with what the command line changes in it: effects on, then any number, then effects off."""
+    """Return a scene with what the command line changes in it: numbers set, then effects on, then effects off."""
     from loomopt.scene_errors import refusal
 
-    own: dict[str, object] = {}
-    rest: dict[str, object] = {}
+    values: dict[str, object] = {}
     for item in sets or ():
         key, equals, value = item.partition("=")
         if not equals:
@@ -91,14 +90,8 @@ def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: l
         value = value.strip()
         if len(value) > 1 and value[0] == value[-1] and value[0] in "\"'":  # quotes that the shell has kept
             value = value[1:-1]
-        (own if key.strip().startswith("effects.") else rest)[key.strip()] = value
-    scene = scene.update(own) if own else scene
-    for name in on or ():
-        scene = scene.with_effect(name)
-    scene = scene.update(rest) if rest else scene
-    for name in off or ():
-        scene = scene.without_effect(name)
-    return scene
+        values[key.strip()] = value
+    return scene.change(values, on or (), off or ())
 
 
 class Asked(NamedTuple):

@@ -1,7 +1,7 @@
 """The commands that solve many times: a row of a table each, by as many workers as there are, kept as they come."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from loomopt.design_study import DesignStudy
+    from loomopt.studies.findings import SceneStudy
     from loomopt.studies.rows import Row
-    from loomopt.studies.sweep import Sweep
 
 Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
 Workers = Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")]
@@ -26,9 +26,12 @@ Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the tab
 Figure = Annotated[
     list[Path] | None, typer.Option(metavar="F", help="Draw it, with designs beside: .png, .svg or .pdf.")
 ]
+Bars = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
 Si = Annotated[bool, typer.Option("--si", help="Tables in SI, not in the scene's own units.")]
 OK, NOT_CERTIFIED, INFEASIBLE = 0, 4, 3
 """Exit statuses."""
+ANSWERED = "needed", "evaluated"
+"""Statuses of rows that are answered without a solve."""
 
 
 class Run(NamedTuple):
@@ -68,26 +71,86 @@ def sweep(
 
     how = Run(workers, dask, store, resume, out, figure, si, as_json)
     scene = read_scene(problem, sets, on, off, free)
-    raise typer.Exit(carried_out(planned(scene, _over(over, scene.origin), target), how))
+    ranges = _parted(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
+    raise typer.Exit(carried_out(planned(scene, ranges, target), how))
 
 
-def _over(items: list[str], origin: str) -> dict[str, str]:
-    """Return key → range of what is to be swept. Raises BadInput."""
+def pareto(
+    problem: Problem,
+    against: Annotated[str, typer.Option(metavar="B", help="The axis that pays for it.")],
+    minimise: Annotated[
+        list[str] | None, typer.Option(metavar="A", help="The axis of which the least is sought.")
+    ] = None,
+    maximise: Annotated[
+        list[str] | None, typer.Option(metavar="A", help="An axis of which the most is sought.")
+    ] = None,
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option("--range", metavar="B=LO:HI UNIT", help='No further along an axis, such as "m4e=0:5 kg".'),
+    ] = None,
+    points: Annotated[str | None, typer.Option(metavar="N", help="So many points; 40 without it.")] = None,
+    target: Annotated[str | None, typer.Option(help="Whose demands hold; the scene's limits alone without it.")] = None,
+    sets: Set = None,
+    free: Free = None,
+    on: With = None,
+    off: Without = None,
+    workers: Workers = None,
+    dask: Dask = None,
+    store: StoreFile = None,
+    resume: Resume = False,
+    out: Out = None,
+    figure: Figure = None,
+    si: Si = False,
+    as_json: Json = False,
+) -> None:
+    """Show what two figures cost each other: the whole front."""
+    from loomopt.studies import front
+
+    how = Run(workers, dask, store, resume, out, figure, si, as_json)
+    scene = read_scene(problem, sets, on, off, free)
+    axes = _axes(minimise or [], maximise or [], against)
+    ranges = front.si(scene, _parted(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
+    count = None if points is None else read_number("--points", points, int)
+    study = front.trade(
+        scene, axes, target, maximise=maximise or (), minimise=minimise or (), ranges=ranges, points=count
+    )
+    raise typer.Exit(carried_out(study, how))
+
+
+def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
+    """Return the axis that is sought and the one that pays for it. Raises BadInput."""
+    from loomopt.scene_errors import refusal
+
+    named = [*minimise, *maximise]
+    twice = next((name for name in named if named.count(name) > 1), None)
+    sought = [name for name in named if name != against] or named
+    remedy = "Write --minimise A --against B, or --maximise A; and --maximise B where its most is sought"
+    if twice:
+        raise refusal("it is sought twice", "", twice, remedy=remedy)
+    if len(sought) != 1:
+        problem = f"{len(sought)} axes are sought beside {against}" if sought else "no axis is sought"
+        raise refusal(problem, "", "--minimise", ", ".join(sought) or against, remedy=remedy)
+    return sought[0], against
+
+
+def _parted(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
+    """Return key → what an option gives for it. Raises BadInput."""
     from loomopt.scene_errors import refusal
 
     found: dict[str, str] = {}
     for item in items:
         key, equals, values = (part.strip() for part in item.partition("="))
         if not equals or key in found:
-            problem = f"{key} is swept twice" if equals else "it is not KEY=LO:HI:STEP UNIT"
-            raise refusal(problem, origin, "--over", item, remedy='Write --over "operation.M0=600:900:25 N*m"')
+            problem = f"{key} is given twice" if equals else f"it is not {form}"
+            raise refusal(problem, "", option, item, remedy=f'Write {option} "{example}"')
         found[key] = values
     return found
 
 
-def carried_out(study: "Sweep", how: Run) -> int:
+def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
     from loomopt.design_study import DesignStudy, conducted
+    from loomopt.studies.findings import counted
     from loomopt.views import study_files
 
     for path in how.out or ():
@@ -98,7 +161,7 @@ def carried_out(study: "Sweep", how: Run) -> int:
 
     def kept(row: "Row") -> None:
         rows[row.point] = row
-        progress.say(f"{len(rows)} of {study.size} points")
+        progress.say(counted(study, len(rows)))
 
     count = None if how.workers is None else read_number("--workers", how.workers, int)
     try:
@@ -136,7 +199,7 @@ def _print(found: "DesignStudy", how: Run) -> None:
     if how.as_json:
         print(outputs.json_text(found.as_dict()))
     else:
-        layout.show(*study_files.parts(found.study, found.rows, how.si))
+        layout.show(*study_files.parts(found.study, found.solved, how.si))
 
 
 def status(rows: "tuple[Row, ...]") -> int:
@@ -146,5 +209,66 @@ def status(rows: "tuple[Row, ...]") -> int:
     return OK if all(row.certified or row.status == "infeasible" for row in rows) else NOT_CERTIFIED
 
 
-STUDIES: dict[str, Callable[..., None]] = {"sweep": sweep}
+def effects(
+    problem: Problem,
+    target: Target = None,
+    tolerance: Annotated[
+        str, typer.Option(metavar="R", help="What an effect may change, relative to natural sizes.")
+    ] = "0.01",
+    sets: Set = None,
+    free: Free = None,
+    on: With = None,
+    off: Without = None,
+    workers: Workers = None,
+    dask: Dask = None,
+    figure: Bars = None,
+    as_json: Json = False,
+) -> None:
+    """Show what each effect is worth, and what may be left out."""
+    from loomopt import effects_study
+    from loomopt.studies.effects import planned
+    from loomopt.views import effects_table, layout, outputs, study_files
+
+    for path in figure or ():
+        study_files.check_figure(path)
+    count = None if workers is None else read_number("--workers", workers, int)
+    scene = read_scene(problem, sets, on, off, free)
+    study = planned(scene, target, read_number("--tolerance", tolerance, float))
+    rows: dict[int, Row] = {}
+
+    def kept(row: "Row") -> None:
+        rows[row.point] = row
+        progress.say(f"{len(rows)} solved")
+
+    def told(found: effects_study.EffectsStudy) -> None:
+        if as_json:
+            print(outputs.json_text(found.as_dict()))
+        else:
+            layout.show(*effects_table.parts(found))
+
+    try:
+        with _executor(dask) as executor, Progress() as progress:
+            progress.say("solving with all effects on")
+            found = effects_study.conducted(study, executor, count, kept)
+    except KeyboardInterrupt:
+        if rows:
+            told(effects_study.concluded(study, tuple(rows.values())))
+        raise
+    told(found)
+    for path in figure or ():
+        if found.reference.scales:
+            found.plot(path)
+        remark(f"Wrote {path}" if found.reference.scales else f"{path} is not written: no effect was measured")
+    raise typer.Exit(outcome(found.statuses))
+
+
+def outcome(statuses: Sequence[str]) -> int:
+    """Return the exit status of a study by those of its solves; what need not be solved counts as it is."""
+    solved = [status for status in statuses if status not in ANSWERED]
+    if all(status == "infeasible" for status in solved):
+        return INFEASIBLE
+    return OK if all(status in ("optimal", "infeasible") for status in solved) else NOT_CERTIFIED
+
+
+STUDIES: dict[str, Callable[..., None]] = {"sweep": sweep, "pareto": pareto, "effects": effects}
 """Name → command."""

@@ -6,9 +6,11 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
+from loomopt.effects.kinds import Event
 from loomopt.jobs import registry
 from loomopt.provenance import csv as csv
 from loomopt.provenance import provenance as provenance
+from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
@@ -37,7 +39,7 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in found])
     more = {}
     if isinstance(solution, Solution):
-        more = {"target": solution.target, "accuracy": solution.solver["accuracy"]}
+        more = {"target": solution.sought, "accuracy": solution.solver["accuracy"]}
     frame.attrs.update(provenance(scene, **more))
     return frame.set_index("name")
 
@@ -154,6 +156,9 @@ def curves(
     job = registry.of(scene)
     rows = functools.partial(job.curves, scene, {**job.today(scene), **designs.flat(design)})
     more: dict[str, object] = {"target": target} if target else {}
+    if accuracy is not None and any(isinstance(effect, Event) for effect in scene.active):
+        problem = "what is simulated has no curves in as few rows as show their peaks"
+        raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
     if accuracy is None:
         columns = rows()
     else:

@@ -127,8 +127,13 @@ class Tape:
 
     def choose(self, system: int, place: Number, values: Sequence[Number]) -> Recorded:
         """Return the value at a place, by a number system's `choose`."""
-        listed = "".join(f"{{{k}}}, " for k in range(len(values)))
-        return self.call(system, "choose", place, self.record(f"({listed})", *values))
+        return self.call(system, "choose", place, self.listed(values))
+
+    def listed(self, values: Iterable[Number]) -> Recorded:
+        """Return numbers as a tuple of them."""
+        operands = tuple(values)
+        listed = "".join(f"{{{k}}}, " for k in range(len(operands)))
+        return self.record(f"({listed})", *operands)
 
     def record(self, form: str, *operands: Number) -> Recorded:
         """Return the result of an operation on recorded numbers and literals."""

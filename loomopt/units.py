@@ -39,7 +39,8 @@ _TABLE: tuple[tuple[tuple[int, int, int, int], dict[str, Fraction | str]], ...] 
     ((0, 0, 0, 1), {"rad": "1", "mrad": "1e-3", "deg": _PI / 180, "turn": 2 * _PI}),
     ((0, 0, -1, 1), {"rpm": _PI / 30}),
     ((0, 0, -1, 0), {"Hz": "1"}),
-    ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
+    ((1, 1, -2, 0), {"N": "1", "mN": "1e-3", "kN": "1000", "MN": "1e6", "lbf": _POUND * _GRAVITY, "kgf": _GRAVITY}),
+    ((2, 1, -2, 0), {"J": "1"}),
     ((2, 1, -3, 0), {"W": "1", "kW": "1000", "hp": _HORSEPOWER}),
     ((-1, 1, -2, 0), {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "bar": "1e5", "psi": _PSI}),
 )
@@ -70,6 +71,7 @@ SI_UNIT: dict[str, str] = {
     "acceleration": "m/s^2",
     "jerk": "m/s^3",
     "power": "W",
+    "energy": "J",
 }
 """Kind of quantity → the SI unit its numbers have inside the program."""
 

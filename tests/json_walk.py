@@ -26,7 +26,7 @@ KNOWN = {
         "anyOf",
     ),
     *("allOf", "if", "then", "properties", "required", "additionalProperties", "items", "minItems", "maxItems"),
-    *("minimum", "exclusiveMinimum", "exclusiveMaximum", "minProperties"),
+    *("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minProperties"),
 }
 
 
@@ -77,5 +77,5 @@ def _inside(schema, data, root):
         )
     if isinstance(data, int | float) and not isinstance(data, bool):
         high, above = schema.get("exclusiveMaximum", data + 1), schema.get("exclusiveMinimum", data - 1)
-        return schema.get("minimum", data) <= data and above < data < high
+        return schema.get("minimum", data) <= data <= schema.get("maximum", data) and above < data < high
     return True

@@ -26,7 +26,7 @@ KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene",
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]
 FIGURES = ["M3_fdc", "peak_torque", "alpha_fdc", "swing", "theta", "beta", "mu_min", "J4", "r4", "pulse_rms"]
 TIMES = ["import_s", "build_s", "solve_s", "settle_s", "certify_s", "report_s", "total_s"]
-SI = {"m", "kg", "rad", "N", "N*m", "rad/s^2", "kg*m^2", "W", "1"}
+SI = {"m", "kg", "rad", "N", "N*m", "rad/s", "rad/s^2", "kg*m^2", "W", "1"}
 
 
 @pytest.fixture
@@ -265,3 +265,25 @@ def test_progress_is_silent_in_a_pipe(capsys):
         progress.began -= 2
         progress.say("start 2 of 9")
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("command", ["solve", "prove", "accuracy", "sweep"])
+def test_commands_that_seek_or_prove_refuse_a_crank_of_changing_speed(cli, command):
+    over = ["--over", "operation.M0=600:700:50 N*m"] if command == "sweep" else []
+    status, out, err = cli(command, "beatup", "--with", "speed_fluctuation", "--json", *over)
+    assert (status, out) == (2, "")
+    assert "effects.speed_fluctuation" in err
+    assert "without it, evaluate with it" in err
+    assert err.count("\n") == 1
+
+
+def test_a_crank_of_changing_speed_is_evaluated_and_simulated(cli, tmp_path):
+    status, out, err = cli("evaluate", "beatup", "--with", "speed_fluctuation", "--json")
+    data = json.loads(out)
+    assert (status, err) == (0, "")
+    assert data["figures"]["fluctuation"] == pytest.approx(0.00805602236175, rel=1e-9)
+    assert [data["units"][name] for name in ("fluctuation", "speed_fdc", "motor_torque_max")] == ["1", "rad/s", "N*m"]
+    file = tmp_path / "curves.csv"
+    assert cli("simulate", "beatup", "--with", "speed_fluctuation", "--out", str(file))[0] == 0
+    head = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
+    assert head.endswith("omega [rad/s],motor_torque [N*m]")

@@ -311,6 +311,9 @@ def without_structure(node):
     """Return a function without what asks how the scene is built: `if X is None: return`, `A if X == "word" else B`."""
 
     class Structure(ast.NodeTransformer):
+        def visit_ImportFrom(self, found):
+            return None  # of what only scenes that call for it import
+
         def visit_If(self, found):
             test = found.test
             structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is)
@@ -364,11 +367,55 @@ def test_formulas_of_the_crank_rocker_hold_no_branch(file):
     assert {name: offences(found[name]) for name in found.keys() - NOT_FORMULAS[file] if offences(found[name])} == {}
 
 
+@pytest.mark.parametrize("name", ["_under", "_critical", "_over", "constants"])
+def test_formulas_of_an_oscillator_hold_no_branch(name):
+    assert not offences(without_structure(functions(read("motion", "harmonic.py"))[name]))
+
+
 @pytest.mark.parametrize("file", EFFECT_FILES)
 def test_formulas_of_an_effect_hold_no_branch(file):
     found = functions(read("effects", file))
     formulas = {name: node for name, node in found.items() if any(a.arg == "maths" for a in node.args.args)}
-    assert formulas
+    assert formulas or file == "shedding/separation.py", "flight is followed in floats alone"
     for name, node in formulas.items():
         checked = node if name == "force" else without_structure(node)
         assert not offences(checked), name
+
+
+# Powers of e, and sums over an array of positions --------------------------------------------------------------------
+
+ARRAYS = (*SCALAR, maths.jets())
+
+
+def weighed(system, numbers):
+    """Return Σ weights · sqrt(1 + a sin x) exp(−x) over positions, as plain floats; numbers: a."""
+    angles = [system.number(x) for x in (0.1, 0.7, 2.0)]
+    weights = [[system.number(w) for w in row] for row in ((1.0, -2.0, 0.5), (0.25, 3.0, -1.0))]
+    over = maths.arrays(system)
+    x = over.spread(angles, [numbers])
+    return system.weighted(weights, over.sqrt(1 + numbers * over.sin(x)) * over.exp(-x))
+
+
+@pytest.mark.parametrize("system", ARRAYS, ids=lambda system: system.name)
+def test_sums_over_positions_are_the_same_in_every_system(system):
+    a = ca.SX.sym("a") if system.name == "casadi" else system.number(0.3)
+    found = weighed(system, a)
+    if system.name == "casadi":
+        found = [ca.Function("f", [a], [each])(0.3) for each in found]
+    expected = [
+        sum(w * math.sqrt(1 + 0.3 * math.sin(x)) * math.exp(-x) for w, x in zip(row, (0.1, 0.7, 2.0), strict=True))
+        for row in ((1.0, -2.0, 0.5), (0.25, 3.0, -1.0))
+    ]
+    assert [float(value) for value in found] == pytest.approx(expected, rel=1e-13)
+
+
+def test_sums_over_positions_take_many_designs_at_once():
+    a = np.array([0.3, 0.5])
+    single = [weighed(maths.FLOAT, float(each)) for each in a]
+    assert pytest.approx(np.array(single), rel=1e-14) == np.array(weighed(maths.numpy(), a)).T
+
+
+def test_what_is_not_enclosed_over_boxes_says_so():
+    for system in (maths.boxes(), maths.box_series()):
+        with pytest.raises(ValueError, match="not enclosed over boxes"):
+            system.exp(0.5)

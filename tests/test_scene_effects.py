@@ -5,10 +5,11 @@ import pickle
 from dataclasses import replace
 
 import pytest
+from together import combined
 
 from loomopt import scenes
 from loomopt.effects.beatup import inertia, rocker_inertia
-from loomopt.effects.kinds import Event, Load, Speed, State, ranked
+from loomopt.effects.kinds import Clash, Load, ranked
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
@@ -138,20 +139,43 @@ def test_an_instance_goes_on_and_off_with_its_values():
     assert none.with_effect("mass.rocker").effects == off.effects
 
 
-UNBUILT = [
-    State(name="shaft", summary="", own=Own, carries=(), derived=lambda *_: {}, force=lambda *_: 0),
-    Speed(name="motor", summary="", own=Own),
-    Event(name="contact", summary="", own=Own),
-]
+class Shaped(Table):
+    shape: str = "round"
 
 
-@pytest.mark.parametrize("effect", UNBUILT, ids=lambda effect: type(effect).__name__)
-@pytest.mark.parametrize("table", ["effects", "available"])
-def test_a_kind_that_is_not_built_is_refused_by_name(effect, table):
-    with pytest.raises(BadInput, match=f"effect {effect.name} changes the motion itself") as error:
-        built({table: {effect.name: {"m": "1 kg"}}}, effect)
-    assert error.value.key == f"{table}.{effect.name}"
-    assert built({}, effect).effects == BEATUP.effects
+def apart(name, **declared):
+    """Return an effect without a term of its own worth, that says beside what it stands."""
+    return Load(name=name, summary="", own=Table, acts="drive", force=lambda *_: 0, **declared)
+
+
+def test_an_effect_that_another_needs_is_asked_for():
+    needy = apart("needy", beside=("rocker_inertia",))
+    with pytest.raises(BadInput, match="effect needy needs the effect rocker_inertia") as error:
+        built({"effects": {"needy": {}}}, needy)
+    assert error.value.key == "effects.needy"
+    assert "[effects.rocker_inertia]" in error.value.remedy
+    both = built({"effects": {"needy": {}, "rocker_inertia": {"J3": "1 kg*m^2"}}}, needy)
+    assert "needy" in both.effects
+
+
+def test_effects_that_clash_are_refused_naming_both():
+    lone = apart("lone", clashes=(Clash("resistance", "both push the reed"),))
+    with pytest.raises(BadInput, match="lone and resistance cannot be on together: both push the reed") as error:
+        built({"effects": {"lone": {}}}, lone)
+    assert error.value.key == "effects.lone"
+    assert "--without resistance" in error.value.remedy
+
+
+@pytest.mark.parametrize(("shape", "stands"), [("round", True), ("square", False)])
+def test_effects_may_clash_only_by_a_word_of_the_other(shape, stands):
+    lone = apart("lone", clashes=(Clash("shaped", "it has corners", "shape", ("square", "flat")),))
+    other = Load(name="shaped", summary="", own=Shaped, acts="drive", force=lambda *_: 0)
+    tables = {"effects": {"lone": {}, "shaped": {"shape": shape}}}
+    if stands:
+        assert "lone" in built(tables, lone, other).effects
+        return
+    with pytest.raises(BadInput, match="lone and shaped with shape square cannot be on together: it has corners"):
+        built(tables, lone, other)
 
 
 def test_tables_are_found_by_their_models():
@@ -169,8 +193,8 @@ def test_tables_are_found_by_their_models():
 @pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
 def test_a_scene_with_every_effect_pickles_to_the_same_scene(name):
     scene = load(name)
-    for effect in scene.schema.effects:
-        scene = scene.with_effect(effect)
+    for effect in combined(scene.schema.effects.values()):
+        scene = scene.with_effect(effect.name)
     again = pickle.loads(pickle.dumps(scene))
     assert again == scene
     assert (again.hash, again.active, again.jobs) == (scene.hash, scene.active, scene.jobs)
@@ -195,3 +219,21 @@ def test_a_load_known_in_part_of_the_cycle_is_refused_by_jobs_that_cannot_judge_
         return
     with pytest.raises(BadInput, match="partly is known in part of the cycle only"):
         registry.scene(document)
+
+
+def test_of_several_changes_only_the_outcome_has_to_hold():
+    heavy = BEATUP.with_effect("gravity")
+    with pytest.raises(BadInput, match="shaft_torsion and gravity cannot be on together"):
+        heavy.with_effect("shaft_torsion")
+    twisted = heavy.change({}, on=("shaft_torsion",), off=("gravity",))
+    assert "shaft_torsion" in twisted.effects
+    assert "gravity" not in twisted.effects
+
+    both = load("rapier").change({"effects.tape_stretch.stiffness": "9 kN/m"}, on=("head_inertia", "tape_stretch"))
+    assert both.given("effects.tape_stretch.stiffness") == "9 kN/m"
+    assert both.given("effects.head_inertia.mass") == "0.35 kg"
+
+
+def test_a_value_set_in_available_is_what_goes_on():
+    changed = BEATUP.change({"available.rocker_inertia.J3": "0.07 kg*m^2"}, on=("rocker_inertia",))
+    assert changed.own(rocker_inertia.Own).J3 == 0.07

@@ -14,8 +14,10 @@ HELPERS = {"annotated_doc", "click", "shellingham", "typing_inspection"}
 """What Typer and pydantic bring themselves, by version."""
 RICH = {"rich"}
 SOLVER = {"casadi", "mpmath", "gmpy2"}
-MODULES, OWN = 620, 130
+MODULES, OWN = 620, 133
 """Most modules that any command imports, and most of this package's."""
+STEADY = {f"loomopt.{name}" for name in ("effects.steady", "program.settled", "program.states")}
+"""What only a scene with a state needs."""
 LISTED = """import sys
 from loomopt.cli import run
 code = run(sys.argv[1:])
@@ -81,6 +83,15 @@ def test_only_commands_that_solve_import_casadi():
         assert ("casadi" in imported(*arguments)[1]) == expected
 
 
+@pytest.mark.parametrize("with_it", [False, True], ids=["algebraic", "with a state"])
+def test_motions_that_follow_from_forces_are_imported_by_scenes_that_have_them_only(with_it):
+    for command in (("evaluate", "beatup"), ("solve", "beatup", "--starts", "1"), ("show", "beatup", "--equations")):
+        code, modules = imported(*command, *(("--with", "shaft_torsion") if with_it else ()))
+        assert code == 0
+        motions = {module for module in modules if module.startswith("loomopt.motion")} | modules & STEADY
+        assert motions == ({"loomopt.motion", "loomopt.motion.harmonic"} | STEADY if with_it else set())
+
+
 @pytest.mark.parametrize("name", registry.own_names())
 def test_a_job_imports_no_module_of_another(name):
     others = set(registry.own_names()) - {name}
@@ -108,3 +119,16 @@ def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_oth
     own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**own, **given})
     assert done.stdout.split() == [expected, "1"]
+
+
+def test_a_motion_of_its_own_is_imported_only_by_the_scenes_that_need_it():
+    own = {"loomopt.motion.turning", "loomopt.program.crank_motion"}
+    for arguments, needed in (
+        (("evaluate", "beatup"), set()),
+        (("evaluate", "beatup", "--with", "speed_fluctuation"), own),
+    ):
+        code, modules = imported(*arguments)
+        assert code == 0
+        assert own & modules == needed
+    _, solving = imported("solve", "beatup")
+    assert not {name for name in solving if name.startswith("loomopt.motion")}

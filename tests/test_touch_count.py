@@ -82,6 +82,7 @@ def copy(tmp_path):
     return Copy(tmp_path / "copy")
 
 
+@pytest.mark.slow
 def test_a_new_effect_is_its_file_and_its_reference_rows(copy):
     copy.write("loomopt/effects/beatup/clock_spring.py", EFFECT)
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", REFERENCE, "-k", "clock_spring")
@@ -100,6 +101,7 @@ def test_a_new_effect_is_its_file_and_its_reference_rows(copy):
     assert copy.touched() == ["loomopt/effects/beatup/clock_spring.py", "tests/data/effects.csv"]
 
 
+@pytest.mark.slow
 def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
     for path in sorted(PRESS.rglob("*")):
         place = path.relative_to(PRESS).as_posix()

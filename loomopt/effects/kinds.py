@@ -6,11 +6,17 @@ An effect that is absent from a scene is absent from its equations.
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from loomopt.maths import Maths, Number
 from loomopt.schema import Figure, Table, Values
 from loomopt.units import Shown
+
+if TYPE_CHECKING:
+    from loomopt.effects.steady import Carried, Moved, Oscillator, Replied, Written
+    from loomopt.motion.flight import Cam, Course
+    from loomopt.motion.free import Body
+    from loomopt.motion.turning import Turning
 
 
 class Motion:
@@ -49,6 +55,15 @@ class Force(Protocol[Pose]):
         """Return the term, N or N·m."""
 
 
+class Response(Protocol[Pose]):
+    """response(maths, oscillator, pose, given, own, switch): the closed-form answer to a load with corners."""
+
+    def __call__(
+        self, maths: Maths, oscillator: "Oscillator", pose: Pose, given: Values, own: Values, switch: Number, /
+    ) -> tuple[Number, Number]:
+        """Return z, rad or m, and z˙ in the periodic steady state."""
+
+
 class Reading(Protocol[Pose]):
     """reading(maths, pose, given, own): a value read from the solved motion at one instant."""
 
@@ -66,6 +81,15 @@ def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
     return ()
 
 
+class Clash(NamedTuple):
+    """Another effect that one cannot stand beside, and why; key, words: only while that key of its table says so."""
+
+    effect: str
+    why: str
+    key: str = ""
+    words: tuple[str, ...] = ()
+
+
 class Demand(NamedTuple):
     """What an effect's row must keep: a value, SI, or that of a key of its table; sign +1 at most, −1 at least, 0 ="""
 
@@ -81,7 +105,8 @@ class Effect:
     name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
     own: model of that table's values. rank: its place among the job's effects, the lowest first.
     reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
-    needs: scene keys that must be given. examples: tables it may have, as a scene writes them, for tests and templates.
+    needs: scene keys that must be given; beside: effects that must be on; clashes: those that must not.
+    examples: tables it may have, as a scene writes them, for tests and templates.
     letters: keys of its table → their symbols in equations, a key's own name without one.
     figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
     many: whether the table holds one table for each of several instances; instance: which of them this is.
@@ -93,6 +118,8 @@ class Effect:
     rank: int = 100
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    clashes: tuple[Clash, ...] = ()
     examples: tuple[Mapping[str, str], ...] = ({},)
     letters: Mapping[str, str] = field(default_factory=dict)
     figures: tuple[Figure, ...] = ()
@@ -114,6 +141,7 @@ class Load(Effect, Generic[Pose]):
     force(maths, pose, given, own, switch): the term, N or N·m. `given` holds the scene's numbers, `own` its table's.
     corners(maths, given, own): crank angles in rad where the formula changes; switch(angle, corners): which formula
     holds at a crank angle inside a piece, as a number the force is handed.
+    response: what an oscillator that carries the load makes of it; one with corners cannot be carried without.
     known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
     moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
@@ -126,6 +154,7 @@ class Load(Effect, Generic[Pose]):
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
     moved: Callable[[Values, Values], Number] | None = None
+    response: Response[Pose] | None = None
     symbol: str = ""
     told: Mapping[float, str] = field(default_factory=dict)
 
@@ -140,6 +169,11 @@ class Axis(NamedTuple):
 def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
     """Return nothing: no number of the effect comes in sizes."""
     return {}
+
+
+def nothing_remarked(given: Values, own: Values, shown: Shown) -> str:
+    """Return nothing: the figures stand for themselves."""
+    return ""
 
 
 def nothing_explained(
@@ -157,6 +191,7 @@ class Check(Effect, Generic[Pose]):
     rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
     on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
+    remark(given, own, shown): what to know beside its figures, "" for nothing, in the reader's units.
     explain(known, bounds, own, clash, shown): what physics says of why the limits `clash` do, in the reader's units.
     """
 
@@ -166,6 +201,7 @@ class Check(Effect, Generic[Pose]):
     least: str = ""
     axes: tuple[Axis, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
+    remark: Callable[[Values, Values, Shown], str] = nothing_remarked
     explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str], Shown], str] = (
         nothing_explained
     )
@@ -188,33 +224,113 @@ class Check(Effect, Generic[Pose]):
             raise ValueError(f"effect {self.name}: {faults[0]}")
 
 
+class Peak(NamedTuple):
+    """A figure of a state: the largest |value| over the cycle, or the least value, of what is read."""
+
+    read: "Callable[[Moved], Number]"
+    least: bool = False
+
+
+def no_oscillator(maths: Maths, given: Values, own: Values) -> "Oscillator":
+    """Raise LookupError: no load with corners is carried."""
+    raise LookupError("the state answers no load with corners")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State(Effect, Generic[Pose]):
+class State(Effect):
     """One linear coordinate between the output and the loads that move with it; eliminated before a formula reads it.
 
     carries: names of the loads that move with the coordinate: they leave the output force, and `force` stands there.
-    derived(maths, given, own, carried): values that follow from the scene's numbers; carried(phi, switch by name)
-    returns the pose and the sum of the carried terms there. force: as a load's, of derived values.
+    derived(maths, given, own, carried): values that follow from the scene's numbers, in the steady state.
+    force, coordinate: Q's term, N or N·m, and z itself, of derived values. oscillator(maths, given, own): what loads
+    with corners answer, of derived values too.
+    fixed(given, own, carried): words that choose formulas at a design, in floats; `own` has those of its neighbours, if
+    any, and what serves them is kept. Raises UnsteadyError.
+    samples(given, own): of one turn, from which extremes are refined.
+    peaks: figure → what it is of; columns: of the curves, with unit → what is read.
+    motion(written, own): both sides of its equation of motion; term(written, own): `force` in the same symbols.
+    between: the symbols that z is the difference of, what moves first. rests(own): what neither proofs nor studies of
+    accuracy cover of it, a sentence without its full stop.
     """
 
     carries: tuple[str, ...]
-    derived: Callable[[Maths, Values, Values, Callable[[Number, Values], tuple[Any, Number]]], Mapping[str, Number]]
-    force: Force[Pose]
+    derived: "Callable[[Maths, Values, Values, Carried], Mapping[str, Number]]"
+    force: "Replied"
+    coordinate: "Replied"
+    motion: "Callable[[Written, Values], tuple[Number, Number]]"
+    term: "Callable[[Written, Values], Number]"
+    between: tuple[str, str]
+    rests: Callable[[Values], str]
+    oscillator: "Callable[[Maths, Values, Values], Oscillator]" = no_oscillator
+    fixed: "Callable[[Values, Values, Carried], Mapping[str, str]]" = lambda given, own, carried: {}
+    samples: Callable[[Values, Values], float] = lambda given, own: 0.0
+    peaks: Mapping[str, Peak] = field(default_factory=dict)
+    columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
     acts: Literal["output"] = "output"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Speed(Effect):
-    """The crank's own motion: its speed changes over the turn."""
+    """The crank's own motion: its speed changes over the turn as the motor gives what the crank takes.
+
+    motor(maths, omega, given, own): the motor's torque, N·m, at a speed, rad/s; given["no_load_speed"] is the one that
+    follows from the mean speed over time. flywheel(given, own): inertia, kg·m², of all that turns with the crank.
+    rows: name → value(turning, given, own), SI, of the motion that is solved; most: the one that is the motor's largest
+    torque.
+    """
+
+    motor: Callable[[Maths, Number, Values, Values], Number]
+    flywheel: Callable[[Values, Values], Number]
+    rows: Mapping[str, Callable[["Turning", Values, Values], float]] = field(default_factory=dict)
+    most: str = ""
+
+
+class Rule(NamedTuple):
+    """One line of an effect's own equations: what it is of; left sign right, "=", "<=" or ">="; words that follow."""
+
+    name: str
+    left: Number
+    sign: str
+    right: Number
+    where: str = ""
+
+
+class Terms(NamedTuple):
+    """Symbols of an event's equations: symbol(name); the output's terms in all, what of them is friction, the mass."""
+
+    symbol: Callable[[str], Number]
+    total: Number
+    friction: Number
+    mass: Number
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Event(Effect):
-    """What parts and meets again: contact that is lost."""
+    """What parts and meets again: contact of the output that is lost. Followed on a given design, never in a program.
+
+    force: the quantity that is the force of contact; least: the one that is largest where that is least.
+    free(given, q, velocity, acceleration, direction): the pose of the output on its own, as its loads read it; one
+    that reads more cannot be followed. direction: of its motion, between −1 and 1 at rest.
+    places(given): event of the motion that loads call in → the output there, m or rad.
+    follow(body, cam, own): its course from contact at crank angle 0 on; read(course): figures, where contact is lost.
+    rules(terms): its equation of motion and what holds when it meets the mechanism again.
+    """
+
+    force: str
+    least: str
+    free: Callable[[Values, float, float, float, float], Motion]
+    places: Callable[[Values], Mapping[str, float]]
+    follow: "Callable[[Body, Cam, Values], Course]"
+    read: "Callable[[Course], Mapping[str, float | None]]"
+    rules: Callable[[Terms], Sequence[Rule]]
+
+    def rests(self, own: Values) -> str:
+        """Return what of it no proof and no study of accuracy covers."""
+        return f"{self.name}, which is simulated ({', '.join(figure.name for figure in self.figures)})"
 
 
-UNBUILT = (State, Speed, Event)
-"""Kinds that no scene can turn on yet."""
+EVALUATED = (Speed,)
+"""Kinds with which a design is evaluated and simulated, but neither sought nor proven."""
 
 
 @functools.cache

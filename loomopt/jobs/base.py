@@ -10,9 +10,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from loomopt.cycle import Floats
+from loomopt.effects.kinds import Event
 from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
-from loomopt.program import numbers
+from loomopt.program import drive, numbers
 from loomopt.program.curves import STEPS, Columns, curves, tops
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
     from loomopt.program.axes import Asked, Traded
+    from loomopt.program.parting import Parted
 
 Figures = Mapping[str, float | None]
 
@@ -102,8 +104,13 @@ class Job(abc.ABC):
         return self.numbers(scene) | {scene.full(name): value for name, value in design.items()}
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
-        """Return a design ready to be sampled."""
-        return sampled(self.model(scene, design), self.numbers_of(scene, design))
+        """Return a design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
+        found = sampled(self.model(scene, design), self.numbers_of(scene, design))
+        if drive.motor(found.model.effects) is None:
+            return found
+        from loomopt.program.crank_motion import turned
+
+        return turned(found, scene)
 
     def curves(
         self, scene: Scene, design: Numbers, steps: int = STEPS, also: Sequence[float] = ()
@@ -111,9 +118,20 @@ class Job(abc.ABC):
         """Return the curves of a design over one turn, units in the column names; peaks that are figures are rows."""
         sampler = self.sampler(scene, design)
         peaks = tops(sampler, self.peaks(sampler.model).values())
-        kinds = {name: figure.kind for name, figure in scene.schema.figures.items()}
-        checks = {name: SI_UNIT[kinds[name]] for check in sampler.model.checks for name in check.quantities}
-        return curves(sampler, self.columns(scene, sampler)._replace(checks=checks), steps, [*peaks, *also])
+        kinds = {name: figure.kind for name, figure in scene.schema.figures.items()} | drive.KINDS
+        names = [name for check in sampler.model.checks for name in check.quantities]
+        names += drive.KINDS if drive.motor(sampler.model.effects) else ()
+        checks = {name: SI_UNIT[kinds[name]] for name in names}
+        columns, parted = self.columns(scene, sampler)._replace(checks=checks), self.parted(scene, sampler)
+        return (parted.curves if parted else functools.partial(curves, sampler))(columns, steps, [*peaks, *also])
+
+    def parted(self, scene: Scene, sampler: Sampler) -> "Parted | None":
+        """Return a sampled design, followed, where an effect of the scene may part its output from the mechanism."""
+        if not any(isinstance(effect, Event) for effect in scene.active):
+            return None
+        from loomopt.program.parting import followed
+
+        return followed(scene, sampler)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""

@@ -65,7 +65,10 @@ def solve(
     elastic: Elastic | None = None,
     known: Known | None = None,
 ) -> Point:
-    """Solve a program from a start (SI) or warm from a solved neighbour of the same structure."""
+    """Solve a program from a start (SI) or warm from a solved neighbour.
+
+    warm: of the same structure; of another one with the same rows only pivots lead on from it.
+    """
     calls = Calls(program, settings, elastic, known)
     if warm:
         within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
@@ -73,6 +76,8 @@ def solve(
         followed = follow(calls, warm) if warm.reached else None
         if followed:
             return followed
+        if warm.structure not in (None, program.structure):
+            warm = None
     x = dict(warm.x if warm else start)
     sampler = calls.sampler(x)
     if sampler is None:

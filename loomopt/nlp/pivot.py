@@ -114,7 +114,7 @@ def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthes
     below = np.concatenate([np.zeros(len(firm) - len(fixed), dtype=bool), fixed])
     step: _Step | None = _Step(arguments["x0"], (active | firm) & ~below)
     for _ in range(PIVOTS):
-        meeting = _met(problem, step) if step else None
+        meeting = _met(problem, step) or _met(problem, _parted(problem, step))
         if meeting is None or np.abs(meeting.x - arguments["x0"]).max() > farthest:
             return None
         here = _priced(problem, meeting)
@@ -129,15 +129,13 @@ def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthes
     return None
 
 
-def _met(problem: _Problem, step: _Step) -> _Meeting | None:
+def _met(problem: _Problem, step: _Step | None) -> _Meeting | None:
     """Return where the active limits meet, by Newton's method with the least change; None where they do not."""
-    arguments, (x, active) = problem.arguments, step
-    unit = np.eye(len(x))
+    if step is None:
+        return None
+    x, active = step
     for _ in range(PIVOT_NEWTON_STEPS):
-        rows, jacobian = problem.nlp.jacobian(x, arguments["p"])
-        bounds = x - arguments["ubx"], arguments["lbx"] - x
-        excess = np.concatenate([np.asarray(rows).ravel() - arguments["ubg"], *bounds])
-        slopes = np.concatenate([np.asarray(jacobian), unit, -unit])
+        excess, slopes = _limits(problem, x)
         if not np.all(np.isfinite(slopes)):
             return None
         change = _least(slopes[active], -excess[active])
@@ -146,6 +144,33 @@ def _met(problem: _Problem, step: _Step) -> _Meeting | None:
             met = np.abs(excess[active]).max(initial=0.0) <= PIVOT_MET
             return _Meeting(x, active, excess, slopes) if met else None
     return None
+
+
+def _parted(problem: _Problem, step: _Step | None) -> _Step | None:
+    """Return a step without the active limit that has most room where all of them come nearest; None without any.
+
+    Where a front ends a limit stands on the opposite one, and both are active; beside it only one can be.
+    """
+    if step is None:
+        return None
+    excess, slopes = _limits(problem, step.x)
+    active = step.active
+    if not np.all(np.isfinite(slopes[active])):
+        return None
+    left = excess + slopes @ _least(slopes[active], -excess[active])
+    slackest = int(np.argmin(np.where(active & ~problem.firm, left, np.inf)))
+    if not active[slackest] or left[slackest] >= -PIVOT_MET:
+        return None
+    return _Step(step.x, active & (np.arange(len(active)) != slackest))
+
+
+def _limits(problem: _Problem, x: Floats) -> tuple[Floats, Floats]:
+    """Return the excess and the slopes of all limits."""
+    arguments, unit = problem.arguments, np.eye(len(x))
+    rows, jacobian = problem.nlp.jacobian(x, arguments["p"])
+    bounds = x - arguments["ubx"], arguments["lbx"] - x
+    excess = np.concatenate([np.asarray(rows).ravel() - arguments["ubg"], *bounds])
+    return excess, np.concatenate([np.asarray(jacobian), unit, -unit])
 
 
 def _priced(problem: _Problem, at: _Meeting) -> _Priced:

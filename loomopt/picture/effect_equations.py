@@ -1,12 +1,14 @@
 """Equations of effects by their own formulas on symbols: each load's term, the balance, what checks read and demand."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections import ChainMap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from loomopt import maths
+from loomopt import balance, maths
 from loomopt.balance import Acting, Given
-from loomopt.effects.kinds import Check, Load, Motion
+from loomopt.effects.kinds import Check, Event, Load, Motion, State, Terms
 from loomopt.picture.equations import (
     Case,
     Equation,
@@ -21,9 +23,14 @@ from loomopt.picture.equations import (
     sympy,
     text,
 )
+from loomopt.program.drive import motor
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
 
+if TYPE_CHECKING:
+    from loomopt.effects.steady import Written
+
+AnyMotion = TypeVar("AnyMotion", bound=Motion)
 SIGNS, ENDS = {-1: ">=", 0: "=", 1: "<="}, {-1: "min", 0: "given", 1: "max"}
 Piece = tuple[Expression, tuple[Expression, Expression]]
 """A formula, and the crank angles between which it holds."""
@@ -42,10 +49,57 @@ def forces(
     letter: str,
     torque: tuple[str, str] = ("crank torque", "Md"),
 ) -> list[Equation]:
-    """Write each term, their balance and the crank torque, then what checks read and demand."""
-    found = [term(load, pose, known, letter) for load in model.loads]
-    found += sums(model.loads, pose, symbol(total), letter, torque)
-    return found + [each for check in model.checks for each in check_equations(check, pose, known)]
+    """Write each term, their balance and the crank torque, the crank's motion, then what checks read and demand."""
+    at = turning(pose, model)
+    found = [each for load in model.loads for each in _written(model, load, at, known, letter)]
+    found += sums(model.loads, at, symbol(total), letter, torque)
+    found += crank_motion(model, at, known, torque[1])
+    return found + [each for check in model.checks for each in check_equations(check, at, known)]
+
+
+def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
+    """Return a pose of symbols with the change of its speed where an effect gives the crank a speed of its own."""
+    if motor(model.effects) is None:
+        return pose
+    return replace(pose, omega_dot=symbol("omega_dot"))  # type: ignore[type-var]  # poses are dataclasses
+
+
+def crank_motion(model: JobModel, pose: Motion, known: Given, torque: str) -> list[Equation]:
+    """Write the motor's line, the crank's own equation of motion, and what its mean speed demands; none without."""
+    own = motor(model.effects)
+    if own is None:
+        return []
+    system, sp, table = maths.sympy(), sympy(), known.own[own.name]
+    own_names = {name: symbol(name) for name in ("speed", "no_load_speed")}
+    values = ChainMap(own_names, known.values)  # type: ignore[arg-type]  # it is only read
+    given_torque, omega, phi = symbol("M_motor"), symbol("omega"), pose.phi
+    taken = [symbol(torque)] if model.loads else []
+    once_round = sp.Integral(1 / sp.Function("omega")(phi), (phi, 0, 2 * sp.pi))
+    return [
+        equation(own.name, given_torque, own.motor(system, omega, values, table)),
+        equation(own.name, given_torque, sum(taken) + own.flywheel(values, table) * pose.omega_dot),
+        equation(own.name, pose.omega_dot, omega * symbol("omega'")),
+        equation("mean speed", once_round, 2 * sp.pi / values["speed"]),
+    ]
+
+
+def _written(model: JobModel, load: Acting, pose: Motion, known: Given, letter: str) -> Iterator[Equation]:
+    """Yield a load's term, after the equation of motion of a state."""
+    if isinstance(load, State):
+        own = [each for each in model.loads if isinstance(each, Load) and each.name in load.carries]
+        inertia = balance.total([each.moved(known.values, known.own[each.name]) for each in own if each.moved])
+        carried = balance.total([symbol(f"{letter}_{each.name}") for each in own])
+        left, right = load.motion(_in_symbols(pose, inertia, carried), known.own[load.name])
+        yield equation(load.name, left, right)
+        moved, still = map(symbol, load.between)
+        yield relation(load.name, symbol("z"), "=", moved - still, "after every turn the same")
+    yield term(load, pose, known, letter)
+
+
+def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Written":
+    from loomopt.effects.steady import Written
+
+    return Written((symbol("z"), symbol("z'"), symbol("z''")), pose.omega, inertia, carried)
 
 
 def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
@@ -68,6 +122,8 @@ def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
 
 def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:
     """Return a load's formula at a switch."""
+    if isinstance(load, State):
+        return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
     number = sympy().Rational(switch)
     return load.force(maths.sympy(), pose, known.values, known.own[load.name], number)
 
@@ -107,6 +163,22 @@ def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:
         kind = f"{check.name}: {name}" if whole else check.name
         written.append(relation(kind, value if whole else symbol(name), SIGNS[each.sign], limit))
     return written
+
+
+def event_equations(model: JobModel, poses: tuple[Motion, Motion], known: Given, letter: str) -> list[Equation]:
+    """Write how the output parts from its mechanism, moves on its own and meets it again, as an event says it.
+
+    poses: of symbols, on the output's way forward and back; none without an event.
+    """
+    sp, omega = sympy(), symbol("omega")
+    output = [load for load in model.loads if load.acts == "output"]
+    forward, back = ([sp.expand(force(load, pose, known, 0)) for load in output] for pose in poses)
+    total = sum(symbol(f"{letter}_{load.name}") for load in output)
+    mass = sum(form.coeff(poses[0].q2) for form in forward) / omega**2
+    friction = sum((one - other) / 2 for one, other in zip(forward, back, strict=True))
+    terms = Terms(symbol, total, sp.simplify(friction), sp.simplify(mass))
+    rules = [rule for event in model.effects if isinstance(event, Event) for rule in event.rules(terms)]
+    return [relation(each.name, sp.sympify(each.left), each.sign, sp.sympify(each.right), each.where) for each in rules]
 
 
 def terms(loads: Sequence[Acting], pose: Motion, known: Given) -> Mapping[str, Expression]:

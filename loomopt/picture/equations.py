@@ -9,7 +9,7 @@ from typing import Any
 
 from loomopt import balance, maths
 from loomopt.balance import Acting
-from loomopt.effects.kinds import Effect, Motion
+from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.schema import Values
 
 Expression = Any
@@ -92,12 +92,12 @@ def sums(
     torque: what the crank's torque is called, and its symbol.
     """
     system, found = maths.sympy(), []
-    shown = [dataclasses.replace(load, force=_constant(symbol(f"{letter}_{load.name}"))) for load in loads]
-    output = [load for load in shown if load.acts == "output"]
+    shown = [_shown(load, symbol(f"{letter}_{load.name}")) for load in loads]
+    output, gone = [load for load in shown if load.acts == "output"], balance.carried(loads)
     given = balance.Given({}, {load.name: {} for load in loads})
     if output:
         found.append(equation("balance", total, balance.output_force(system, shown, pose, given, {})))
-    summed = [dataclasses.replace(load, force=_constant(total)) for load in output[:1]]
+    summed = [_shown(load, total) for load in [each for each in output if each.name not in gone][:1]]
     summed += [load for load in shown if load.acts == "drive"]
     if summed:
         name, sign = torque
@@ -105,9 +105,11 @@ def sums(
     return found
 
 
-def _constant(value: Expression) -> Callable[..., Expression]:
-    """Return a force that is one symbol."""
-    return lambda *_: value
+def _shown(load: Acting, value: Expression) -> Acting:
+    """Return a load whose force is one symbol, and which no state needs to answer."""
+    if isinstance(load, Load):
+        return dataclasses.replace(load, force=lambda *_: value, response=None)
+    return dataclasses.replace(load, force=lambda *_: value)
 
 
 def own_values(effect: Effect, words: Mapping[str, str]) -> Values:
@@ -168,8 +170,10 @@ def latex(expression: Expression) -> str:
 
 
 def _latex_name(name: str) -> str:
-    """Return a symbol's name in LaTeX: its letter with primes, what follows as index; words stay words."""
+    """Return a symbol's name in LaTeX: its letter with primes or dot, what follows as index; words stay words."""
     head, _, rest = name.partition("_")
+    if rest == "dot":
+        return rf"\dot{{{_latex_name(head)}}}"
     letters = head.rstrip("'")
     primes = head[len(letters) :]
     word = letters.rstrip("0123456789")

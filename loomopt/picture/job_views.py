@@ -48,8 +48,17 @@ class JobViews:
         return {}
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
-        """Return what to know beside the numbers, each a sentence without its full stop."""
-        return ()
+        """Return what to know beside the numbers, each a sentence without its full stop: what checks remark."""
+        from loomopt.effects.kinds import Check
+        from loomopt.owned import owned
+        from loomopt.program.numbers import numbers
+
+        known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
+        told = []
+        for check in (effect for effect in scene.active if isinstance(effect, Check)):
+            own = {key: known.get(owned(check, key)) for key in check.own.model_fields}
+            told.append(check.remark(known, own, scene.show))
+        return tuple(text for text in told if text)
 
     def missing(self, scene: "Scene") -> tuple[str, ...]:
         """Return the keys without which the scene cannot be drawn."""

@@ -3,10 +3,11 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.effects.kinds import Check, Load, State
+from loomopt.effects.kinds import Check, Load, Speed, State
 from loomopt.frozen import Frozen
 from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name
 from loomopt.program.curves import split as split
+from loomopt.program.drive import MOTOR, SPEED
 from loomopt.program.drive import POWER as PEAK_POWER
 from loomopt.scene_tables import Limit
 from loomopt.scenes import Scene
@@ -120,6 +121,8 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
             found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
         elif isinstance(effect, Check):
             found |= {name: Curve(peak=name) for name in effect.quantities}
+        elif isinstance(effect, Speed):
+            found |= {SPEED: Curve("crank speed"), MOTOR: Curve(most=effect.most)}
     return found
 
 

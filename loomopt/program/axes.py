@@ -28,6 +28,11 @@ class Traded:
         """Whether the figure grows with the value."""
         return 1 if self.sense == "least" else -1
 
+    @property
+    def called(self) -> str:
+        """Its name; of a magnitude it says so."""
+        return f"|{self.axis.name}|" if self.objective.form == "magnitude" else self.axis.name
+
     def figure(self, value: float) -> float:
         """Return the figure, SI, of a value."""
         root = max(value, 0.0) ** (1 / self.axis.power) if self.axis.power != 1 else value

@@ -11,6 +11,7 @@ from loomopt import maths
 from loomopt.balance import Acting
 from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.frozen import Frozen
+from loomopt.program.drive import motor_power
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
 from loomopt.tolerances import SAME_ANGLE, SAME_ROW
@@ -22,6 +23,10 @@ POWER = "motor_power [W]"
 ALIKE = 1e-12
 """Share of a quantity's largest magnitude by which two of its largest values are one: they mirror each other."""
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
+
+
+Rows = tuple[Pieces, Floats, Floats]
+"""Nodes (pieces, u), and their crank angles, rad."""
 
 
 class Columns(NamedTuple):
@@ -50,7 +55,12 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
     Rows are `steps` equal ones, the angles `also`, rad, and both sides of every corner where a formula changes (the
     same angle twice). Where a load's term is not known, neither it nor the force is: NaN.
     """
-    pieces, u, phi = _rows(sampler, columns, steps, also)
+    return columns_at(sampler, columns, rows(sampler, columns, steps, also))
+
+
+def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floats]:
+    """Return the curves at rows, SI."""
+    pieces, u, phi = rows
     node = sampler.node(pieces, u)
     at = sampler.model.instant(maths.numpy(), sampler.given, node)
     unknown = np.zeros(u.shape, dtype=bool)
@@ -58,6 +68,10 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
         unknown = ~np.any([sampler.cycle.on(where)[pieces] for where in sampler.model.known_in], axis=0)
     found = {ANGLE: phi} | {name: _column(formula, at, u) for name, formula in columns.motion.items()}
     found |= _in_time(found, at)
+    if sampler.model.states:
+        from loomopt.program import states
+
+        found |= {name: _column(formula, at, u) for name, formula in states.columns(sampler.model.states).items()}
     loads = sampler.model.loads
     for load, term in zip(loads, at.terms().values(), strict=True):
         whole = np.broadcast_to(np.asarray(term, dtype=float), u.shape).astype(float)
@@ -68,7 +82,7 @@ def curves(sampler: Sampler, columns: Columns, steps: int = STEPS, also: Sequenc
         found[columns.force[0]] = np.where(unknown, np.nan, _column(columns.force[1], at, u))
     if columns.torque and loads:
         torque = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
-        found |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: torque * at.pose.omega})
+        found |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: motor_power(at, torque)})
     for name, unit in columns.checks.items():
         found[f"{name} [{unit}]"] = _column(sampler.model.formula(name), at, u)
     return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
@@ -117,7 +131,7 @@ def _column(formula: Formula, at: Instant, u: Floats) -> Floats:
         return np.broadcast_to(np.asarray(formula(at), dtype=float), u.shape).astype(float)
 
 
-def _rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float]) -> tuple[Pieces, Floats, Floats]:
+def rows(sampler: Sampler, columns: Columns, steps: int, also: Sequence[float]) -> Rows:
     """Return nodes (pieces, u) and their crank angles, rad, in order; a corner at 0 ends the turn at 2π too."""
     cycle = sampler.cycle
     even = np.linspace(0.0, TURN, steps, endpoint=False)

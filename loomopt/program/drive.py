@@ -2,8 +2,9 @@
 
 from collections.abc import Collection, Iterable
 
-from loomopt.effects.kinds import Effect, Load, State
-from loomopt.program.instant import Quantity
+from loomopt.effects.kinds import Effect, Load, Speed, State
+from loomopt.maths import Number
+from loomopt.program.instant import Instant, Quantity
 from loomopt.schema import Figure
 
 TORQUE, POWER = "peak_torque", "peak_power"
@@ -12,10 +13,15 @@ FIGURES = (
     Figure(
         POWER,
         "power",
-        "peak |motor power| over the cycle, driving or braking: crank torque times speed",
+        "peak |motor power| over the cycle, driving or braking: crank torque, and what a flywheel takes, times speed",
         sides=("max",),
     ),
 )
+
+
+SPEED, MOTOR = "omega", "motor_torque"
+KINDS = {SPEED: "angular speed", MOTOR: "torque"}
+"""What is told over the cycle of a crank whose speed changes: its speed, and the motor's own torque."""
 
 
 def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, Quantity]:
@@ -26,4 +32,30 @@ def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, Q
     if not any(isinstance(effect, Load | State) for effect in effects):
         return {}
     found = {TORQUE: Quantity(lambda at: at.crank_torque)}
-    return found | ({POWER: Quantity(lambda at: at.power)} if "speed" in known else {})
+    return found | ({POWER: Quantity(lambda at: motor_power(at, at.crank_torque))} if "speed" in known else {})
+
+
+def motion() -> dict[str, Quantity]:
+    """Return the speed of a crank, rad/s, and the motor's torque, N·m, which differ from its mean and the crank's."""
+    return {
+        SPEED: Quantity(lambda at: at.pose.omega, figure=False),
+        MOTOR: Quantity(lambda at: motor_torque(at, at.crank_torque), figure=False),
+    }
+
+
+def motor(effects: Iterable[Effect]) -> Speed | None:
+    """Return the effect by which the crank has a speed of its own; None at constant speed."""
+    return next((effect for effect in effects if isinstance(effect, Speed)), None)
+
+
+def motor_torque(at: Instant, crank_torque: Number) -> Number:
+    """Return what the motor gives, N·m, of which the crank takes so much; the rest turns the flywheel."""
+    omega_dot, own = at.pose.omega_dot, motor(at.model.effects)
+    if omega_dot is None or own is None:
+        return crank_torque
+    return crank_torque + own.flywheel(at.values, at.given.own[own.name]) * omega_dot
+
+
+def motor_power(at: Instant, crank_torque: Number) -> Number:
+    """Return the motor's power, W: its torque times the crank's speed; negative where the mechanism drives."""
+    return motor_torque(at, crank_torque) * at.pose.omega

@@ -1,6 +1,7 @@
 """The mechanism with its effects at one instant, and the formulas that are read there: quantities, rows, integrals."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt import balance
@@ -50,11 +51,6 @@ class Instant:
         """The torque on the crank, N·m."""
         return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
 
-    @property
-    def power(self) -> Number:
-        """The motor's power, W: the torque on the crank times its speed; negative where the mechanism drives."""
-        return self.crank_torque * self.pose.omega
-
     def terms(self) -> dict[str, Number]:
         """Return each load's term by its name, N or N·m."""
         found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
@@ -64,6 +60,12 @@ class Instant:
         """Return the same node with other switches."""
         node = Node(self.node.phi, {**self.node.switch, **switch})
         return Instant(self.model, self.maths, self.given, node, self.event)
+
+    def at_speed(self, speed: Number) -> "Instant":
+        """Return the same node with the crank at another speed, rad/s; its pose must be a dataclass with `omega`."""
+        found = Instant(self.model, self.maths, self.given, self.node, self.event)
+        found._pose = replace(self.pose, omega=speed)
+        return found
 
 
 Formula = Callable[[Instant], Number]
@@ -96,7 +98,7 @@ class Integral(NamedTuple):
     """A mean of `quantity` over the crank angle; root: its square root.
 
     Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch
-    "datum".
+    "datum". parts: of each piece, where one rule does not resolve what rings on it.
     """
 
     name: str
@@ -105,3 +107,4 @@ class Integral(NamedTuple):
     where: Where | None = None
     angles: tuple[float, ...] = ()
     data: tuple[float, ...] = ()
+    parts: int = 1

@@ -1,21 +1,24 @@
 """One model for every job: kinematics + effects + arcs + named quantities and rows, in every number system.
 
-Only this file groups effects, reads their switches, by name, and runs loads, states and checks.
+Only this file groups effects by name and runs loads and checks; corners.py reads their switches, and states.py
+eliminates states, where there are any.
 """
 
 import functools
+import math
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
-from loomopt import balance, cycle
+from loomopt import cycle
 from loomopt.balance import Acting, Given
 from loomopt.cycle import Cycle, Node, Where
-from loomopt.effects.kinds import Check, Demand, Effect, Load, State
+from loomopt.effects.kinds import Check, Demand, Effect, Load, Speed, State
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.owned import label, owned
 from loomopt.program import formulas
+from loomopt.program.corners import cornered
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics, Squares
 from loomopt.schema import Values
@@ -51,7 +54,7 @@ class JobModel:
     @lazy
     def key(self) -> Hashable:
         """What distinguishes this model's formulas from another's."""
-        means = tuple((mean.name, len(mean.angles)) for mean in self.integrals)
+        means = tuple((mean.name, len(mean.angles), mean.parts) for mean in self.integrals)
         arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
         own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
         return own, self.effects, self.words, self.known, self.cases
@@ -60,6 +63,11 @@ class JobModel:
     def loads(self) -> tuple[Acting, ...]:
         """What acts in the balance, in order."""
         return tuple(effect for effect in self.effects if isinstance(effect, Load | State))
+
+    @lazy
+    def states(self) -> tuple[State, ...]:
+        """What of them has a coordinate of its own."""
+        return tuple(load for load in self.loads if isinstance(load, State))
 
     @lazy
     def checks(self) -> tuple[Check[Any], ...]:
@@ -106,7 +114,11 @@ class JobModel:
         for check in self.checks:
             for name in check.quantities:
                 found[name] = Quantity(functools.partial(formulas.of_check, check, name))
-        return found
+        if not self.states:
+            return found
+        from loomopt.program import states
+
+        return found | states.quantities(self.states)
 
     @lazy
     def _rows(self) -> dict[str, Row]:
@@ -146,6 +158,11 @@ class JobModel:
         return tuple(name for name, quantity in self._quantities.items() if quantity.figure)
 
     @lazy
+    def least(self) -> tuple[str, ...]:
+        """Figures that are the least of a value over the cycle: their quantities are its opposite."""
+        return tuple(name for each in self.states for name, peak in each.peaks.items() if peak.least)
+
+    @lazy
     def signed(self) -> frozenset[str]:
         """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
         return self._of_kind("signed")
@@ -166,7 +183,8 @@ class JobModel:
     def has_row(self, name: str) -> bool:
         """Say whether a name is that of a row this model has the numbers for."""
         means = {each for mean in self.integrals for each in (mean.name, mean.root)}
-        return self._cased.get(name, (name, 0))[0] in {*self._rows, *means}
+        turned = {row for effect in self.effects if isinstance(effect, Speed) for row in effect.rows}
+        return self._cased.get(name, (name, 0))[0] in {*self._rows, *means, *turned}
 
     @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
@@ -184,32 +202,34 @@ class JobModel:
 
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers and what follows from them at once, SI."""
-        first = self._given(maths, values)
+        known = frozenset(values)
+        first = self._given(maths, values, known)
         others = tuple(
-            self._given(maths, {**values, **{name: values[cased(name, k + 1)] for name in names}})
+            self._given(maths, {**values, **{name: values[cased(name, k + 1)] for name in names}}, known)
             for k, names in enumerate(self.cases)
         )
-        return Given(first.values, first.own, others, frozenset(values))
+        return first._replace(cases=others)
 
-    def _given(self, maths: Maths, values: Values) -> Given:
+    def _given(self, maths: Maths, values: Values, known: frozenset[str]) -> Given:
+        found = self.plain(maths, values, known)
+        if not self.states:
+            return found
+        from loomopt.program import states
+
+        return states.eliminated(maths, self.kinematics, self.loads, found)
+
+    def samples(self, given: Given) -> int:
+        """Return how many samples of one turn the states of a design need; 0 without any."""
+        return max((math.ceil(each.samples(given.values, given.own[each.name])) for each in self.states), default=0)
+
+    def plain(self, maths: Maths, values: Values, known: frozenset[str]) -> Given:
+        """Return the numbers of one case with what follows from the mechanism alone; known: names of the scene's."""
         own: dict[str, dict[str, Any]] = {}
         for effect, full in self._full.items():
             own[effect] = {key: values[name] for key, name in full.items() if name in values}
             own[effect] |= self.words_of(effect)
-        found = Given({**values, **self.kinematics.derived(maths, values, self.called)}, own)
-        for state in (load for load in self.loads if isinstance(load, State)):
-            derived = state.derived(
-                maths, found.values, own[state.name], functools.partial(self._carried, maths, found)
-            )
-            found = Given({**found.values, **derived}, own)
-        return found
-
-    def _carried(self, maths: Maths, given: Given, phi: Number, switch: Values) -> tuple[Any, Number]:
-        """Return the pose at a crank angle, and the sum of the terms that a state carries."""
-        gone = balance.carried(self.loads)
-        pose = self.kinematics.pose(maths, given, Node(phi, switch))
-        loads = [load for load in self.loads if load.name in gone]
-        return pose, balance.total([term for _, term in balance.terms(maths, loads, pose, given, switch)])
+        values = {**values, **self.kinematics.derived(maths, values, self.called)}
+        return Given(values, own, known=known)
 
     @lazy
     def _single(self) -> tuple[str, ...]:
@@ -229,29 +249,13 @@ class JobModel:
         arcs = {arc.name for arc in self.arcs}
         return frozenset(name for name in self.switches if self._cased.get(name, (name, 0))[0] not in arcs)
 
-    def _cornered(self, maths: Maths, given: Given) -> list["_Cornered"]:
-        """Return of each switch its corner angles, rad, what reads it, and which of them are corners of the cycle."""
-        found: list[_Cornered] = []
-        for case in (given, *given.cases):
-            for arc in (*self.kinematics.arcs, *self.arcs):
-                angles = arc.corners(maths, case)
-                found.append(_Cornered(angles, arc.switch, angles))
-            for load in self.loads:
-                if isinstance(load, Load) and load.corners:
-                    angles = load.corners(maths, case.values, case.own[load.name])
-                    # An event on a corner of the motion's own arcs would be that corner twice.
-                    events = self.kinematics.breaks.intersection(load.reads)
-                    there = {id(angle) for event in events for angle in case.values[event]}
-                    found.append(_Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
-        return found
-
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         """Return the corner angles of the cycle, rad, as declared one after the other."""
-        return tuple(angle for each in self._cornered(maths, given) for angle in each.placed)
+        return tuple(angle for each in cornered(self, maths, given) for angle in each.placed)
 
     def split(self, maths: Maths, given: Given) -> Cycle:
         """Return the pieces of the cycle; maths: of floats."""
-        found = self._cornered(maths, given)
+        found = cornered(self, maths, given)
         corners = [angle for each in found for angle in each.placed]
         return cycle.split(corners, self.switches, lambda angle: [each.switch(angle, each.angles) for each in found])
 
@@ -332,14 +336,6 @@ class JobModel:
         """Return the crank angle of an event, rad."""
         plain, k = self._cased.get(name, (name, -1))
         return self.kinematics.events(maths, given if k < 0 else given.cases[k])[plain]
-
-
-class _Cornered(NamedTuple):
-    """A switch: the angles, rad, of its corners, what reads it between them, and those that part the cycle."""
-
-    angles: tuple[Number, ...]
-    switch: Callable[[float, tuple[float, ...]], float]
-    placed: tuple[Number, ...]
 
 
 def cased(name: str, case: int) -> str:

@@ -1,13 +1,15 @@
 """A scene's numbers by one name each, whatever table they stand in; what its effects say of them."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 from loomopt.cycle import Where
 from loomopt.effects.kinds import Check, Load
 from loomopt.errors import BadInput
 from loomopt.owned import label, owned
+from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
@@ -16,6 +18,8 @@ from loomopt.tolerances import START_ROOM
 
 Bounds = Mapping[str, tuple[float, float]]
 """Lower and upper bound of numbers by full name, SI."""
+Asked = Mapping[str, Sequence[tuple[str, float]]]
+"""Variable → which limits ask how much of it at least, SI."""
 LEAST_CHANGE = "least change from today"
 
 
@@ -75,12 +79,70 @@ def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
     return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
 
 
+def floored(variables: Iterable[Variable], asked: Asked) -> tuple[list[Variable], list[Limit]]:
+    """Return variables that are no less than limits on their figures ask for, and these limits.
+
+    A variable without room, or one that is not there yet, stands at the most that is asked. Raises BadInput.
+    """
+    own, limits = {v.name: v for v in variables}, list[Limit]()
+    for name, each in asked.items():
+        least = max(value for _, value in each)
+        held = own.get(name) or Variable(name, least, least, least, (least, least))
+        room = held.lower < held.upper
+        if room and least > held.upper:
+            remedy = f"Correct the limit, or the bounds of {held.called}."
+            raise BadInput(f"{held.called} cannot be as large", key=f"limits.{each[0][0]}.min", remedy=remedy)
+        upper, around = (held.upper, held.range) if room else (least, (least, least))
+        own[name] = replace(held, lower=max(least, held.lower) if room else least, upper=upper, range=around)
+        limits += _asking(held, [(by, value) for by, value in each if not room or value > held.lower])
+    return list(own.values()), limits
+
+
+def _asking(variable: Variable, asked: Sequence[tuple[str, float]]) -> Iterator[Limit]:
+    """Yield what limits ask of a variable, the most first; a row that stood twice would have no price."""
+    known = set[str | float]()
+    for name, value in sorted(asked, key=lambda each: -each[1]):
+        if not known & {name, value}:
+            yield Limit(name, -1, variable.name, value, variable.scale, "variable")
+        known |= {name, value}
+
+
+def implied(limit: Limit, variables: Iterable[Variable]) -> bool:
+    """Say whether the bounds of the variable that a limit is named after say as much."""
+    own = next((v for v in variables if v.name == limit.name), None)
+    if own is None:
+        return False
+    return (limit.sign > 0 or own.lower >= limit.value) and (limit.sign < 0 or own.upper <= limit.value)
+
+
 def size(program: Program, today: Sampler, name: str) -> float:
     """Return the natural size, SI, of a variable, or of a figure by today's machine."""
     own = next((v.scale for v in program.variables if name in (v.name, v.called)), 0.0)
     if own:
         return own
-    return (today.peak(name) if today.model.has_quantity(name) else abs(today.single(name))) or 1.0
+    return figure_size(today, name)
+
+
+def figure_size(today: Sampler, name: str) -> float:
+    """Return the natural size, SI, of a figure by today's machine; 1 for one that only its own speed tells."""
+    motor = drive.motor(today.model.effects)
+    if motor and name in motor.rows:
+        return 1.0
+    return abs(today.peak(name) if today.model.has_quantity(name) else today.single(name)) or 1.0
+
+
+def settled(scene: Scene, model: JobModel, known: Mapping[str, float], design: Mapping[str, float] | None) -> JobModel:
+    """Return the model as its states need it; known: the scene's numbers, design: what differs, SI. Raises BadInput."""
+    if not model.states:
+        return model
+    from loomopt.effects.steady import UnsteadyError
+    from loomopt.program import settled
+
+    try:
+        return settled.settled(model, {**known, **{scene.full(name): value for name, value in (design or {}).items()}})
+    except UnsteadyError as error:
+        names = ", ".join(f"effects.{state.name}" for state in model.states)
+        raise BadInput(error.problem, file=scene.origin, key=names, remedy=f"{error.remedy}.") from None
 
 
 def figure_limits(scene: Scene, sampler: Sampler) -> list[Limit]:
@@ -88,7 +150,7 @@ def figure_limits(scene: Scene, sampler: Sampler) -> list[Limit]:
     found = []
     for name, limit in scene.limits.items():
         cycle = sampler.model.has_quantity(name)
-        size = (sampler.peak(name) if cycle else abs(sampler.single(name))) or 1.0
+        size = figure_size(sampler, name)
         sides = ends(limit.min, limit.max)
         found += [Limit(name, sign, name, value, size, "cycle" if cycle else "static") for sign, value in sides]
     return found

@@ -225,6 +225,11 @@ class Program:
         return {k: sides[key] for k, key in keys.items()}
 
     @lazy
+    def told(self) -> frozenset[str]:
+        """Names of limits that a designer reads: a hidden row of such a name is part of it."""
+        return frozenset(limit.name for limit in self.limits if not limit.hidden)
+
+    @lazy
     def held(self) -> frozenset[str]:
         """Variables that are held without being limited: their value is today's, not a choice."""
         limited = {limit.row for limit in self.limits if limit.family == "variable"}

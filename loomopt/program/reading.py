@@ -30,6 +30,9 @@ def quadrature(cycle: Cycle, integral: Integral) -> tuple[Pieces, Floats, Floats
     """Return nodes (pieces, u) and weights in u of a mean over pieces of the cycle."""
     active = np.flatnonzero(cycle.on(integral.where))
     nodes, weights = gauss()
+    if integral.parts > 1:
+        nodes = np.add.outer(np.arange(integral.parts), nodes).ravel() / integral.parts
+        weights = np.tile(weights, integral.parts) / integral.parts
     return np.repeat(active, len(nodes)), np.tile(nodes, len(active)), np.tile(weights, len(active))
 
 

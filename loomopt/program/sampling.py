@@ -80,11 +80,12 @@ class Sampler:
     """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined."""
 
     def __init__(self, model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> None:
-        self.model, self.values, self.samples = model, dict(values), samples
+        self.model, self.values = model, dict(values)
         given = model.given(maths.FLOAT, values)
         self.hints = model.hints(given)
         self.given: Given = model.given(maths.FLOAT, {**values, **self.hints}) if self.hints else given
         self.cycle: Cycle = model.split(maths.FLOAT, self.given)
+        self.samples = max(samples, model.samples(self.given))
         self._extremes: dict[str, list[Extreme]] = {}
 
     @lazy

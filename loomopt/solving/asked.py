@@ -4,13 +4,17 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from loomopt.effects.kinds import EVALUATED
 from loomopt.errors import BadInput
+from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY as ACCURACY
 from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 
 GAP, SECONDS = 1e-3, 60.0
 """What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""
+OMITTED = 0.01
+"""Share of an objective's natural size that leaving out an effect may change, usual."""
 LEAST_GAP, MOST_GAP = 1e-6, 0.5
 """Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
 
@@ -26,8 +30,10 @@ class Everywhere(NamedTuple):
     say: Callable[[str], None] = lambda text: None
 
 
-def check_everywhere(asked: Everywhere) -> None:
-    """Raise BadInput for a gap or a time outside what can be kept."""
+def check_everywhere(asked: Everywhere | None) -> None:
+    """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
+    if asked is None:
+        return
     if not LEAST_GAP <= asked.gap <= MOST_GAP:
         raise BadInput(
             "the gap is out of range",
@@ -59,6 +65,15 @@ def target_name(scene: Scene, target: str | None) -> str:
             remedy="Choose one of them.",
         )
     return name
+
+
+def check_sought(scene: Scene, what: str = "solve") -> None:
+    """Raise BadInput where an effect takes part only where a given design is evaluated; what: the command."""
+    for effect in scene.active:
+        if isinstance(effect, EVALUATED):
+            problem = f"{what} does not cover effect {effect.name}: with it, a design is evaluated and simulated only"
+            remedy = f"Take it off (--without {effect.name}): {what} without it, evaluate with it"
+            raise refusal(problem, scene.origin, f"effects.{effect.name}", remedy=remedy)
 
 
 def check_numbers(accuracy: float, starts: int | None) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Program
-from loomopt.program.sampling import sampled
+from loomopt.program.sampling import Sampler, sampled
 from loomopt.solving import kkt, second_order
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.derivatives import Derivatives
@@ -76,7 +76,7 @@ def certified(derivatives: type[Derivatives], program: Program, x: Mapping[str, 
         local = Local(program, x, sampler, active, found, found.gradients())
         rows = cycle_rows(program)
         cycle = Cycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
-        return _certificate(local, cycle, judged_levels(local), accuracy)
+        return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         reason = f"a value or a slope is no number here ({type(error).__name__})"
         by, clear = derivatives.by, issubclass(derivatives, Exact)
@@ -139,10 +139,22 @@ def _residuals(local: Local, place: int, system: System, multipliers: Multiplier
     return Level(figure, residual, float(slack), held, price, name)
 
 
-def _certificate(local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accuracy: float) -> Certificate:
-    """Return what was verified, and every reason why it is not enough."""
+def _unserved(sampler: Sampler) -> str:
+    """Return why the states of a design need another model than the one it was solved with, "" where they do not."""
+    if not sampler.model.states:
+        return ""
+    from loomopt.program.settled import unserved
+
+    return unserved(sampler.model, sampler.values)
+
+
+def _certificate(
+    local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accuracy: float, model: str = ""
+) -> Certificate:
+    """Return what was verified, and every reason why it is not enough; model: why it is none for here, if so."""
     feasibility = float(max(0.0, *local.active.excess))
     reasons = [*_amiss(local, feasibility), *_open(cycle, accuracy), *_not_least(levels)]
+    reasons += [model] if model else []
     curvatures = [each.curvature for each in levels if each.curvature]
     step = next((curvature.step for curvature in curvatures if len(curvature.step)), np.zeros(0))
     names = local.derivatives.names
@@ -223,5 +235,5 @@ def _binding(local: Local, levels: Sequence[JudgedLevel]) -> Iterator[Binding]:
     for k, row in enumerate(local.active.rows[: local.active.limits]):
         multipliers = [float(each.multipliers.of[k]) for each in levels]
         first = next((level for level, multiplier in enumerate(multipliers) if abs(multiplier) > POSITIVE), None)
-        if first is not None and row.limit and not row.limit.hidden:
+        if first is not None and row.limit and row.limit.name in local.program.told:
             yield priced(local.sampler, row.limit, local.program.objectives[first], multipliers[first])

@@ -22,7 +22,7 @@ from loomopt.solving.search import Candidate, Judged, Search, corrected, exact, 
 from loomopt.solving.settle import unchanging, wished
 from loomopt.solving.sizes import CHANGE_WEIGHTS
 from loomopt.solving.verdict import Certificate
-from loomopt.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK
+from loomopt.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
@@ -54,18 +54,20 @@ def with_least_change(search: Search) -> Search:
     return replace(search, best=moved or best, settled=search.settled + time.perf_counter() - began)
 
 
-def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    """Say whether two designs (variables, SI) differ by more than rounding."""
-    return any(abs(one[v.name] - other[v.name]) > MOVED * v.scale for v in program.variables)
+def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float], most: float = MOVED) -> bool:
+    """Say whether two designs (variables, SI) differ by more than `most`, in natural sizes."""
+    return any(abs(one[v.name] - other[v.name]) > most * v.scale for v in program.variables)
 
 
 def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) -> Judged | None:
     """Return the design of least change with its certificate; None where it has none, or a level is not as good.
 
     kept: variables that stay; ways: directions that are open. The weight of the earlier levels against the change is
-    raised, each solve starting warm from the one before, until all of them are held.
+    raised, each solve starting warm from the one before, until all of them are held. The first starts from the design
+    itself: its rows are the same ones, and often it has changed least already.
     """
-    program, warm = search.program, None
+    program = search.program
+    warm = replace(best.candidate.point, x=dict(best.x))
     task = changing(program, best.x, kept, search.today)
     if task is None:
         return None
@@ -73,11 +75,12 @@ def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) ->
     for weight in CHANGE_WEIGHTS:
         weighed = replace(CHANGED, scale=weight / settings.penalty)
         solved = replace(task, objectives=(*program.objectives, weighed))
-        start = warm.x if warm else best.x
-        (candidate,) = tried(Search(search.job, solved, settings), start, warm).candidates
+        (candidate,) = tried(Search(search.job, solved, settings), warm.x, warm).candidates
         if not candidate.point.reached:
             continue
         warm = candidate.point
+        if not _differ(program, warm.x, best.x, ROUNDING):
+            candidate = replace(candidate, point=replace(warm, x=dict(best.x)))
         found = _held(search, best, task, candidate) if _as_good(program, warm.x, best.x) else None
         if found:
             return _named(found, best, task, ways)
@@ -100,7 +103,9 @@ def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> 
             break
     if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
         return None
-    alone = certify(search.program, exact(search, found.x), search.settings.accuracy)
+    here = exact(search, found.x)
+    stayed = here == exact(search, best.x)
+    alone = best.certificate if stayed else certify(search.program, here, search.settings.accuracy)
     return (found, alone) if alone.passed else None
 
 

@@ -78,7 +78,8 @@ def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     rest = len(prices) - len(rows) if cycles else 0
     of = [*rows, *(cycles[k] for k in owners(program, families(program, elastic=True), rest))] if len(prices) else []
     priced = zip(of, prices, strict=True)
-    return tuple(dict.fromkeys(words.limit(each) for each, price in priced if price > PRICED and not each.hidden))
+    told = (each for each, price in priced if price > PRICED and each.name in program.told)
+    return tuple(dict.fromkeys(map(words.limit, told)))
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

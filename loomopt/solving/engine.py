@@ -13,7 +13,7 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
 from loomopt.solving import report
-from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, target_name
+from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, check_sought, target_name
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
@@ -21,6 +21,9 @@ from loomopt.solving.words import Words
 if TYPE_CHECKING:
     from loomopt.solving.search import Judged, Search
 
+RESOLVED = 5
+"""Times a search begins again with what its best needs of a steady state: each doubles it, from the fewest to the most.
+"""
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 """What is said of the solver where no start assembles."""
 
@@ -80,9 +83,9 @@ def solve(
     began = time.perf_counter()
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
+    check_sought(scene)
     check_numbers(accuracy, starts)
-    if everywhere:
-        check_everywhere(everywhere)
+    check_everywhere(everywhere)
     settings = Settings(accuracy, callback=_callback(on_iteration), on_step=on_step).at(f"building the {target}")
     imported = _import_solver()
     begun = time.perf_counter()
@@ -135,7 +138,27 @@ def solve_program(
     from loomopt.solving.strategy import searched
 
     same = [point for point in _points(near) if point.structure == program.structure]
-    return searched(Search(job, program, settings, today or {}), starts, seed, same, on_start)
+    search = searched(Search(job, program, settings, today or {}), starts, seed, same, on_start)
+    for _ in range(RESOLVED if search.best else 0):
+        finer = _finer(search)
+        if finer is search.program:
+            break
+        search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
+    return search
+
+
+def _finer(search: "Search") -> Program:
+    """Return the program with what the steady state of a search's best needs; itself where it has that, or cannot."""
+    program, best = search.program, search.best
+    if not program.model.states or best is None:
+        return program
+    from loomopt.program.settled import settled
+
+    try:
+        model = settled(program.model, {**program.parameters, **best.x})
+    except ArithmeticError:
+        return program
+    return program if model is program.model else replace(program, model=model)
 
 
 def _points(near: Solution | Point | Sequence[Point] | None) -> Sequence[Point]:

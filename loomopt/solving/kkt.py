@@ -5,6 +5,7 @@ by multipliers that sum to 1. A limit or an earlier objective that binds is an e
 """
 
 import math
+import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -120,14 +121,19 @@ def solved(gradients: Floats, system: System) -> Multipliers:
 def replaceable(gradients: Floats, system: System, found: Multipliers, most: float) -> list[int]:
     """Return the inequalities with a multiplier without which others might leave a residual of at most `most`.
 
-    Two solutions y, z have ‖A (y − z)‖ ≥ σ ‖y − z‖, σ the least singular value of the slopes A: without a row of
-    multiplier y_k what is left is no less than σ y_k less what y leaves.
+    Without row k of multiplier y_k what is left is no less than y_k times the distance of its slope from the span of
+    the others', less what y leaves. Slopes A = U S V' of length 1 have it as 1/‖(S⁻¹ V')_k‖; singular values that
+    vanish count as rounding, so that a row in a sum that vanishes has none.
     """
-    slopes, _, _ = _equations(gradients, system)
-    sizes = np.linalg.svd(slopes, compute_uv=False)
-    least = float(sizes[-1]) if len(sizes) == slopes.shape[1] else 0.0
+    slopes, _, one_sided = _equations(gradients, system)
+    lengths = np.linalg.norm(slopes, axis=0)
+    _, sizes, turned = np.linalg.svd(slopes / np.where(lengths > 0.0, lengths, 1.0))
+    sizes = np.maximum(np.pad(sizes, (0, len(turned) - len(sizes))), sys.float_info.epsilon)
+    apart = lengths / np.linalg.norm(turned / sizes[:, None], axis=0)
     reach = math.sqrt(len(slopes)) * (found.residual + most)
-    return [k for k in system.inequalities if found.of[k] > POSITIVE and least * found.of[k] <= reach]
+    places = zip([*system.pieces, *system.inequalities], apart[:one_sided], strict=True)
+    near = [k for k, distance in places if found.of[k] > POSITIVE and distance * found.of[k] <= reach]
+    return [k for k in near if k in system.inequalities]
 
 
 def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:

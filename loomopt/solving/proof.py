@@ -16,11 +16,12 @@ from loomopt.cycle import Where
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.program import states
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
 from loomopt.showing import Shown
-from loomopt.solving.asked import target_name
+from loomopt.solving.asked import check_sought, target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
@@ -65,6 +66,8 @@ class Proofs(Shown):
     target: str
     proofs: tuple[Proof, ...]
     scene: Scene = field(compare=False)
+    uncovered: tuple[str, ...] = ()
+    """What the proofs rest on and do not cover, each a sentence without its full stop."""
 
     @property
     def passed(self) -> bool:
@@ -82,26 +85,37 @@ class Proofs(Shown):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `prove --json` prints."""
-        return {"problem": self.problem, "target": self.target, "proofs": [proof.as_dict() for proof in self.proofs]}
+        proofs = [proof.as_dict() for proof in self.proofs]
+        found = {"problem": self.problem, "target": self.target, "proofs": proofs}
+        return found | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
 
 
-def prove(scene: Scene, design: Mapping[str, float], target: str | None = None, slack: float = SLACK) -> Proofs:
+def prove(
+    scene: Scene,
+    design: Mapping[str, float],
+    target: str | None = None,
+    slack: float = SLACK,
+    judged_by: Program | None = None,
+) -> Proofs:
     """Return the proofs of a design's limits (SI; what it does not name is today's).
 
-    slack: what is left open, relative to each quantity's largest magnitude over the cycle. Raises BadInput.
+    slack: what is left open, relative to each quantity's largest magnitude over the cycle; judged_by: a program whose
+    limits they are, the target's own without one. Raises BadInput.
     """
     if not LEAST_SLACK <= slack <= MOST_SLACK:
         allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
         remedy = "Give 1e-8, or leave it out."
         raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
     job, name = registry.of(scene), target_name(scene, target)
+    check_sought(scene, "prove")
     job.demand(scene, name)
     full = {**job.today(scene), **design}
-    own, asked = job.adopted(scene, full, name)
-    program = job.program(own, asked)
+    own, asked = (scene, name) if judged_by else job.adopted(scene, full, name)
+    program = judged_by or job.program(own, asked)
     reads = _readings(own, job, program, full, slack)
     found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
-    return Proofs(scene.name, name, found, scene)
+    whole = reads[1].sampler
+    return Proofs(scene.name, name, found, scene, states.rests(whole.model.effects, whole.given.own))
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:
@@ -140,7 +154,8 @@ def _readings(
     scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float
 ) -> tuple[_Read, _Read]:
     """Return the design read by the target's program, and by the job as a whole."""
-    known = job.numbers(scene)
+    # What has no room in the program stands where the program holds it: limits may ask for more than the scene's own.
+    known = {name: value for name, value in job.numbers(scene).items() if name not in program.fixed}
     chosen = {scene.full(name): value for name, value in design.items()}
     # What the target's program does not choose is the design's own too, and today's where it names nothing.
     parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
@@ -154,7 +169,8 @@ def _readings(
 def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
     """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
     for limit in (limit for limit in program.limits if limit.family != "variable"):
-        text = limit.name if limit.hidden else words.limit(limit)
+        hidden = limit.row if limit.name in program.told else limit.name
+        text = hidden if limit.hidden else words.limit(limit)
         if limit.family == "cycle":
             peak = own.sampler.peak(limit.row, limit.where)
             yield _over_cycle(own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where))

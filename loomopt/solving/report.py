@@ -80,11 +80,11 @@ def with_optimum(
 
     searched: how far the best was sought, as a sentence.
     """
-    prices = _prices(Words(scene), certificate)
+    binding = prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
     headline = job.say(scene, target, here.figures)
     if passed:
-        message = " ".join(part for part in (headline, _stops(prices), _left_open(certificate), searched) if part)
+        message = " ".join(part for part in (headline, stops(binding), _left_open(certificate), searched) if part)
     else:
         reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
         message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
@@ -93,7 +93,7 @@ def with_optimum(
         target=target,
         status="optimal" if passed else "uncertified",
         message=message,
-        binding=prices,
+        binding=binding,
         certificate=certificate,
         solver=solver,
         today=today,
@@ -105,7 +105,7 @@ def _left_open(certificate: Certificate) -> str:
     return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
 
 
-def _prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
+def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
     """Return one price per limit and side."""
     groups: dict[tuple[str, int], list[Any]] = {}
     for binding in certificate.binding:
@@ -113,12 +113,12 @@ def _prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
     return tuple(words.price(group) for group in groups.values())
 
 
-def _stops(prices: tuple[Price, ...]) -> str:
+def stops(binding: tuple[Price, ...]) -> str:
     """Return the sentence that names the limits which stop the first objective they move."""
-    if not prices:
+    if not binding:
         return "No limit binds."
-    figure = next(iter(prices[0].worth))
-    first = [price for price in prices if figure in price.worth]
+    figure = next(iter(binding[0].worth))
+    first = [price for price in binding if figure in price.worth]
     listed = ", ".join(f"{price.text} (worth {price.reading})" for price in first)
     return f"Limits that stop {figure}: {listed}."
 

@@ -4,7 +4,7 @@ They run only along moves verified flat at this design: objectives unchanged to 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def unchanging(program: Program, x: Numbers) -> list[dict[str, float]]:
     Neither an objective, nor a limit that is touched, but for the bounds of what moves.
     """
     ways = ((move, way) for move in program.moves for way in _directions(move, x))
-    return [way for move, way in ways if all(_is_same(program, x, end) for end in _ends(move, way, x))]
+    return [way for move, way in ways if _is_same(program, x, list(_ends(move, way, x)))]
 
 
 def _directions(move: Move, x: Numbers) -> Iterator[dict[str, float]]:
@@ -96,17 +96,21 @@ def _ends(move: Move, way: Numbers, x: Numbers) -> Iterator[dict[str, float]]:
         yield from ({name: end} for name in way for end in move.bounds[name])
 
 
-def _is_same(program: Program, x: Numbers, goal: Numbers) -> bool:
-    """Say whether neither the objectives nor a limit that is touched changes on the way to the goal."""
+def _is_same(program: Program, x: Numbers, ends: Sequence[Numbers]) -> bool:
+    """Say whether neither the objectives nor a limit that is touched changes on the way to either end."""
     try:
-        before, there = _excesses(program, x), _excesses(program, {**x, **goal})
-        if not is_flat(program, x, goal):
+        before = _excesses(program, x)
+        there = [_excesses(program, {**x, **end}) for end in ends]
+        if not is_flat(program, x, *ends):
             return False
     except (ValueError, ZeroDivisionError):
         return False
-    pairs = zip(program.limits, before, there, strict=True)
-    touched = [(one, other) for limit, one, other in pairs if one >= -ACTIVE and not _bounds(limit, goal)]
-    return all(abs(other - one) <= UNCHANGED for one, other in touched)
+    return all(
+        abs(other - one) <= UNCHANGED
+        for end, after in zip(ends, there, strict=True)
+        for limit, one, other in zip(program.limits, before, after, strict=True)
+        if one >= -ACTIVE and not _bounds(limit, end)
+    )
 
 
 def _bounds(limit: Limit, goal: Numbers) -> bool:
@@ -121,12 +125,12 @@ def _part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
     return {**x, **{name: x[name] + share * (end - x[name]) for name, end in goal.items()}}
 
 
-def is_flat(program: Program, x: Numbers, goal: Numbers) -> bool:
-    """Say whether the objectives stay the same along the way to the goal, and a little beyond x."""
+def is_flat(program: Program, x: Numbers, *goals: Numbers) -> bool:
+    """Say whether the objectives stay the same along the way to each goal (of the same variables), and beyond x."""
     before = _objectives(program, x)
-    nearby = {name: x[name] * (1 + BEYOND) for name in goal}
-    shares = [_part_way(x, goal, share) for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
-    return all(np.abs(_objectives(program, trial) - before).max() <= UNCHANGED for trial in shares)
+    nearby = {name: x[name] * (1 + BEYOND) for goal in goals for name in goal}
+    trials = [_part_way(x, goal, share) for goal in goals for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
+    return all(np.abs(_objectives(program, trial) - before).max() <= UNCHANGED for trial in trials)
 
 
 def _objectives(program: Program, x: Numbers) -> Floats:

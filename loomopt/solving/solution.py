@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
@@ -95,6 +95,24 @@ class Clash:
     x: Mapping[str, float] = field(default_factory=dict)
 
 
+class Terms(Protocol):
+    """What a design is judged by where that is not a target alone, such as the limits on the axes of a front."""
+
+    @property
+    def said(self) -> str:
+        """What is sought, in a few words."""
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """The figures that are sought."""
+
+    def evaluation(self, design: Mapping[str, float]) -> "Evaluation":
+        """Return figures and limits of a design, SI."""
+
+    def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
+        """Return proofs of its limits. Raises BadInput."""
+
+
 @dataclass(frozen=True)
 class Evaluation:
     """A given design: its figures and limits, SI and rad."""
@@ -109,6 +127,8 @@ class Evaluation:
     """Of each figure of which the target asks what may be out of reach, whether the design reaches it."""
     scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
     """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
+    terms: Terms | None = field(default=None, kw_only=True, repr=False, compare=False)
+    """What it is judged by; None for its target alone."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -168,12 +188,17 @@ class Solution(Evaluation):
         """Today's machine, evaluated when it is first read."""
         return self.today() if self.today else None
 
+    @property
+    def sought(self) -> str:
+        """What it answers: its target, or what its terms say."""
+        return self.terms.said if self.terms else self.target
+
     def as_dict(self) -> dict[str, Any]:
         """Return the object `solve --json` prints."""
         base = super().as_dict()
         head: dict[str, Any] = {
             "problem": self.problem,
-            "target": self.target,
+            "target": self.target or None,
             "status": self.status,
             "message": self.message,
             "effects": base["effects"],

@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from loomopt import tables
+from loomopt.jobs import registry
+from loomopt.program import states
 from loomopt.scenes import Scene
+from loomopt.solving.asked import check_sought
 from loomopt.studies import optima, readings
 from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.subject import Subject
@@ -85,6 +88,7 @@ def climbs(
     ladders: Sequence[Ladders] = LADDERS,
 ) -> Iterator[Climb]:
     """Yield each ladder with its rows as soon as it is done. Raises BadInput for a scene that does not assemble."""
+    check_sought(scene, "accuracy")
     subject = Subject(scene)
     for make in ladders:
         for ladder in make(subject, full):
@@ -102,7 +106,9 @@ def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Stud
             knees |= {} if at is None else {name: at}
     rows = tuple(row for _, found in climbs for row in found)
     told = tables.provenance(scene, study="full" if full else "quick")
-    return Study(scene.name, rows, orders, knees, advice(rows), told)
+    sampler = registry.of(scene).sampler(scene, {})
+    left = [f" Not covered: {text}." for text in states.rests(sampler.model.effects, sampler.given.own)]
+    return Study(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
 
 
 def advice(rows: Sequence[Row]) -> str:

@@ -1,7 +1,6 @@
-"""Solve the packaged scenes again and compare with the reference tables, by verified optimum."""
+"""Solve the packaged scenes again and compare with the reference tables: verified optima, and a front for each job."""
 
 import functools
-import io
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,21 +13,17 @@ from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
-from loomopt.tolerances import REPRODUCED_DESIGN, REPRODUCED_OBJECTIVE
+from loomopt.studies import references
 
 if TYPE_CHECKING:
     import pandas as pd
 
 OnStep = Callable[[str], None]
-LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
-"""Sizes below which a difference is measured against the size instead, by unit, SI."""
-LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
-"""Figures that another of the same unit, which may be zero, is measured against."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One scene and target beside its reference; differences are named, none means it reproduces."""
+    """One scene and target, or front, beside its reference; differences are named, none means it reproduces."""
 
     problem: str
     target: str
@@ -37,7 +32,7 @@ class Outcome:
 
 
 def check(problems: Iterable[str] = (), folder: Path | None = None, on_step: OnStep | None = None) -> Iterable[Outcome]:
-    """Yield an outcome for every target of the named scenes (all packaged ones, and plug-ins', without a name).
+    """Yield an outcome for every target and front of the named scenes (all packaged ones, and plug-ins', without one).
 
     on_step: called with what is being done, before it is. Raises BadInput for a name that is not packaged.
     """
@@ -47,6 +42,8 @@ def check(problems: Iterable[str] = (), folder: Path | None = None, on_step: OnS
             found = _solved(scene, target, on_step)
             path = (folder or registry.results(scene)) / f"{name}.{target}.csv"
             yield Outcome(name, target, found.status, tuple(_differences(reference(found, scene), path)))
+        if scene.schema.conflict:
+            yield from _fronts(scene, folder or registry.results(scene), on_step)
 
 
 def named(problems: Iterable[str]) -> list[str]:
@@ -107,45 +104,55 @@ def _solved(scene: Scene, target: str, on_step: OnStep | None) -> Solution:
     return engine.solve(scene, target)
 
 
+def _fronts(scene: Scene, folder: Path, on_step: OnStep | None) -> Iterable[Outcome]:
+    """Yield the outcome of the front that stands for a scene's job, where there is one."""
+    from loomopt.studies import front_reference
+
+    study = front_reference.trade(scene)
+    if study is None:
+        return
+    called = front_reference.said(study)
+    if on_step:
+        on_step(f"solving {scene.name}, {called}")
+    path = folder / front_reference.file(study)
+    then = references.read(path)
+    if then is None:
+        yield Outcome(scene.name, called, "not solved", (f"no reference table {path.name}",))
+        return
+    found = list(front_reference.checked(study, then))
+    status = next((status for status, _ in found if status != "optimal"), "optimal")
+    yield Outcome(scene.name, called, status, tuple(each for _, differences in found for each in differences))
+
+
+def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
+    """Name every difference between an answer and its reference table."""
+    then = references.read(path)
+    if then is None:
+        return [f"no reference table {path.name}"]
+    objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []
+    return list(references.differing(now, then, objectives))
+
+
 def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = None) -> list[Path]:
-    """Write the reference table of every target of the named scenes (all without a name); returns the files."""
+    """Write the reference table of every target and front of the named scenes (all without one); returns the files."""
     from loomopt.files import atomically
+    from loomopt.studies import front_reference
 
     written = []
     for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
             text = tables.csv(reference(_solved(scene, target, on_step), scene))
-            path = folder / f"{name}.{target}.csv"
-            atomically(path, functools.partial(_put, text))
-            written.append(path)
+            written.append(folder / f"{name}.{target}.csv")
+            atomically(written[-1], functools.partial(_put, text))
+        study = front_reference.trade(scene)
+        if study:
+            if on_step:
+                on_step(f"solving {name}, {front_reference.said(study)}")
+            written.append(folder / front_reference.file(study))
+            atomically(written[-1], functools.partial(_put, tables.csv(front_reference.table(study))))
     return written
 
 
 def _put(text: str, path: Path) -> None:
     path.write_text(text, encoding="utf-8")
-
-
-def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
-    """Name every difference between an answer and its reference table."""
-    import pandas as pd
-
-    if not path.is_file():
-        return [f"no reference table {path.name}"]
-    text = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if not line.startswith("#"))
-    then = pd.read_csv(io.StringIO(text), keep_default_na=False, dtype=str)
-    found = [f"column {name} is new" for name in now.columns.difference(then.columns)]
-    found += [f"column {name} is gone" for name in then.columns.difference(now.columns)]
-    objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []
-    least = LEAST | {of: float(then[column].iloc[0]) for of, column in LARGEST.items() if column in then}
-    for name in now.columns.intersection(then.columns):
-        new, old = now[name].iloc[0], then[name].iloc[0]
-        if isinstance(new, str) or name == "unique":
-            if str(new) != str(old):
-                found.append(f"{name}: {new}, reference {old}")
-            continue
-        allowed = REPRODUCED_OBJECTIVE if name.split(" [")[0] in objectives else REPRODUCED_DESIGN
-        size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
-        if not abs(float(new) - float(old)) <= allowed * size:
-            found.append(f"{name}: {float(new)!r}, reference {float(old)!r}")
-    return found

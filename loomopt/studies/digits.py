@@ -19,8 +19,7 @@ from loomopt.program.chains import stations
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import (
-    BINDING,
+from loomopt.studies.tolerances import (
     EXTREME_FAR,
     EXTREME_STEPS,
     EXTREME_TIED,
@@ -33,6 +32,7 @@ from loomopt.tolerances import (
     REFERENCE_SLOPE,
     REFERENCE_STEP,
 )
+from loomopt.tolerances import BINDING
 
 
 def tiny(system: Maths, decimals: int) -> Number:

@@ -1,6 +1,7 @@
 """Executors that a study can be given by name: processes on this machine, and a Dask cluster."""
 
 import contextlib
+import importlib
 import multiprocessing
 import os
 import signal
@@ -17,6 +18,8 @@ T = TypeVar("T")
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Threads of linear algebra would wait for each other longer than matrices as small as these take."""
+NEEDED = "casadi", "loomopt.studies.front_trade", "loomopt.studies.sweep"
+"""What a worker imports while it starts."""
 MOST_WORKERS = 1024
 RETRIES = 3
 """How often Dask gives a task to another worker when one is lost."""
@@ -90,9 +93,14 @@ def _for_children() -> Iterator[None]:
 
 
 def _begin(lifeline: Connection) -> None:
-    """Begin as a worker: it ends when the other end of its lifeline closes."""
+    """Begin as a worker: it ends when the other end of its lifeline closes.
+
+    What every solve needs is imported before there is a first task, so that none waits for it.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
+    for name in NEEDED:
+        importlib.import_module(name)
 
 
 def _end_with(lifeline: Connection) -> None:

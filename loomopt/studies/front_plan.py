@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 from loomopt.studies.rows import Row
 
+ENDS = 0, 1
+"""Points where the first axis, and the second, is least."""
 BATCH = 8
 """Points of a round."""
 NARROW = 1e-5

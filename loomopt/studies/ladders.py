@@ -16,7 +16,7 @@ import numpy as np
 from loomopt.errors import BadInput
 from loomopt.maths import Number
 from loomopt.program.sampling import Tally
-from loomopt.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
+from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
 
 Setting = float | int | str
 EPSILON = float(np.finfo(float).eps)

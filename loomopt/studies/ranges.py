@@ -10,6 +10,7 @@ from loomopt.scene_errors import refusal
 MOST_VALUES = 20_000
 """Points of a study."""
 _RANGE = re.compile(r"([^:\s]+) *: *([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
+_ENDS = re.compile(r"([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
 _ALLOWED = "LO:HI:STEP UNIT, such as 600:900:25 N*m"
 
 
@@ -34,5 +35,14 @@ def values(text: str, key: str) -> list[str]:
     return [f"{number} {found[4]}" if found[4] else number for number in told]
 
 
-def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range") -> BadInput:
-    return refusal(problem, "", key, text, _ALLOWED, remedy)
+def ends(text: str, key: str) -> tuple[str, str]:
+    """Return LO and HI of "LO:HI UNIT", each as text with the unit. Raises BadInput."""
+    found = _ENDS.fullmatch(text.strip())
+    if found is None or None in map(plain_number, found.groups()[:2]):
+        raise _refused("it is no range of numbers", key, text, allowed="LO:HI UNIT, such as 0:5 kg")
+    low, high = (f"{number} {found[3]}" if found[3] else number for number in found.groups()[:2])
+    return low, high
+
+
+def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range", allowed: str = _ALLOWED) -> BadInput:
+    return refusal(problem, "", key, text, allowed, remedy)

@@ -15,7 +15,8 @@ from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
-from loomopt.tolerances import EXTREME_STEPS, REFERENCE_SLOPE, SAME_ANGLE
+from loomopt.studies.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
+from loomopt.tolerances import SAME_ANGLE
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"

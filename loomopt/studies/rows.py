@@ -16,8 +16,8 @@ class Row:
 
     point: its number in the plan; place: what was asked, by scene key or axis; parent: the point that it started warm
     from, None for one that started cold; status: as of a solve; reason: why it is not optimal; multipliers: "FIGURE per
-    LIMIT SIDE" → fall of the figure per unit the limit is loosened; reached: goals of the target, met or not; warm:
-    JSON data from which a neighbour can start.
+    LIMIT SIDE" → fall of the figure per unit the limit is loosened, along a front "FIGURE per OTHER" → its slope;
+    reached: goals of the target, met or not; warm: JSON data from which a neighbour can start.
     """
 
     point: int
@@ -49,6 +49,18 @@ class Row:
     def told(self) -> dict[str, Any]:
         """Return what `--json` prints of it: all but what only a neighbour needs."""
         return {name: value for name, value in self.as_dict().items() if name != "warm"}
+
+
+def priced(figure: str, limit: str, side: str) -> str:
+    """Return the name of a multiplier."""
+    return f"{figure} per {limit} {side}"
+
+
+def parts(multiplier: str) -> tuple[str, str, str]:
+    """Return figure, limit and side of a multiplier's name; of a slope the other figure, and no side."""
+    figure, _, limit = multiplier.partition(" per ")
+    name, _, side = limit.rpartition(" ")
+    return (figure, name, side) if name else (figure, side, "")
 
 
 def digest(rows: Iterable[Row]) -> str:

@@ -1,43 +1,15 @@
 """Run a study: its batches in turn, each row kept as soon as it is there; the same rows whoever computes them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 from loomopt.studies import workers
+from loomopt.studies.plan import Study, Task
 from loomopt.studies.rows import Row
 
 if TYPE_CHECKING:
     from loomopt.studies.store import Store
-
-
-@dataclass(frozen=True)
-class Task:
-    """One point to be solved.
-
-    place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
-    ask: what else is asked, as JSON data.
-    """
-
-    point: int
-    parent: int | None
-    place: Mapping[str, float]
-    ask: Mapping[str, Any] = field(default_factory=dict)
-
-
-class Study(Protocol):
-    """A plan of points: small, and it pickles; the same study has the same key, and the same rows."""
-
-    @property
-    def key(self) -> str:
-        """A hash of all that its rows depend on."""
-
-    def batch(self, rows: Sequence[Row]) -> Sequence[Task]:
-        """Return the next tasks, from all rows of earlier batches and from nothing else; none at the end."""
-
-    def solved(self, task: Task, parent: Row | None) -> Row:
-        """Return the row of a task, from its arguments and from nothing else."""
 
 
 OnRow = Callable[[Row], None]

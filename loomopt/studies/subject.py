@@ -23,7 +23,7 @@ from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import check, digits
 from loomopt.studies.ladders import Reference
-from loomopt.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS
+from loomopt.studies.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS
 
 POSITIONS = 24
 """Crank angles, evenly over the turn, at which closed forms are compared."""

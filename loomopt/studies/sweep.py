@@ -4,7 +4,7 @@ import functools
 import itertools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from loomopt import designs
@@ -17,14 +17,15 @@ from loomopt.scene_errors import misread, refusal
 from loomopt.scene_numbers import files, quantity
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, check_numbers, target_name
+from loomopt.solving.asked import ACCURACY, check_numbers, check_sought, target_name
 from loomopt.solving.solution import Solution
 from loomopt.studies import ranges, warm
+from loomopt.studies.findings import Change, Findings
 from loomopt.studies.lattice import Lattice
-from loomopt.studies.rows import Row
-from loomopt.studies.runs import Task
+from loomopt.studies.plan import Task
+from loomopt.studies.rows import Row, parts, priced
 
-PLAN = 1
+PLAN = 2
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 Over = Mapping[str, str | Sequence[str | float]]
 """Dotted key of a scene → "LO:HI:STEP UNIT", or its values as a scene would give them."""
@@ -62,6 +63,17 @@ class Sweep:
     cold: bool
 
     name = "sweep"
+
+    @property
+    def heading(self) -> str:
+        """Scene and target."""
+        return f"{self.scene.name}, {self.target}"
+
+    @property
+    def shown(self) -> list[str]:
+        """The figures that the target is about, in its order."""
+        program = registry.of(self.scene).program(self.scene, self.target)
+        return list(dict.fromkeys(each.figure for each in program.objectives))
 
     @property
     def asked(self) -> dict[str, object]:
@@ -141,6 +153,23 @@ class Sweep:
         scene = self.scene_at(task.point)
         return warm.written(answer.point, registry.of(scene).program(scene, self.target))
 
+    def place(self, row: Row) -> Mapping[str, float]:
+        """Return the numbers that are swept, SI, at a row."""
+        return row.place
+
+    def sought(self, row: Row) -> Mapping[str, float]:
+        """Return nothing: the target says what is sought."""
+        return {}
+
+    def told(self, row: Row) -> dict[str, object]:
+        """Return what `--json` prints of a row."""
+        return row.told()
+
+    def read(self, rows: Sequence[Row]) -> Findings:
+        """Return rows in the order of their points; of a sweep over one number what changes along it, and its gaps."""
+        line = sorted(rows, key=lambda row: (*row.place.values(), row.point)) if len(self.axes) == 1 else []
+        return Findings(tuple(rows), "", tuple(_changes(line)), tuple(_gaps(line)))
+
     def solved(self, task: Task, parent: Row | None) -> Row:
         """Return the row of a task. Raises BadInput for a combination that is no scene."""
         answer = self.solve(task, parent)
@@ -151,7 +180,7 @@ class Sweep:
             place=task.place,
             parent=task.parent,
             status=answer.status,
-            reason=None if answer.status == "optimal" else _reason(answer),
+            reason=None if answer.status == "optimal" else reason(answer),
             design=designs.flat(answer.design),
             figures={name: _finite(value) for name, value in answer.figures.items()},
             multipliers=multipliers(answer),
@@ -169,12 +198,25 @@ def multipliers(answer: Solution) -> dict[str, float]:
     }
 
 
-def priced(figure: str, limit: str, side: str) -> str:
-    """Return the name of a multiplier."""
-    return f"{figure} per {limit} {side}"
+def _changes(line: Sequence[Row]) -> Iterator[Change]:
+    """Yield where the active set changes along rows over one number."""
+    for row, after in itertools.pairwise(line):
+        before, now = ({parts(name)[1:] for name in each.multipliers} for each in (row, after))
+        if row.certified and after.certified and before != now:
+            between = (next(iter(row.place.values())), next(iter(after.place.values())))
+            yield Change(between, "active set", tuple(sorted({limit for limit, _ in before ^ now})))
 
 
-def _reason(answer: Solution) -> str:
+def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:
+    """Yield the stretches of one number, SI, where no admissible design exists."""
+    for empty, stretch in itertools.groupby(line, key=lambda row: row.status == "infeasible"):
+        if empty:
+            values = [next(iter(row.place.values())) for row in stretch]
+            yield values[0], values[-1]
+
+
+def reason(answer: Solution) -> str:
+    """Return why an answer is not optimal: what clashes, else what came in the way."""
     clash = f"limits that clash: {', '.join(answer.clash)}" if answer.clash else answer.message
     return f"{clash}; {answer.explanation}" if answer.explanation else clash
 
@@ -202,6 +244,7 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
     job = registry.of(base)
     job.demand(base, name)
+    check_sought(base)
     return Sweep(base, name, axes, accuracy, seed, bool(job.program(base, name).single))
 
 

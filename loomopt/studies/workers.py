@@ -11,8 +11,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from loomopt.studies.plan import Study, Task
     from loomopt.studies.rows import Row
-    from loomopt.studies.runs import Study, Task
 
     Work = tuple[Task, Row | None]
     """A task with the row of its parent."""
@@ -92,13 +92,16 @@ class Crew:
             self.executor = None
 
     def work(self, tasks: "Sequence[Work]", kept: "Callable[[Row], None]") -> None:
-        """Have tasks solved; `kept` is handed each row as it comes. Raises KeyboardInterrupt on Ctrl-C."""
+        """Have tasks solved; `kept` is handed each row as it comes. Raises KeyboardInterrupt on Ctrl-C.
+
+        Workers begin with the longest tasks, so that they end together.
+        """
         if self.executor is None and self.make is None:
             for task, parent in tasks:
                 kept(_read(solved(self.payload, task, parent)))
             return
         try:
-            for row in self._rows(deque(tasks)):
+            for row in self._rows(deque(sorted(tasks, key=lambda work: -work[0].length))):
                 kept(row)
         except KeyboardInterrupt:
             for future in self.running:

@@ -13,7 +13,7 @@ from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
 from loomopt.views import outputs
-from loomopt.views.figure import COLOURS, STYLES, _figure, _own_style, save
+from loomopt.views.figure import COLOURS, STYLES, blank, own_style, save
 from loomopt.views.heads import Entry, head
 from loomopt.views.layout import Grid, joined
 
@@ -80,9 +80,9 @@ def draw(study: Study, path: Path) -> None:
 def drawn(study: Study) -> Any:
     """Return the figure: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
-    with _own_style(study.problem, *panels):
+    with own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
-        page = _figure(9.0, 2.5 * high + 0.5)
+        page = blank(9.0, 2.5 * high + 0.5)
         page.set_layout_engine("constrained")
         page.suptitle(f"{study.problem}: what accuracy costs", fontsize=11, parse_math=False)
         placed = []

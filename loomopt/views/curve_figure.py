@@ -47,6 +47,11 @@ class Turn(NamedTuple):
     marks: Mapping[str, float]
     unit: str = "deg"
 
+    @property
+    def whole(self) -> float:
+        """The angle after which the curves repeat, deg: a turn, or as many as the table covers."""
+        return 360.0 * max(1, round(float(self.angles[-1] - self.angles[0]) / 360.0))
+
     def told(self, angle: float) -> str:
         """Return a crank angle, deg, as text."""
         return f"{angle:.2f} deg" if self.unit == "deg" else show(math.radians(angle), self.unit, 5)
@@ -80,13 +85,13 @@ def curves(
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
     design, before = _turn(frame, marks or {}, unit), _turn(*today, unit) if today else None
-    with figure._own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
+    with figure.own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
         page, cells = _grid(panels)
         entries = [_panel(cell.axes, panel, design, before) for cell, panel in cells]
         widen(page, [cell for cell, _ in cells])
         heads = {}
         for (cell, panel), shown in zip(cells, entries, strict=True):
-            names = _mark(cell.axes, design.marks)
+            names = _mark(cell.axes, design)
             heads[cell.axes] = head(cell.axes, f"{panel.title}{_bracketed(panel)}", shown, names if cell.first else ())
         stack(page, [cell for cell, _ in cells], heads)
         _entitle(page, title, f"{angle} phi [{unit}]", both=before is not None)
@@ -107,7 +112,7 @@ def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
     on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
     wide = 1 if len(panels) <= 4 else 2
     rows, height = math.ceil(len(others) / wide), len(on_top)
-    page = figure._figure(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0)
+    page = figure.blank(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0)
     shared: Any = None
     cells = []
     for place, panel in enumerate([*on_top, *others]):
@@ -181,8 +186,9 @@ def _frame(axes: Any, values: Floats, turn: Turn) -> None:
     if low < 0 < high:
         axes.axhline(0.0, color="#9ca3af", linewidth=0.6, zorder=1)
     axes.set_xlim(turn.angles.min(), turn.angles.max())
-    axes.xaxis.set_major_locator(MultipleLocator(45))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{(x if 0 <= x <= 360 else x % 360) / size:.4g}"))
+    whole = turn.whole
+    axes.xaxis.set_major_locator(MultipleLocator(45 * whole / 360))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{(x if 0 <= x <= whole else x % whole) / size:.4g}"))
     axes.yaxis.set_major_formatter(FuncFormatter(_tick))  # no common power that stands in the way
     axes.grid(color="#e5e7eb", linewidth=0.5)
     axes.spines[["top", "right"]].set_visible(False)
@@ -219,7 +225,7 @@ def _row(values: Floats, turn: Turn, how: str) -> int | None:
     """Return the row of what is marked, the first of those alike; None where nothing is known."""
     if how not in WORDS:
         place = math.degrees(turn.marks.get(how, math.nan))
-        near = np.flatnonzero(np.abs(turn.angles - turn.angles[0] - (place - turn.angles[0]) % 360.0) <= SAME)
+        near = np.flatnonzero(np.abs(turn.angles - turn.angles[0] - (place - turn.angles[0]) % turn.whole) <= SAME)
         return int(near[0]) if near.size and np.isfinite(values[near[0]]) else None
     heights = {"peak": np.abs(values), "most": values, "least": -values}[how]
     if not np.isfinite(heights).any():
@@ -247,17 +253,17 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
     return entries
 
 
-def _mark(axes: Any, marks: Mapping[str, float]) -> list[tuple[float, str]]:
+def _mark(axes: Any, of: Turn) -> list[tuple[float, str]]:
     """Shade stretches and mark angles wherever they fall on the axis; return the names with their places."""
-    low, high = axes.get_xlim()
-    marks = {name: angle for name, angle in marks.items() if math.isfinite(angle)}
+    (low, high), whole = axes.get_xlim(), of.whole
+    marks = {name: angle for name, angle in of.marks.items() if math.isfinite(angle)}
     names: list[tuple[float, str]] = []
     stretches = [name.removesuffix(" begins") for name in marks if name.endswith(" begins")]
     stretches = [name for name in stretches if f"{name} ends" in marks]
     for name in stretches:
         begin, end = math.degrees(marks[f"{name} begins"]), math.degrees(marks[f"{name} ends"])
-        end = begin + (end - begin) % 360
-        parts = [(max(begin + turn, low), min(end + turn, high)) for turn in _turns(begin, low - 360, high)]
+        end = begin + (end - begin) % whole
+        parts = [(max(begin + turn, low), min(end + turn, high)) for turn in _turns(begin, low - whole, high, whole)]
         parts = [(left, right) for left, right in parts if left < right]
         for left, right in parts:
             axes.axvspan(left, right, color="#fde68a", alpha=0.6, linewidth=0, zorder=0)
@@ -265,7 +271,7 @@ def _mark(axes: Any, marks: Mapping[str, float]) -> list[tuple[float, str]]:
         names.append((sum(widest) / 2, name))
     marks = {name: angle for name, angle in marks.items() if name.rpartition(" ")[0] not in stretches}
     for name, angle in marks.items():
-        for turn in _turns(math.degrees(angle), low, high):
+        for turn in _turns(math.degrees(angle), low, high, whole):
             place = math.degrees(angle) + turn
             if low <= place <= high:
                 axes.axvline(place, color=LINE, linewidth=0.6, linestyle=(0, (9, 2, 1, 2)))
@@ -273,7 +279,7 @@ def _mark(axes: Any, marks: Mapping[str, float]) -> list[tuple[float, str]]:
     return sorted(names)
 
 
-def _turns(angle: float, low: float, high: float) -> list[float]:
-    """Return the whole turns, deg, that may bring an angle between low and high."""
-    first, last = math.floor((low - angle) / 360), math.ceil((high - angle) / 360)
-    return [360.0 * turn for turn in range(first, last + 1)]
+def _turns(angle: float, low: float, high: float, whole: float) -> list[float]:
+    """Return the multiples of the whole, deg, that may bring an angle between low and high."""
+    first, last = math.floor((low - angle) / whole), math.ceil((high - angle) / whole)
+    return [whole * turn for turn in range(first, last + 1)]

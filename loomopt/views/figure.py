@@ -48,24 +48,24 @@ def draw(drawing: Drawing, path: Path) -> None:
     drawing = sheet(drawing)
     box = extent(drawing)
     inches = _PAGE / max(box.right - box.left, box.top - box.bottom)
-    with _own_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
-        figure = _figure((box.right - box.left) * inches, (box.top - box.bottom) * inches)
+    with own_style(*(primitive.text for primitive in drawing.primitives if isinstance(primitive, Text))):
+        figure = blank((box.right - box.left) * inches, (box.top - box.bottom) * inches)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", frame_on=False)
         axes.set(xlim=(box.left, box.right), ylim=(box.bottom, box.top), xticks=[], yticks=[])
         for order, (name, layer) in enumerate(drawing.layers.items()):
             for primitive in drawing.primitives:
                 if primitive.layer == name:
-                    _append(axes, primitive, layer, drawing.height, 72 * inches, order)
+                    put(axes, primitive, layer, drawing.height, 72 * inches, order)
         _save(figure, path)
 
 
 def save(figure: Any, path: Path) -> None:
     """Write a figure as PNG, PDF or SVG, by the path's ending, whatever the user's settings."""
-    with _own_style():
+    with own_style():
         _save(figure, path)
 
 
-def _append(axes: Any, primitive: Primitive, layer: Layer, text_height: float, points: float, order: int) -> None:
+def put(axes: Any, primitive: Primitive, layer: Layer, text_height: float, points: float, order: int) -> None:
     """Add a primitive to axes in m; points: printer's points per m of the drawing."""
     from matplotlib import lines, patches
 
@@ -96,7 +96,7 @@ def _append(axes: Any, primitive: Primitive, layer: Layer, text_height: float, p
 
 
 @contextmanager
-def _own_style(*texts: str) -> Iterator[None]:
+def own_style(*texts: str) -> Iterator[None]:
     """Draw texts in matplotlib's own defaults, whatever the user's settings; a character no font has is a box."""
     from matplotlib import style
 
@@ -106,7 +106,7 @@ def _own_style(*texts: str) -> Iterator[None]:
         yield
 
 
-def _figure(width: float, height: float) -> Any:
+def blank(width: float, height: float) -> Any:
     """Return an empty figure, inches, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

@@ -21,7 +21,12 @@ from loomopt.views.layout import Grid
 ORDINALS = ("first", "second", "third")
 GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "mu": "μ"}
 """Letters that drawings write as such."""
-SHARED = {"phi": "angle of the shaft", "motor_power": "crank torque times the speed of the shaft"}
+SHARED = {
+    "phi": "angle of the shaft",
+    "omega": "speed of the shaft",
+    "motor_torque": "torque of the motor: the shaft's, and what turns the flywheel",
+    "motor_power": "torque of the motor times the speed of the shaft",
+}
 """Columns that every job's curves may have."""
 KINDS = {unit: kind for kind, unit in SI_UNIT.items() if kind != "angular speed"}
 """SI unit → kind of quantity."""

@@ -1,12 +1,11 @@
 """The JSON Schema of a job's scenes, by which editors complete and check TOML: from the models that read a scene."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
-from loomopt.effects.kinds import UNBUILT, Effect
 from loomopt.quantities import Quantity, quantity_of
 from loomopt.quantity_patterns import QUANTITY, foreign
 from loomopt.scene_display import KINDS
@@ -38,7 +37,7 @@ def scene(schema: SceneSchema) -> Json:
     tables = {name: makers[name](schema) for name in TABLES}
     whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
     rules = [_given(each, "") for each in schema.needs]
-    rules += [_given(key, effect.name) for effect in _own(schema) for key in effect.needs]
+    rules += [_given(key, effect.name) for effect in schema.effects.values() for key in effect.needs]
     found: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
     return _hoisted(found | ({"allOf": rules} if rules else {}))
 
@@ -60,14 +59,9 @@ def _problem(schema: SceneSchema) -> Json:
     return found
 
 
-def _own(schema: SceneSchema) -> Iterator[Effect]:
-    """Yield the effects that a scene may turn on."""
-    yield from (effect for effect in schema.effects.values() if not isinstance(effect, UNBUILT))
-
-
 def _effects(schema: SceneSchema) -> Json:
     found = {}
-    for effect in _own(schema):
+    for effect in schema.effects.values():
         own = _model(effect.own, effect.summary)
         found[effect.name] = {"type": "object", "additionalProperties": own} if effect.many else own
     return _closed(found)
@@ -76,7 +70,7 @@ def _effects(schema: SceneSchema) -> Json:
 def _bounds(schema: SceneSchema) -> Json:
     """Return [bounds]: every number by its name, as a range or as one value."""
     kinds: dict[str, list[Quantity]] = {}
-    effects = [effect for effect in _own(schema) if not effect.many]
+    effects = [effect for effect in schema.effects.values() if not effect.many]
     for model in (schema.mechanism, schema.operation, *(effect.own for effect in effects)):
         for name in model.model_fields:
             if quantity := quantity_of(model, name):
@@ -84,7 +78,7 @@ def _bounds(schema: SceneSchema) -> Json:
     for name, kind in schema.variables.items():
         kinds[name] = kinds.get(name, [Quantity(kind)])[:1]
     found = _closed({name: _any([_bound(_quantity(each)) for each in of]) for name, of in kinds.items()})
-    if len(effects) < sum(1 for _ in _own(schema)):  # instances are named by the scene
+    if len(effects) < len(schema.effects):  # instances are named by the scene
         found["additionalProperties"] = {"type": "object"}
     return found
 

@@ -55,13 +55,13 @@ def html(thing: object) -> str:
     """
     match thing:
         case Scene():
-            return _page(scene_view.parts(thing), _drawn(thing, {}))
+            return page(scene_view.parts(thing), _drawn(thing, {}))
         case Solution(scene=Scene() as scene):
-            return _page(terminal.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(terminal.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
         case Evaluation(scene=Scene() as scene):
-            return _page(terminal.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(terminal.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
         case Proofs():
-            return _page(terminal.proofs(thing))
+            return page(terminal.proofs(thing))
     raise TypeError(f"a {type(thing).__name__} is not shown")
 
 
@@ -77,7 +77,7 @@ def _on_page(size: re.Match[str]) -> str:
     return f'width="{width}" height="{height}"'
 
 
-def _page(parts: Sequence[str | Grid], drawn: str = "") -> str:
+def page(parts: Sequence[str | Grid], drawn: str = "") -> str:
     """Return paragraphs and tables, then a drawing."""
     told = (table(part) if isinstance(part, Grid) else f"<p>{_escaped(part)}</p>" for part in parts)
     return f"<div>{''.join(told)}{drawn}</div>"

@@ -143,7 +143,7 @@ def curves(
     else:
         from loomopt.views import figure
 
-        drawn = plotted(frame, scene, flat(design), target, said)
+        drawn = plotted(frame, scene, flat(design), said)
         atomically(path, functools.partial(figure.save, drawn))
 
 
@@ -154,18 +154,16 @@ def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Fi
     if path:
         suffix(path, PICTURES)
     frame = tables.curves(scene, found.design, target=target)
-    drawn = plotted(frame, scene, flat(found.design), target, what(found))
+    drawn = plotted(frame, scene, flat(found.design), what(found))
     if path:
         atomically(path, functools.partial(figure.save, drawn))
     return drawn
 
 
-def plotted(
-    frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], target: str | None = None, said: str = ""
-) -> "Figure":
+def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: str = "") -> "Figure":
     """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
-    design: SI; today's without one. target: what it was found for. said: what it is, where more is known.
+    design: SI; today's without one. said: what it is, as `what` says it.
     """
     from loomopt.picture.panels import in_units
     from loomopt.views import curve_figure
@@ -175,9 +173,9 @@ def plotted(
     own = {**now, **design}
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
-    subject = (f"design for {target}" if target else GIVEN) if design else TODAY
     name, broken, _ = said.partition(BROKEN)
-    title = f"{scene.name}: {name or subject}{', limits not held' if broken else ''}, curves over the cycle"
+    subject = name or (GIVEN if design else TODAY)
+    title = f"{scene.name}: {subject}{', limits not held' if broken else ''}, curves over the cycle"
     unit = scene.shown_in("angle")
     drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
@@ -191,7 +189,7 @@ def what(found: Evaluation, target: str | None = None, status: str | None = None
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     said = f"{BROKEN}{broken}" if broken else ""
     if isinstance(found, Solution):
-        return FOUND[found.status].format(found.target) + said
+        return FOUND[found.status].format(found.sought) + said
     if target and status in FOUND and not (broken and status == "optimal"):
         return FOUND[status].format(target) + said
     own, scene = flat(found.design), found.scene

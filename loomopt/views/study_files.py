@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt.files import atomically, check, suffix
-from loomopt.jobs import registry
 from loomopt.provenance import csv
 from loomopt.studies import study_table
+from loomopt.studies.findings import Change, SceneStudy, counted
 from loomopt.studies.rows import Row
-from loomopt.studies.study_table import Change, Column
-from loomopt.studies.sweep import Sweep
+from loomopt.studies.study_table import Column
 from loomopt.units import show
 from loomopt.views import outputs
 from loomopt.views.layout import Grid, joined
@@ -23,6 +22,8 @@ TABLES = (".csv", ".parquet")
 SAME = 1e-9
 """Relative spread of a column below which its number is the same in all rows."""
 
+KINDS = {"jump": "jump", "kink": "kink", "active set": "what binds changes"}
+"""Kind of a change, as it is told."""
 MOST_REASONS = 5
 """Reasons that are told below a table."""
 
@@ -47,18 +48,13 @@ def table(path: Path, frame: "pd.DataFrame") -> None:
         atomically(path, frame.to_parquet)
 
 
-def told(study: Sweep, rows: Sequence[Row], si: bool = False) -> list[Column]:
-    """Return the columns that a study is about: figures that the target is about, and what differs of the design."""
+def told(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[Column]:
+    """Return the columns that a study is about: what it seeks and shows, and what differs of the design."""
     columns = study_table.columns(study, rows, si)
-    asked = objectives(study)
-    figures = [column for name in asked for column in columns["figures"] if column.name == name]
-    return figures + [column for column in columns["design"] if _differs(column) and column not in figures]
-
-
-def objectives(study: Sweep) -> list[str]:
-    """Return the figures that the target is about, in its order."""
-    program = registry.of(study.scene).program(study.scene, study.target)
-    return list(dict.fromkeys(each.figure for each in program.objectives))
+    known = [*columns["design"], *columns["figures"], *columns["multipliers"]]
+    shown = [column for name in study.shown for column in known if column.name == name]
+    differing = [column for column in columns["design"] if _differs(column) and column not in shown]
+    return [*columns["sought"], *shown, *differing]
 
 
 def _differs(column: Column) -> bool:
@@ -66,28 +62,38 @@ def _differs(column: Column) -> bool:
     return max(known) - min(known) > SAME * max(map(abs, known))
 
 
-def parts(study: Sweep, rows: Sequence[Row], si: bool = False) -> list[str | Grid]:
-    """Return the parts of a study in a terminal: a line per row, what changes along it, and what came of it."""
-    columns = [*study_table.columns(study, rows, si)["place"], *told(study, rows, si)]
+def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str | Grid]:
+    """Return the parts of a study in a terminal: a line per row, what changes along it, and what came of it.
+
+    rows: of all points that were solved.
+    """
+    found = study.read(rows)
+    columns = [*study_table.columns(study, found.rows, si)["place"], *told(study, found.rows, si)]
     heads = ["", *(column.name if column.unit == "1" else f"{column.name}\n{column.unit}" for column in columns)]
     lines = []
-    for place, row in enumerate(rows):
+    for place, row in enumerate(found.rows):
         cells = ["" if each is None else f"{each:.6g}" for each in (column.shown[place] for column in columns)]
         lines.append((str(row.point), *cells, "" if row.status == "optimal" else row.status))
-    counts = Counter(row.status for row in rows)
+    counts = Counter(row.status for row in found.rows)
     outcome = ", ".join(f"{count} {status}" for status, count in counts.items())
-    left = f" of {study.size}" if len(rows) < study.size else ""
-    first = f"{study.scene.name}, {study.target}: {len(rows)}{left} points, {outcome}"
+    whole = study.size is None or len(rows) == study.size
+    number = len(found.rows)
+    count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
     grid = Grid("", (*heads, "status"), tuple(lines), right=tuple(range(len(heads))))
-    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in rows if row.reason]
+    reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
-    said = [_said(study, change, si) for change in study_table.changes(study, rows)]
-    return [first, grid, *said, *reasons[:MOST_REASONS], *more]
+    message = [found.message] if found.message else []
+    said = [change_said(study, change, si) for change in found.changes]
+    return [f"{study.heading}: {count}, {outcome}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
 
 
-def _said(study: Sweep, change: Change, si: bool) -> str:
+def change_said(study: SceneStudy, change: Change, si: bool) -> str:
     """Return a change as a sentence."""
     key = next(iter(study.kinds))
     unit = study_table.Units(study, si).of(key)
-    low, high = (show(value, unit) for value in change.at)
-    return f"{joined(key)} from {joined(low)} to {joined(high)}: what binds changes, {', '.join(change.limits)}"
+    limits = [joined(limit) for limit in change.limits]
+    low, high = (joined(show(value, unit)) for value in change.between)
+    if change.at is None:
+        return f"{joined(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"
+    where = f"{low} to {high}" if change.kind == "jump" else joined(show(change.at, unit))
+    return f"{joined(key)} {where}: {', '.join([KINDS[change.kind], *limits])}"

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = "relaxed" if answer.relaxation else "design"
-    parts: list[str | Grid] = [f"{answer.problem}, {answer.target}: {answer.status}"]
+    parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.status}"]
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]
-    elif answer.status == "optimal":
+    elif answer.status == "optimal" and not answer.terms:
         parts.append(registry.of(scene).say(scene, answer.target, answer.figures))
     else:
         parts.append(answer.message)
@@ -187,7 +187,8 @@ def proven(found: "Proofs") -> list[str]:
     boxes = sum(proof.boxes for proof in found.proofs)
     head = f"Proven at every crank angle, up to {SLACK:.0e} of each quantity's largest magnitude, in {boxes} boxes:"
     lines = [f"    {said}: {', '.join(texts)}" for said, texts in shown.items() if texts]
-    return ["\n".join([head, *lines])] * bool(lines) + ([f"NOT proven: {', '.join(missed)}"] if missed else [])
+    told = ["\n".join([head, *lines])] * bool(lines) + ([f"NOT proven: {', '.join(missed)}"] if missed else [])
+    return told + [f"Not covered: {text}." for text in found.uncovered]
 
 
 def proofs(found: "Proofs") -> list[str | Grid]:
@@ -200,4 +201,6 @@ def proofs(found: "Proofs") -> list[str | Grid]:
         shown = "" if unit == "1" else unit
         lines.append((joined(proof.text), proof.status, *sizes, shown, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
-    return [f"{found.problem}, {found.target}: {found.said}", Grid("", head, tuple(lines), right=(2, 3, 5, 6))]
+    table = Grid("", head, tuple(lines), right=(2, 3, 5, 6))
+    uncovered = (f"Not covered: {text}." for text in found.uncovered)
+    return [f"{found.problem}, {found.target}: {found.said}", table, *uncovered]

@@ -3,7 +3,7 @@
 import math
 from importlib.metadata import EntryPoint
 
-from loomopt.effects.kinds import Axis, Check, Demand, Load
+from loomopt.effects.kinds import Axis, Check, Demand, Load, Speed
 from loomopt.quantities import Coordinate, PositiveLength, PureNumber
 from loomopt.schema import Figure, Table
 
@@ -121,6 +121,25 @@ PLATE: Check[object] = Check(
     axes=(Axis(name="spare", key="spare"),),
     examples=({"thickness": "5 mm", "spare": "7 mm", "strong": "3 mm"},),
 )
+
+
+class MotorTable(Table):
+    line: PureNumber
+    wheel: PureNumber
+
+
+MOTOR = Speed(
+    name="made_up_motor",
+    summary="a motor whose torque falls with the square of the speed, and a flywheel",
+    own=MotorTable,
+    rank=95,
+    motor=lambda m, omega, given, own: own["line"] * (given["no_load_speed"] ** 2 - omega**2),
+    flywheel=lambda given, own: own["wheel"],
+    rows={"made_up_fastest": lambda turning, given, own: turning.range[1]},
+    needs=("operation.speed",),
+    figures=(Figure("made_up_fastest", "angular speed", "greatest speed of the shaft"),),
+    examples=({"line": "0.05", "wheel": "20"},),
+)
 DEAD_CENTRE = at_event("front dead centre", lambda given: (given["beta"], given["beta"] + 1))
 TURNS = at_event("turns", lambda given: tuple(given["turns"]))
 HALF_OPEN = at_event("half_open", lambda given: (*given["half_open"], BEGINS, ENDS))
@@ -135,6 +154,7 @@ NAMES = {
 }
 for _job in ("beatup", "rapier", "shedding"):
     NAMES |= {f"{_job}.made_up_output": "OUTPUT", f"{_job}.made_up_drive": "DRIVE", f"{_job}.made_up_plate": "PLATE"}
+    NAMES[f"{_job}.made_up_motor"] = "MOTOR"
 
 
 def points(group):

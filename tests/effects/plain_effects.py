@@ -5,26 +5,31 @@ Nothing of loomopt is in a value. `python tests/effects/plain_effects.py` writes
 """
 
 import csv
+import functools
 import itertools
 from pathlib import Path
 
 import mpmath
+from mpmath.calculus.quadrature import GaussLegendre
 
 MP = mpmath.MPContext()
 MP.dps = 50
 PI = MP.pi
-UNITS = {"mm": "1e-3", "MPa": "1e6", "GPa": "1e9", "deg": PI / 180}
+UNITS = {"MN*m/rad": "1e6", "mm": "1e-3", "kN/m": "1e3", "MPa": "1e6", "GPa": "1e9", "deg": PI / 180}
 """SI of a unit that is not one already."""
 BEATUP = {"l1": 31, "l2": 65, "l3": 155, "l4": 167, "today_l2": 65, "m4": 56800, "r4": 45, "m4e": 0, "r4e": 0}
 """[Yuan24] in g and mm; speed 600 rpm, M0 745 N·m."""
 COUNTERWEIGHT = {"l1": 30.5, "l2": 83, "l3": 150, "l4": 166, "m4e": 3000, "r4e": 70}
 M0, SPEED = 745, 20 * PI
+REED, STEP = {"J4": "0.62", "pulse": "29.8 deg"}, 15
+"""What moves with the reed of the packaged scene, and degrees between borders of the turn."""
 RAPIER = {
     "l1": "0.076385", "l2": "0.275705", "l3": "0.684", "l71": "0.773", "l3p": "0.18", "l4": "0.012", "l5": "0.4950647",
     "l6": "0.185", "C0x": "0.4610345", "C0y": "0.2342173", "travel": 2,
 }  # fmt: skip
-"""[Hong17] in m: i1 i2 wheel/2 = 300/18 · 0.24/2 = 2 m; 60 rpm."""
+"""[Hong17] in m: i1 i2 wheel/2 = 300/18 · 0.24/2 = 2 m; 60 rpm, and a head of 0.35 kg."""
 PHI30, ALPHA, PHI40, SHAFT = 80.48, 30, 166.67588, 2 * PI
+HEAD = MP.mpf("0.35")
 SHEDDING = {"travel": "0.0656", "rise": 120, "far": 60, "back": 120, "K1": "8029.14", "X0": "0.08"}
 """[Qiu21]: m, deg, N/m; cycloidal law, 600 rpm."""
 
@@ -85,6 +90,35 @@ class Reed:
     def resistance(self, own, phi):
         away = phi - self.beta
         return M0 * MP.cos(PI * away / own["pulse"]) if abs(away) <= own["pulse"] / 2 else MP.mpf(0)
+
+    def shaft_torsion(self, own, phi):
+        """Return k z + c z˙ by convolution: all that ever acted on the reed, faded and turned by e^(λ(t − s)).
+
+        phi: a multiple of STEP; own: underdamped.
+        """
+        k, c = own["stiffness"], own["damping"]
+        J = MP.mpf(REED["J4"]) + self.v["m4e"] * self.v["r4e"] ** 2
+        rate = -c / (2 * J) + 1j * MP.sqrt(k / J - (c / (2 * J)) ** 2)
+        turn, total = 2 * PI, MP.mpc(0)
+        for at, weight, force in self.acting(J):
+            back = (phi - at) % turn
+            total += weight * force * MP.exp(rate * back / SPEED) / SPEED
+        return ((k + c * rate) * total / (1 - MP.exp(rate * turn / SPEED)) / (J * rate.imag)).imag
+
+    def acting(self, J):
+        """Return nodes and weights of a turn with what acts on the reed there: Gauss's rule between borders."""
+        if not hasattr(self, "kept"):
+            pulse = {"pulse": number(REED["pulse"])}
+            corners = [self.beta - pulse["pulse"] / 2, self.beta + pulse["pulse"] / 2]
+            borders = sorted([*corners, *(k * STEP * PI / 180 for k in range(360 // STEP + 1))])
+            rule = GaussLegendre(MP).calc_nodes(4, MP.prec)
+            self.kept = []
+            for begin, end in itertools.pairwise(borders):
+                for x, weight in rule:
+                    at = (begin + end + (end - begin) * x) / 2
+                    force = J * self.motion(at)[1] + self.resistance(pulse, at)
+                    self.kept.append((at, weight * (end - begin) / 2, force))
+        return self.kept
 
     def bearing_friction(self, own, phi):
         rate = self.motion(phi)[0]
@@ -153,6 +187,12 @@ class Head:
     def tape_friction(self, own, phi):
         return own["force"] * MP.sign(slope(self.S, phi))
 
+    def tape_stretch(self, own):
+        """Return how far HEAD stretches the tape where it is farthest out."""
+        near = max((2 * PI * k / 72 for k in range(72)), key=self.S)
+        farthest = MP.findroot(lambda phi: slope(self.S, phi), (near, near + MP.mpf("0.01")))
+        return {"head_overrun": -HEAD * slope(self.S, farthest, 2) * SHAFT**2 / own["stiffness"]}
+
 
 def corner(opposite, one, other):
     return MP.acos((one**2 + other**2 - opposite**2) / (2 * one * other))
@@ -204,6 +244,9 @@ class Frame:
             return MP.mpf(0) if sense else (own["T2"] if u else -own["T1"])
         return -own["T1"] * (1 - 2 * lowered) if lowered < 0.5 else own["T2"] * (2 * lowered - 1)
 
+    def spring_inertia(self, own, theta):
+        return own["mass"] / 3 * slope(self.X, theta, 2) * SPEED**2
+
     def coil(self, own):
         """Return the figures and margins of one of the coils, full loops turned up from the last coil."""
         K1, X0, d, D, n = self.v["K1"], self.v["X0"], own["wire"], own["diameter"], own["turns"]
@@ -242,9 +285,14 @@ def knows(job, effect):
     return effect == "centrifugal" or hasattr(MACHINES.get(job), effect)
 
 
+@functools.cache
+def machine_of(job, design):
+    return MACHINES[job](design)
+
+
 def value(job, effect, example, design, angle, what):
     """Return a term, N or N·m, or a figure or row `what` of an effect, SI; angle: deg, "" where none counts."""
-    own, machine = {key: number(text) for key, text in example.items()}, MACHINES[job](design)
+    own, machine = {key: number(text) for key, text in example.items()}, machine_of(job, design)
     if not angle:
         return float(getattr(machine, effect)(own)[what])
     return float(getattr(machine, effect if what == "term" else what)(own, MP.mpf(angle) * PI / 180))
@@ -258,6 +306,7 @@ CASES = {
     ("beatup", "rod_inertia", "term"): "30 200",
     ("beatup", "gravity", "term"): "30",
     ("beatup", "bearing_friction", "term"): "30 200",
+    ("beatup", "shaft_torsion", "term"): "30 75 195",
     ("beatup", "centrifugal", "bearing_force"): "30",
     ("beatup", "centrifugal", "shaking_force"): "30",
     ("rapier", "head_inertia", "term"): "100 250",
@@ -265,6 +314,7 @@ CASES = {
     ("shedding", "weight", "term"): "30",
     ("shedding", "warp_tension", "term"): "30 90 150 200 290 330",
     ("shedding", "inertia", "term"): "30 200",
+    ("shedding", "spring_inertia", "term"): "30 200",
     ("shedding", "damping", "term"): "30 200",
     ("shedding", "dry_friction", "term"): "30 150 200 330",
 }
@@ -275,6 +325,7 @@ def rows(examples):
     cases = {case: angles.split() for case, angles in CASES.items()}
     coil = {key: number(text) for key, text in examples["shedding"]["coil"][0].items()}
     cases |= {("shedding", "coil", what): [""] for what in Frame("today").coil(coil)}
+    cases |= {("rapier", "tape_stretch", "head_overrun"): [""]}
     for (job, effect, what), angles in cases.items():
         for k, example in enumerate(examples[job][effect]):
             for design, angle in itertools.product(("today", "other"), angles):

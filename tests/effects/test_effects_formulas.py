@@ -9,10 +9,15 @@ import pytest
 from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.effects import found as declared
-from loomopt.effects.kinds import Check, Load
+from loomopt.effects.kinds import Check, Load, Speed
 from loomopt.mechanisms import crank_rocker
 
-BEATUP = declared.of("loomopt.effects.beatup")
+BEATUP = {
+    name: effect
+    for name, effect in declared.of("loomopt.effects.beatup").items()
+    if isinstance(effect, Load | Check | Speed)
+}
+"""Those with a formula of an instant; what a state passes on has tests of its own."""
 GIVEN = {
     "l1": 0.031,
     "l2": 0.066,
@@ -28,6 +33,7 @@ GIVEN = {
     "r4": 0.045,
     "beta": 1.15,
     "beta_r": 1.11,
+    "no_load_speed": 63.5,
 }
 OWN = {
     "inertia": {"J4": 0.62},
@@ -38,6 +44,7 @@ OWN = {
     "gravity": {"tilt": 0.3, "offset": 0.1},
     "bearing_friction": {"coulomb": 5.0, "viscous": 0.7},
     "centrifugal": {},
+    "speed_fluctuation": {"motor_torque": 35.0, "slip": 0.08, "flywheel": 2.0},
 }
 SYSTEMS = (maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy())
 G = 9.80665
@@ -49,6 +56,8 @@ def cases():
         if isinstance(effect, Check):
             for key, quantity in effect.quantities.items():
                 yield f"{name}: {key}", quantity, OWN[name]
+        elif isinstance(effect, Speed):
+            yield name, driving(effect), OWN[name]
         elif name == "rod_inertia":
             for model in ("lumped", "exact"):
                 yield f"{name}: {model}", switched(effect, 1), OWN[name] | {"model": model}
@@ -61,6 +70,18 @@ def cases():
 
 def switched(effect, switch):
     return lambda system, pose, given, own: effect.force(system, pose, given, own, switch)
+
+
+def driving(effect):
+    """Return what a motor leaves for the crank."""
+
+    def left(system, pose, given, own):
+        flywheel = effect.flywheel(given, own)
+        return effect.motor(system, pose.omega, given, own) - flywheel * (
+            0 if pose.omega_dot is None else pose.omega_dot
+        )
+
+    return left
 
 
 CASES = {label: (function, own) for label, function, own in cases()}
@@ -111,6 +132,7 @@ EXPECTED = {
     "gravity": -G * UNBALANCED * math.cos(-Q + 0.3 + 0.1),
     "rod_inertia: lumped": 4.0 * (0.03 / 0.065) * 0.155**2 * Q1 * ACCELERATION
     + 4.0 * (1 - 0.03 / 0.065) * 0.031**2 * RATE,
+    "speed_fluctuation": 35 / (0.08 * GIVEN["speed"]) * (63.5 - SPEED) - 2 * RATE,
     "centrifugal: bearing_force": UNBALANCED * (Q1 * SPEED) ** 2,
     "centrifugal: shaking_force": UNBALANCED * math.hypot((Q1 * SPEED) ** 2, ACCELERATION),
 }

@@ -1,7 +1,9 @@
 """Reference rows of every effect of every job: a new algebraic effect is its file and its rows here.
 
 tests/data/effects.csv: job, effect, which of its examples, the design (today's, or the job's other one below), crank
-angle in deg, what ("term" of a load; a check's figure or row, by name; a row has no angle), value in SI.
+angle in deg, what ("term" of a load; a check's figure or row, a figure of the crank's own speed or of an event, by
+name; only a term and a check's figure have an angle), value in SI. What an effect needs beside it has its
+first example.
 """
 
 import csv
@@ -14,7 +16,7 @@ import pytest
 
 from loomopt import maths
 from loomopt.cycle import Node
-from loomopt.effects.kinds import Check
+from loomopt.effects.kinds import Check, Event, Speed
 from loomopt.jobs import registry
 
 ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[1] / "data" / "effects.csv").open())]
@@ -33,13 +35,21 @@ OTHER = {
 @functools.cache
 def sampled(job, effect, example, design):
     """Return the packaged machine with the effect at its example, ready to be read."""
-    values = dict(EFFECTS[job, effect].examples[example])
-    scene = registry.load(job).set(f"effects.{effect}", values)
-    return registry.find(job).sampler(scene, OTHER[job] if design == "other" else {})
+    return registry.find(job).sampler(scene_of(job, effect, example), OTHER[job] if design == "other" else {})
+
+
+def scene_of(job, effect, example):
+    """Return the packaged scene with the effect at its example, and what it needs beside it."""
+    names = dict.fromkeys(EFFECTS[job, effect].beside, 0) | {effect: example}
+    return registry.load(job).update({f"effects.{n}": dict(EFFECTS[job, n].examples[k]) for n, k in names.items()})
 
 
 def asked(effect):
     """Return what an effect must have rows of, for each of its examples."""
+    if isinstance(effect, Speed):
+        return set(effect.rows)
+    if isinstance(effect, Event):
+        return {figure.name for figure in effect.figures}
     return {*effect.quantities, *effect.rows} if isinstance(effect, Check) else {"term"}
 
 
@@ -54,7 +64,9 @@ def test_every_effect_has_its_rows(job, name):
 def test_an_effect_says_what_its_row_does(row):
     job, effect, example, design, angle, what, value = row
     found = sampled(job, effect, int(example), design)
-    if not angle:
+    if isinstance(EFFECTS[job, effect], Event):
+        read = registry.find(job).parted(scene_of(job, effect, int(example)), found).figures[what]
+    elif not angle:
         read = found.static[what]
     else:
         phi = math.radians(float(angle))

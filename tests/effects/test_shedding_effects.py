@@ -44,6 +44,9 @@ def scene_of(names):
 
 
 def pose(**values):
+    """Return a pose that knows what it is given; with a segment, its direction."""
+    if "segment" in values:
+        values["direction"] = {RISE: 1, RETURN: -1}.get(values["segment"], values.get("worst"))
     return SimpleNamespace(**values)
 
 
@@ -236,3 +239,9 @@ def test_linear_tension_bends_in_the_middle_of_the_shed_and_does_not_jump():
     X, term = columns["X [m]"], columns["warp_tension [N]"]
     slopes = [(term[k + 1] - term[k]) / (X[k + 1] - X[k]) for k in (here[0] - 1, here[1])]
     assert slopes == pytest.approx([2 * T1 / H, 2 * T2 / H], rel=1e-9)
+
+
+@pytest.mark.parametrize(("mass", "K1"), [("0.5 kg", 103046.7075553571), ("1.5 kg", 103934.9039080821)])
+def test_a_third_of_the_springs_mass_moves_with_the_frame(mass, K1):
+    scene = lo.load("shedding").set("effects.spring_inertia.mass", mass)
+    assert lo.solve(scene, starts=1).design["K1"] == pytest.approx(K1, rel=1e-10)

@@ -35,9 +35,9 @@ def test_own_scenes_are_read_without_a_scan(name, scans):
     registry.template(scene.job)
     registry.results(scene)
     check.named([name])
-    for effect in scene.schema.effects:
-        if effect in scene.document.get("available", {}):
-            scene.with_effect(effect)
+    for name, effect in scene.schema.effects.items():
+        if name in scene.document.get("available", {}):
+            scene.with_effect(*effect.beside, name)
     assert scans == []
 
 

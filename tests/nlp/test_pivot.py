@@ -85,6 +85,20 @@ def bound(rows, upper=(), lower=()):
             bound([1, 0]),
             [0.3, 0.3],
         ),
+        (
+            "of a limit on the opposite bound, where both cannot be met any more, one lets go",
+            programme([-2, -1], 0, [[1, 0], [0, 1]], [0.5, 1]),
+            call([0, 1], lower=0.0, rows=2),
+            bound([1, 1], lower=[0]),
+            [0.5, 1],
+        ),
+        (
+            "of two opposite rows, where both cannot be met any more, one lets go",
+            programme([-2, -1], 0, [[1, 0], [-1, 0], [0, 1]], [0.5, 0.5, 1]),
+            call([0, 1], rows=3),
+            bound([1, 1, 1]),
+            [0.5, 1],
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

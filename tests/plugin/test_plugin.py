@@ -7,6 +7,8 @@ import math
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 OPTIMUM = {"crank": 0.1, "rod": 0.5}
 """Stroke of 200 mm, reach of 600 mm: both bind."""
 

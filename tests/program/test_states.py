@@ -14,7 +14,6 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
 from loomopt import maths
-from loomopt.balance import total
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Load, State
 from loomopt.nlp import exchange
@@ -36,15 +35,13 @@ class ArmTable(Table):
 def harmonics(system, given, own, carried):
     """Return mean and first harmonic of the carried force, the latter times 1 / (1 − ratio²)."""
     angles = [2 * system.pi * k / SAMPLES for k in range(SAMPLES)]
-    forces = [carried(angle, {})[1] for angle in angles]
-    gain = 1 / (1 - own["ratio"] ** 2)
-    cosines = total([force * system.cos(angle) for force, angle in zip(forces, angles, strict=True)])
-    sines = total([force * system.sin(angle) for force, angle in zip(forces, angles, strict=True)])
-    share = gain * 2 / SAMPLES
-    return {"arm.mean": total(forces) / SAMPLES, "arm.cosine": share * cosines, "arm.sine": share * sines}
+    weights = [[1 for _ in angles], [system.cos(angle) for angle in angles], [system.sin(angle) for angle in angles]]
+    mean, cosines, sines = carried.weigh(angles, weights)
+    share = 2 / (1 - own["ratio"] ** 2) / SAMPLES
+    return {"arm.mean": mean / SAMPLES, "arm.cosine": share * cosines, "arm.sine": share * sines}
 
 
-def passed_on(system, pose, given, own, switch):
+def passed_on(system, pose, given, own, reply):
     return given["arm.mean"] + given["arm.cosine"] * system.cos(pose.phi) + given["arm.sine"] * system.sin(pose.phi)
 
 
@@ -59,6 +56,11 @@ ARM = State(
     carries=("inertia", "spring"),
     derived=harmonics,
     force=passed_on,
+    coordinate=lambda *_: 0,
+    motion=lambda written, own: (0, 0),
+    term=lambda written, own: 0,
+    between=("x_a", "x"),
+    rests=lambda own: "two harmonics are all there are",
 )
 DRAG = Load(name="drag", summary="", own=Table, acts="drive", force=drag)
 STIFF = JobModel(

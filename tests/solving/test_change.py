@@ -13,6 +13,7 @@ from loomopt.mechanisms.cam_spline import spline
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Move, Wish
 from loomopt.solving import change
+from loomopt.solving.certificate import certify
 from loomopt.solving.change import with_least_change
 from loomopt.solving.search import Search, judged, objectives, tried
 
@@ -116,6 +117,25 @@ def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
     assert best.certificate.change is None
 
 
+def test_a_design_that_has_changed_least_already_stays_to_the_last_bit_and_is_not_certified_again(monkeypatch):
+    certified = []
+
+    def counted(*asked):
+        certified.append(asked)
+        return certify(*asked)
+
+    monkeypatch.setattr(change, "certify", counted)
+    program = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (1.0, 9.0)})
+    first = solved(program, {"x": 4.0, "y": 3.0}, {"y": 2.0}).best
+    assert len(certified) == 1
+    again = solved(program, first.x, {"y": first.x["y"]}).best
+    assert len(certified) == 1
+    assert again.x["y"] == first.x["y"]
+    assert again.certificate.passed
+    assert again.certificate.settled == (f"y: {LEAST}",)
+    assert again.certificate.change.stationarity <= 1e-6
+
+
 # Machines --------------------------------------------------------------------------------------------------------
 
 
@@ -155,6 +175,7 @@ def test_no_angles_nearer_to_todays_hold_as_weak_a_spring(unsettled):
     assert nearer > 10
 
 
+@pytest.mark.slow
 def test_a_law_that_need_not_change_is_todays_sampled_but_for_its_end():
     scene = lo.load("shedding").set("operation.speed", "100 rpm")
     answer = lo.solve(scene, "law", starts=1)

@@ -146,3 +146,11 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
     assert set(without) <= set(named)
     if rows <= size and np.linalg.svd(gradients[:rows], compute_uv=False)[-1] * prices.min() > 1e-4:
         assert named == []
+
+
+def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
+    """Slopes (1, 0), twice that, and (0, 1): the first two can stand for each other, the third for none."""
+    gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
+    one = System(((3,),), (0, 1, 2), (), np.zeros((0, 4)))
+    found = Multipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
+    assert replaceable(gradients, one, found, STATIONARY) == [0, 1]

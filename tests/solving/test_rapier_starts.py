@@ -6,7 +6,9 @@ import pytest
 
 import loomopt as lo
 
-STARTS = 30
+pytestmark = pytest.mark.slow
+
+STARTS = 16
 
 
 @pytest.fixture(scope="module")

@@ -114,6 +114,7 @@ def test_effects_change_the_load_and_not_the_optimum(scene, best, effects):
 LOADED = {"peak_jerk": ("1.16", "m/rad^3"), "peak_torque": ("9.9", "N*m")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOADED)
 def test_a_limit_on_jerk_force_or_torque_is_held_and_priced(scene, best, name):
     loaded = scene.with_effect("head_inertia").with_effect("tape_friction")

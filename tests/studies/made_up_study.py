@@ -4,15 +4,15 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
-from loomopt.studies.runs import Task
 
 
 @dataclass(frozen=True)
 class Chain:
     """Rounds of eight points; each adds its number to the value of its parent, eight points before.
 
-    log: every solve appends its point; raises, kills, kills_once: points that do.
+    log: every solve appends its point; raises, kills, kills_once: points that do; long: points that take long.
     """
 
     log: Path
@@ -20,12 +20,13 @@ class Chain:
     raises: tuple[int, ...] = ()
     kills: tuple[int, ...] = ()
     kills_once: tuple[int, ...] = ()
+    long: tuple[int, ...] = ()
     key: str = "made up"
 
     def batch(self, rows):
         first = len(rows)
         points = range(first, min(first + 8, self.count))
-        return [Task(k, k - 8 if k >= 8 else None, {"k": float(k)}, {"add": k}) for k in points]
+        return [Task(k, k - 8 if k >= 8 else None, {"k": float(k)}, {"add": k}, 1 + (k in self.long)) for k in points]
 
     def solved(self, task, parent):
         with self.log.open("a") as file:

@@ -12,9 +12,11 @@ from loomopt.jobs.shedding import design as limit_law
 from loomopt.studies import accuracy, digits, optima, readings
 from loomopt.studies.ladders import Ladder, Outcome, Reference, Row, climbed, grouped, knee, order
 from loomopt.studies.subject import Target
-from loomopt.tolerances import NO_ORDER
+from loomopt.studies.tolerances import NO_ORDER
 from loomopt.views import accuracy_figure
 from tests.views import overlaps
+
+pytestmark = pytest.mark.slow
 
 SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))
 LINEAR_PROGRAMMES = {

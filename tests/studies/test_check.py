@@ -1,5 +1,6 @@
 """The check against the reference results: it reproduces, and names every kind of difference."""
 
+import re
 import shutil
 
 import pytest
@@ -14,6 +15,8 @@ from loomopt.studies import check as study
 
 NAME = "beatup-light"
 BALANCE = f"{NAME}.balance.csv"
+FRONTS = [("beatup", "peak_torque", "m4e"), ("rapier", "peak_acceleration", "dwell"), ("shedding", "K1", "X0")]
+"""Scene and axes of the front that stands for each job."""
 
 
 @pytest.fixture
@@ -66,7 +69,9 @@ def scaled(by):
     return lambda value: repr(float(value) * (1 + by))
 
 
-def test_all_packaged_results_are_reproduced(capsys):
+@pytest.mark.slow
+def test_all_packaged_results_are_reproduced(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
     assert run(["check"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -74,6 +79,8 @@ def test_all_packaged_results_are_reproduced(capsys):
         for target in study.served(load(name)):
             line = next(line for line in out.splitlines() if line.split()[:2] == [name, target])
             assert line.endswith("reproduces")
+    for name, first, second in FRONTS:
+        assert re.search(rf"^{name} +{first} against {second} +optimal +reproduces$", out, re.MULTILINE)
 
 
 def test_targets_that_need_what_a_scene_lacks_are_left_out():
@@ -83,6 +90,7 @@ def test_targets_that_need_what_a_scene_lacks_are_left_out():
 
 def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
     wanted = {f"{name}.{target}.csv" for name in packaged.problem_names() for target in study.served(load(name))}
+    wanted |= {f"{name}.{first}-against-{second}.csv" for name, first, second in FRONTS}
     assert {path.name for path in packaged.results_path().iterdir()} == wanted
     for path in packaged.results_path().iterdir():
         head = dict(line[2:].split(": ", 1) for line in path.read_text().splitlines() if line.startswith("# "))

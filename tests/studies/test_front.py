@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import pickle
+import re
 
 import pytest
 
@@ -11,6 +12,7 @@ import loomopt as lo
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.studies import front, front_plan, runs
+from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 
 RPM = math.pi / 30
@@ -25,7 +27,7 @@ def ends(trade):
 def at(trade, value, parent, **more):
     """Return the row with the second axis held at a value, from a parent; cold without one."""
     ask = {"also": [], "held": (parent.warm["held"] if parent else []), "wide": False} | more
-    task = runs.Task(99, parent.point if parent else None, {trade.axes[1]: value}, ask)
+    task = Task(99, parent.point if parent else None, {trade.axes[1]: value}, ask)
     return trade.solved(task, parent)
 
 
@@ -243,6 +245,32 @@ def test_stiffness_against_speed():
     assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
     assert found.changes[0]["kind"] == "kink"
     assert found.values("speed")[-1] == pytest.approx(900 * RPM)
+
+
+def test_the_end_of_an_axis_that_has_one_need_not_be_named():
+    rapier = lo.load("rapier")
+    alone = front.trade(rapier, ("peak_acceleration", "dwell"))
+    assert alone.senses == ("least", "most")
+    assert alone.key == front.trade(rapier, ("peak_acceleration", "dwell"), maximise=("dwell",)).key
+    with pytest.raises(BadInput, match="of dwell the most can be sought, not the least"):
+        front.trade(rapier, ("peak_acceleration", "dwell"), minimise=("dwell",))
+    assert front.trade(lo.load("shedding"), ("K1", "X0"), ranges={"X0": (0.02, 0.08)}).senses == ("least", "least")
+
+
+@pytest.mark.parametrize(
+    ("axis", "low", "high", "reached"),
+    [
+        ("m4e", 50.0, 60.0, "6.28604 kg"),
+        ("m4e", -5.0, -1.0, "0 kg"),
+        ("peak_torque", 10.0, 20.0, "88.6894 N*m"),
+        ("peak_torque", 100.0, 120.0, "96.5404 N*m"),
+    ],
+)
+def test_a_range_that_no_point_lies_in_is_told(axis, low, high, reached):
+    study = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance", ranges={axis: (low, high)}, points=4)
+    with pytest.raises(BadInput, match=re.escape(f"lies in the range; it comes to {reached}")) as error:
+        runs.run(study)
+    assert error.value.key == axis
 
 
 def test_two_axes_that_do_not_conflict():

@@ -44,6 +44,23 @@ def test_threads_and_processes_give_the_same_digest(chain):
     assert digest(runs.run(chain, executors.workers(2))) == expected
 
 
+def test_workers_begin_each_round_with_the_points_that_take_long(chain):
+    expected = digest(runs.run(chain))
+    long = replace(chain, log=chain.log.with_name("long"), long=(3, 14))
+    with ThreadPoolExecutor(1) as alone:
+        assert digest(runs.run(long, alone)) == expected
+    assert long.solves()[:3] == [3, 0, 1]
+    assert long.solves()[8:11] == [14, 8, 9]
+
+
+def test_a_worker_has_imported_what_solves_need_before_its_first_task():
+    pool = executors.workers(1)()
+    try:
+        assert pool.submit(eval, f"set({executors.NEEDED}) <= set(__import__('sys').modules)").result()
+    finally:
+        pool.shutdown()
+
+
 def test_a_point_that_fails_is_a_row_with_its_reason_and_the_others_go_on(chain):
     rows = runs.run(replace(chain, raises=(3,)))
     assert (rows[3].status, rows[3].reason, rows[3].certified) == ("failed", "no such point", False)

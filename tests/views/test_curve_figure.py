@@ -52,7 +52,7 @@ def drawn(name, kind):
             for c in map(str, table)
             if c.startswith(f"{v} [")
         }
-    return outputs.plotted(tables.curves(scene, design), scene, design, target)
+    return outputs.plotted(tables.curves(scene, design), scene, design, f"design for {target}" if design else "")
 
 
 def titled(figure):

@@ -3,6 +3,8 @@
 Output term M_R = M0 cos(π(φ−β)/δ) for |φ−β| ≤ δ/2, else 0 [Yuan24, eq 3-4]; the corners move with the design.
 """
 
+from typing import TYPE_CHECKING
+
 from pydantic import Field
 
 from loomopt.effects.beatup import ReedPose
@@ -10,6 +12,9 @@ from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
 from loomopt.quantities import PulseAngle
 from loomopt.schema import Table, Values
+
+if TYPE_CHECKING:
+    from loomopt.effects.steady import Oscillator
 
 
 class Own(Table):
@@ -35,6 +40,28 @@ def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Numb
     return switch * given["M0"] * maths.cos(maths.pi * (pose.phi - given["beta"]) / own["pulse"])
 
 
+def response(
+    maths: Maths, oscillator: "Oscillator", pose: ReedPose, given: Values, own: Values, switch: Number
+) -> tuple[Number, Number]:
+    """Return z, rad, and z˙ in answer to the pulse M0 cos Ωt, |t| ≤ τ, once a turn.
+
+    A cos Ωt + B sin Ωt inside, and the free vibrations that begin at both corners, each with z = B and z˙ = −A Ω: there
+    the answer to the cosine sets in, or falls away. The branch of t = (φ−β)/ω jumps where the other formula holds.
+    """
+    frequency, half = maths.pi * pose.omega / own["pulse"], own["pulse"] / (2 * pose.omega)
+    along, across = (given["M0"] * share for share in oscillator.steady(frequency))
+    angle, side = pose.phi - given["beta"], 2 * switch - 1
+    turned = maths.atan2(side * maths.sin(angle), side * maths.cos(angle)) + (1 - switch) * maths.pi
+    time = turned / pose.omega
+    cosine, sine = maths.cos(frequency * time), maths.sin(frequency * time)
+    corner = oscillator.repeated(across, -along * frequency)
+    first = oscillator.ringing(corner, time + half)
+    second = oscillator.ringing(corner, time - half + switch * oscillator.turn)
+    position = switch * (along * cosine + across * sine) + first[0] + second[0]
+    rate = switch * frequency * (across * cosine - along * sine) + first[1] + second[1]
+    return position, rate
+
+
 EFFECT = Load(
     name="resistance",
     summary="beating-up resistance of the cloth",
@@ -45,6 +72,7 @@ EFFECT = Load(
     force=force,
     needs=("operation.M0",),
     corners=corners,
+    response=response,
     symbol="M_R",
     switch=switch,
     examples=({"pulse": "29.8 deg"},),

@@ -21,6 +21,10 @@ class FramePose(Protocol):
         """Which end of what is not determined is meant."""
 
     @property
+    def direction(self) -> Number:
+        """Sign of X˙; at rest which end of [−1, 1] is meant."""
+
+    @property
     def q(self) -> Number:
         """X, m."""
 

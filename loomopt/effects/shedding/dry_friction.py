@@ -21,7 +21,7 @@ class Own(Table):
 
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
     """Return F sgn X˙, N; in a dwell its worst value."""
-    return own["F"] * maths.choose(pose.segment, (1, pose.worst, -1, pose.worst))
+    return own["F"] * pose.direction
 
 
 EFFECT = Load(

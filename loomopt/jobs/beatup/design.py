@@ -65,6 +65,7 @@ def figures(
     found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
     found["mu_min"] = min(static["mu_near"], static["mu_far"])
     found |= {name: sampled.peak(name) for name in sampled.model.quantities}
+    found |= {name: -sampled.peak(name) for name in sampled.model.least}
     weights = scene.table(RetrofitTarget).weights
     widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
     changes = [

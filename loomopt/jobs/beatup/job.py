@@ -26,7 +26,7 @@ class Beatup(Job):
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the crank-rocker with the effects the scene calls for."""
-        return programs.model(scene)
+        return programs.model(scene, self.numbers(scene), design)
 
     def program(self, scene: Scene, target: str) -> Program:
         """Return a target as a task. Raises BadInput."""
@@ -69,7 +69,7 @@ class Beatup(Job):
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""
-        return {name: name for name in model.quantities} | {"mu_min": "obliquity"}
+        return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum is worth."""

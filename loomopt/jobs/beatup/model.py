@@ -56,18 +56,14 @@ class FrontPose(Motion):
 
     maths: Maths
     values: Values
-    omega_dot: None = None
+    omega: Number
+    omega_dot: Number
     q1: int = 0
 
     @property
     def phi(self) -> Number:
         """β, rad."""
         return self.values["beta"]
-
-    @property
-    def omega(self) -> Number:
-        """Crank speed, rad/s."""
-        return self.values.get("speed")
 
     @property
     def q(self) -> Number:
@@ -123,11 +119,11 @@ class CrankRocker:
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedPose:
         """Return the pose at crank angles φ, rad."""
         pose = crank_rocker.Pose(maths, given.values["lengths"], node.phi)
-        return ReedPose(node.phi, given.values.get("speed"), pose)
+        return ReedPose(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
         """Return the pose at front dead centre."""
-        return FrontPose(maths, given.values)
+        return FrontPose(maths, given.values, given.values.get("speed"), given.values.get("omega_dot"))
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Return both dead centres, rad."""
@@ -156,12 +152,16 @@ def change(names: Collection[str], at: Instant) -> Number:
     return balance.total([v[f"weight.{x}"] * ((v[x] - v[f"today.{x}"]) / v[f"width.{x}"]) ** 2 for x in names])
 
 
+def _front(at: Instant) -> Motion:
+    return at.model.kinematics.still(at.maths, at.given, FRONT, {})
+
+
 ROWS: dict[str, Row] = {
     "swing": Row(lambda at: at.values["centres"].swing),
     "theta": Row(lambda at: at.values["centres"].theta),
     "beta": Row(lambda at: at.values["centres"].beta),
     "M3_fdc": Row(lambda at: at.force, event=FRONT),
-    "alpha_fdc": Row(lambda at: at.values["centres"].psi_2_front * at.values["speed"] ** 2, ("speed",)),
+    "alpha_fdc": Row(lambda at: at.values["centres"].psi_2_front * _front(at).omega ** 2, ("speed",)),
     "r4": Row(eccentricity, ("m4", "r4", "m4e")),
     "r4e_square": Row(lambda at: at.values["r4e"] ** 2),
 }

@@ -17,7 +17,7 @@ from loomopt.program import numbers as scene_numbers
 from loomopt.program.drive import TORQUE
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
+from loomopt.program.program import Limit, Move, Numbers, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
@@ -34,14 +34,14 @@ MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 
 
-def model(scene: Scene, known: Mapping[str, float] | None = None, changes: bool = False) -> JobModel:
-    """Return the mechanism with the effects the scene calls for; known: its numbers, where they are at hand.
+def model(scene: Scene, known: Mapping[str, float], design: Numbers | None = None, changes: bool = False) -> JobModel:
+    """Return the mechanism with the effects the scene calls for; known: its numbers; design: what is not today's.
 
     changes: whether the change from today is read.
     """
-    names = frozenset(known or numbers(scene))
     changing = tuple(VARIABLES) if changes else ()
-    return beatup.model(scene.active, scene_numbers.words(scene), names, RESISTED, changing)
+    found = beatup.model(scene.active, scene_numbers.words(scene), frozenset(known), RESISTED, changing)
+    return scene_numbers.settled(scene, found, known, design)
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -59,7 +59,7 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     known = numbers(scene)
     limited = scene_numbers.bounds(scene, known)
     changes = target == "retrofit" or "change" in (traded or ())
-    physics = model(scene, known, changes)
+    physics = model(scene, known, changes=changes)
     sizes = _Sizes(scene, known, limited)
     direct = traded is not None or _reads_counterweight(scene, target, limited)
     variables = _variables(scene, sizes, limited, direct)
@@ -124,10 +124,10 @@ class _Sizes:
         if name == TORQUE:
             return self.peak
         if self.sampler.model.has_quantity(name):
-            return self.sampler.peak(name) or 1.0
+            return abs(self.sampler.peak(name)) or 1.0
         kind = self.scene.schema.figures[name].kind
         fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
-        return fixed.get(kind) or abs(self.sampler.static[name]) or 1.0
+        return fixed.get(kind) or scene_numbers.figure_size(self.sampler, name)
 
 
 def _reed(sampler: Sampler) -> list[float]:

@@ -13,7 +13,7 @@ from loomopt.program import drive
 from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Figure, Table, Target
+from loomopt.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.units import Shown, usual
 
 
@@ -131,5 +131,6 @@ SCHEMA = SceneSchema(
     check=check,
     fault=fault,
     own_axes=AXES,
+    conflict=Conflict(("peak_torque", "m4e"), "balance"),
     own_margins=dict.fromkeys(CrankRocker().groups[""].margins, "length"),
 )

@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from loomopt.cycle import TURN
+from loomopt.effects.kinds import State
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.maths import FLOAT
 from loomopt.picture.job_views import JobViews
+from loomopt.program.curves import tops
 from loomopt.scenes import Scene
 
 if TYPE_CHECKING:
@@ -47,7 +49,15 @@ class BeatupViews(JobViews):
         for pulse in model.integrals:
             begins, ends = sampler.cycle.stretch(pulse.where)
             found |= {"pulse begins": begins, "pulse ends": ends}
-        return found
+        return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
+
+    def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
+        """Return what there is to remark upon: a reed that twists away while it beats up."""
+        if not any(isinstance(effect, State) for effect in scene.active):
+            return ()
+        from loomopt.picture.twisted import twisted
+
+        return twisted(scene, registry.of(scene).sampler(scene, design))
 
     def words(self) -> "Mapping[str, Curve]":
         """Return what the curves are called."""
@@ -58,6 +68,8 @@ class BeatupViews(JobViews):
             "psi_1": Curve("rocker speed"),
             "psi_2": Curve("rocker acceleration"),
             "psi_tt": Curve("rocker acceleration", at={FRONT: "alpha_fdc"}),
+            "psi_r": Curve("reed angle", least="reed_front"),
+            "twist": Curve(peak="twist_peak"),
             "mu": Curve("transmission angle", least="mu_min"),
             "M3": Curve("reed torque", at={FRONT: "M3_fdc"}),
             "Md": Curve("crank torque", peak="peak_torque"),

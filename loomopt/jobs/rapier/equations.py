@@ -73,4 +73,6 @@ def _pose() -> balance.Pose:
 
 def _forces(model: JobModel) -> list[Equation]:
     """Write each term that is on, their balance and the crank torque, and the checks."""
-    return effect_equations.forces(model, _pose(), effect_equations.given(model, Symbols()), "Q", "Q")
+    return effect_equations.forces(
+        model, _pose(), effect_equations.given(model, Symbols(speed=symbol("omega"))), "Q", "Q"
+    )

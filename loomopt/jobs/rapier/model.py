@@ -29,6 +29,10 @@ SLEY = ("l1", "l2", "l3", "l71")
 DWELL = "dwell"
 BEFORE, AFTER = -1.0, 1.0
 """Switch of the dwell arcs on either side of front dead centre."""
+STROKE = "S''_stroke"
+"""S'' at the hand-over, m/rad², which effects may call in."""
+HAND_OVER = "hand-over"
+"""Where the head is farthest out, rad, where that is no number of the program."""
 TURNS = "turns"
 """The event of the head's turning, which effects may call in."""
 JERK_NODES = 64
@@ -122,6 +126,10 @@ class RapierDrive:
         stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
         front = rapier_drive.Pose(maths, dimensions, stand, 0).relative
         found |= {"front_x": front.x, "front_y": front.y}
+        if STROKE in called:
+            given = Given({**values, **found}, {})
+            farthest = values["phi_stroke"] if "phi_stroke" in values else values.get(HAND_OVER, 0)
+            found[STROKE] = self.pose(maths, given, Node(farthest, {})).q2
         if TURNS in called:
             given = Given({**values, **found}, {})
             hints = [values[name] for name in itertools.takewhile(values.__contains__, map(_turn, itertools.count()))]
@@ -139,17 +147,24 @@ class RapierDrive:
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
         joints = rapier_drive.Pose(maths, values["dimensions"], stand, node.phi)
-        return HeadPose(joints, Vector(values["front_x"], values["front_y"]), values.get("speed"))
+        return HeadPose(
+            joints, Vector(values["front_x"], values["front_y"]), values.get("speed"), values.get("omega_dot")
+        )
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
-        """Return where the head turns, the first turn onto its way out; nothing where no load calls that in."""
-        if TURNS not in called:
+        """Return where the head turns, the first turn onto its way out, and where it is farthest, if called in."""
+        if not {TURNS, STROKE} & set(called):
             return {}
 
         def slope(phi: Floats) -> Number:
             return self.pose(systems.numpy(), given, Node(phi, {})).q1
 
-        return {_turn(k): angle for k, angle in enumerate(turning_points.turns(slope))}
+        turns = turning_points.turns(slope)
+        found = {_turn(k): angle for k, angle in enumerate(turns)} if TURNS in called else {}
+        if STROKE in called and "phi_stroke" not in given.values:
+            travels = {angle: float(self.pose(systems.FLOAT, given, Node(angle, {})).q) for angle in turns}
+            found[HAND_OVER] = max(travels, key=travels.__getitem__, default=0.0)
+        return found
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> HeadPose:
         """Return the pose at front dead centre, where φ1 counts from."""
@@ -212,6 +227,7 @@ ROWS: dict[str, Row] = {
     "phi_stroke": Row(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
     "rest": Row(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
     "stroke_short": Row(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
+    "reach": Row(lambda at: _at_stroke(at).q, ("phi_stroke",)),
     "dwell": Row(lambda at: at.values["dwell"], ("dwell",)),
     "dwell_rest": Row(lambda at: at.maths.pi - at.values["dwell"], ("dwell",)),
 }

@@ -16,7 +16,7 @@ from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_drive, rapier_faults
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
-from loomopt.program.numbers import bound_limits, demanded, distinct, ends, inside, numbers
+from loomopt.program.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_errors import refusal
@@ -26,34 +26,51 @@ from loomopt.scenes import Scene
 FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
-ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far")}
-"""Figures that are the least of several smooth rows."""
-LOOSE = frozenset((DWELL, "dwell_after", "dwell_before", "stroke"))
+ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far"), "stroke": ("reach",)}
+"""Figures that are the least of several smooth rows, or a row of another name."""
+SIDES = {"dwell_before": BEFORE, "dwell_after": AFTER}
+LOOSE = frozenset((DWELL, *SIDES, "stroke"))
 """What is a number of its own where it is sought."""
 TOPS = Frozen(phi_stroke="S")
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
 
 
-def model(scene: Scene, asked: Collection[str] = (), read: bool = True) -> JobModel:
+def model(
+    scene: Scene, asked: Collection[str] = (), read: bool = True, dwelt: Collection[str] | None = None
+) -> JobModel:
     """Return the drive with the effects the scene calls for and what is asked; read: whether effects are.
 
-    asked: the target, or what is traded.
+    asked: the target, or what is traded; dwelt: dwells that are asked for, those of the operation without.
     """
     read_too = {*asked, *scene.limits}
     means = [jerk_mean()] if {"smooth", "rms_jerk"} & read_too else []
     means += [match_mean(*match_table(scene))] if {"match", "match_rms"} & read_too else []
     known = {*numbers(scene), *(("phi_stroke",) if asked else ()), *((DWELL,) if DWELL in asked else ())}
     effects = scene.active if read else ()
-    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), _arcs(scene, asked), tuple(means))
+    arcs = _arcs(asked, scene.operation if dwelt is None else dwelt)
+    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), arcs, tuple(means))
 
 
-def _arcs(scene: Scene, asked: Collection[str]) -> tuple[tuple[float, str], ...]:
+def _arcs(asked: Collection[str], dwelt: Collection[str]) -> tuple[tuple[float, str], ...]:
     """Return the sides on which there is a dwell, each with the value that it is."""
-    named = {BEFORE: "dwell_before", AFTER: "dwell_after"}
     if DWELL in asked:
-        return tuple((side, DWELL) for side in named)
-    return tuple((side, name) for side, name in named.items() if name in scene.operation)
+        return tuple((side, DWELL) for side in SIDES.values())
+    return tuple((side, name) for name, side in SIDES.items() if name in dwelt)
+
+
+def _dwells(scene: Scene, asked: Collection[str], kept: Collection[str]) -> Asked:
+    """Return what is asked of each dwell, rad, by name: by the operation, then by limits. Raises BadInput."""
+    least = {name: limit.min for name, limit in scene.limits.items() if name in (DWELL, *SIDES) and limit.min}
+    if DWELL in asked:
+        for name in (name for name in least if name in SIDES):
+            problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
+            raise refusal(problem, scene.origin, f"limits.{name}", remedy=remedy)
+        return {DWELL: [(DWELL, least[DWELL])]} if least else {}
+    found = {name: [(name, scene.operation[name])] if name in kept else [] for name in REQUIRED if name in SIDES}
+    for name, each in found.items():
+        each += [(by, least[by]) for by in (name, DWELL) if by in least]
+    return {name: each for name, each in found.items() if each}
 
 
 def demand(scene: Scene, target: str) -> None:
@@ -74,26 +91,33 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     limited = scene_numbers.bounds(scene, known)
     _demand_figures(scene, traded or ())
     asked = (target,) if traded is None else tuple(traded)
-    physics = model(scene, asked, _reads_effects(scene, asked))
     fallen = {DWELL: ("dwell_after", "dwell_before")}
     free_ends = {end for name in traded or () for end in fallen.get(name, (name,))}
     kept = [n for n in (scene.schema.targets[target].needs if target else ()) if n in known and n not in free_ends]
-    sampler = sampled(physics, {DWELL: 1.0, "phi_stroke": 0.0, **known})
-    labels = scene_numbers.labels(scene)
     free = {scene.full(name): bound.free for name, bound in scene.bounds.items()}
+    dwells = _dwells(scene, asked, [name for name in kept if not free.get(name)])
+    dwelt = {*known, *dwells}
+    physics = model(scene, asked, _reads_effects(scene, asked), dwelt)
+    sampler = sampled(physics, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(dwells, 1.0), **known})
+    labels = scene_numbers.labels(scene)
     variables = [_variable(name, limited[name], known, labels.get(name, "")) for name in limited if free.get(name)]
     named = {variable.name for variable in variables}
     limits = [limit for variable in variables for limit in bound_limits(variable)]
+    own = []
     for name in (name for name in kept if name not in named):
         variables.append(Variable(name, known[name], known[name], _size(name, known), (known[name],) * 2))
-        limits.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
+        own.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
+    wanted = [limit for limit in (*limits, *own) if limit.name in kept and limit.name in FIGURES]
     turn = (0.0, 2 * math.pi)
     variables.append(Variable("phi_stroke", *turn, 1.0, turn))
     variables += [_loose(name, known) for name in asked if name in LOOSE and name not in named]
-    reached = [*kept, *(name for name in asked if name in LOOSE)]
-    limits += _kept_limits(_arcs(scene, asked), reached, known)
+    variables, dwelling = floored(variables, dwells)
+    limits += [*(limit for limit in own if limit.name not in dwells), *dwelling]
+    reached = [*kept, *dwells, *(name for name in asked if name in LOOSE)]
+    limits += _kept_limits(_arcs(asked, dwelt), reached, known)
     limits += _margins(bool(set(SLEY) & named), known)
-    limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sampler)]
+    figures = [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sampler)]
+    limits += [each for each in figures if not implied(each, variables)]
     limits += demanded(scene, physics.checks, known, {})
     taken = {variable.name for variable in variables}
     parameters = {name: value for name, value in known.items() if name not in taken}
@@ -106,7 +130,7 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     objectives = (*levels, *(scene_numbers.least(sampler) if traded is None else ()))
     starts = _starts(variables, known)
     task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS
-    found = Program(*task, goals=goals(limit for limit in limits if limit.name in kept and limit.name in FIGURES))
+    found = Program(*task, goals=goals(wanted))
     return found, functools.partial(_axis_size, found, sampler)
 
 
@@ -190,12 +214,16 @@ def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
     """Return the limits on one figure, row by row."""
     if name == "mu_min" and limit.min is not None:
         return [Limit(name, -1, "obliquity", limit.min, 1.0, "cycle", complement=math.pi / 2)]
+    if name in (DWELL, *SIDES):
+        return []
     sides = ends(limit.min, limit.max)
     if sampler.model.has_quantity(name):
         size = sampler.peak(name) or 1.0
         return [Limit(name, sign, name, value, size, "cycle") for sign, value in sides]
     rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
-    size = sampler.single(name) if name == "rms_jerk" else 1.0
+    size = sampler.single(name) if name == "rms_jerk" else read(sampler).stroke if name == "stroke" else 1.0
+    if any(name in check.rows for check in sampler.model.checks):
+        size = max(abs(value) for _, value in sides) or 1.0
     return [Limit(name, sign, row, value, size, "static") for sign, value in sides for row in rows]
 
 

@@ -15,7 +15,7 @@ from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, Po
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Figure, Table, Target
+from loomopt.schema import Axis, Conflict, Figure, Table, Target
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""
@@ -78,10 +78,10 @@ VARIABLES = {
 FIGURES = {
     figure.name: figure
     for figure in (
-        Figure("stroke", "length", "largest head travel from front dead centre", sides=()),
-        Figure("dwell_after", "angle", "crank angle after front dead centre within s_dwell", sides=()),
-        Figure("dwell_before", "angle", "crank angle before front dead centre within s_dwell", sides=()),
-        Figure("dwell", "angle", "the lesser of both dwells", sides=()),
+        Figure("stroke", "length", "largest head travel from front dead centre"),
+        Figure("dwell_after", "angle", "crank angle after front dead centre within s_dwell", sides=("min",)),
+        Figure("dwell_before", "angle", "crank angle before front dead centre within s_dwell", sides=("min",)),
+        Figure("dwell", "angle", "the lesser of both dwells", sides=("min",)),
         Figure("peak_acceleration", "travel acceleration", "peak |S''| over the cycle", sides=("max",)),
         Figure("peak_jerk", "travel jerk", "peak |S'''| over the cycle", sides=("max",)),
         Figure("rms_jerk", "travel jerk", "rms S''' over the cycle", sides=("max",)),
@@ -133,15 +133,15 @@ def check(scene: Scene) -> None:
             key="mechanism",
             remedy="Correct its dimensions: today's machine must assemble at every crank angle.",
         )
-    dwells = [scene.operation.get(name, 0.0) for name in STROKE[2:]]
-    if sum(dwells) >= 2 * math.pi:
-        raise BadInput(
-            "both dwells together take the whole turn",
-            file=scene.origin,
-            key="operation.dwell_after, dwell_before",
-            allowed="less than 360 deg together",
-            remedy="Shorten them.",
-        )
+    for name in ("dwell", *STROKE[2:]):
+        least = scene.limits[name].min if name in scene.limits else None
+        if least is None:
+            continue
+        if "s_dwell" not in scene.operation:
+            raise refusal("a dwell needs s_dwell", scene.origin, "operation.s_dwell", remedy="Give it")
+        if not 0.0 < least < math.pi:
+            key, allowed = f"limits.{name}.min", "more than 0 deg and less than 180 deg"
+            raise refusal("it is no dwell", scene.origin, key, scene.given(key), allowed, "Correct the value")
 
 
 def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -167,6 +167,7 @@ SCHEMA = SceneSchema(
     check=check,
     fault=rapier_faults.named,
     own_axes=AXES,
+    conflict=Conflict(("peak_acceleration", "dwell"), "stroke-dwell", ("dwell",)),
     own_margins=dict.fromkeys(SLEY_MARGINS, "length") | dict.fromkeys(CLOSES, "number"),
     groups={"sley": SLEY},
 )

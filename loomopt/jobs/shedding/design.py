@@ -8,7 +8,10 @@ force, one in proportion to the shed on either side of its middle, and inertia.
 import math
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from loomopt import balance, maths
+from loomopt.cycle import Floats
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.base import Figures
@@ -41,6 +44,9 @@ CLOSE = 1e-9
 """Share of the largest cam force below which contact just holds."""
 GAVE_WAY = 1e-7
 """A number that a target keeps has given way when it is off by this, in its natural size."""
+LEAST_STRETCH = 1e-3
+"""Share of the largest elongation below which a spring is as good as slack."""
+MEGA = 1e6
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
 MOVES = " The moves, where not every force is known, are not judged."
@@ -92,7 +98,8 @@ def contact(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     found: dict[str, float | None] = {"contact_max": sampled.peak("cam_force")}
     found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
     found["contact_speed"] = None
-    if not physics.known_in and any(load.moved for load in physics.loads if isinstance(load, Load)):
+    unknown = drive.motor(physics.effects) or physics.known_in
+    if not unknown and any(load.moved for load in physics.loads if isinstance(load, Load)):
         speed = survived(sampled, scene.operation["N_min"])
         found["contact_speed"] = speed if math.isfinite(speed) else None
     return found
@@ -149,6 +156,44 @@ def _today(scene: Scene, found: Figures) -> str:
     if speed:
         lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
+
+
+class Sizes:
+    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
+
+    sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
+    """
+
+    def __init__(self, sampler: Sampler, stretch: float, most: float) -> None:
+        self.sampler = sampler
+        given = sampler.given
+        pieces, u = sampler.grid()
+        at = sampler.model.instant(maths.numpy(), given, sampler.node(pieces, u))
+        acting = {name: term for name, term in at.terms().items() if name != RETURN_SPRING.name}
+        parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for term in acting.values()]
+        self.travelled: Floats = np.asarray(at.pose.q, dtype=float)
+        self.others: Floats = np.sum(parts, axis=0) if parts else np.zeros(u.shape)
+        least = float(given.values.get("N_min", 0.0))
+        self.force = float(np.sum(np.abs(parts), axis=0).max() if parts else 0.0) + least or 1.0
+        self.stretch = stretch
+        preload = stretch - float(given.values["travel"])
+        self.needed = self.stiffness_for(least, preload) or (self.force / stretch if stretch > 0.0 else 1.0)
+        self.stiffness = min(self.needed, most) or self.needed
+
+    def stiffness_for(self, least: float, preload: float) -> float:
+        """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
+        elongated = np.maximum(self.travelled + preload, min(LEAST_STRETCH * self.stretch, preload) or LEAST_STRETCH)
+        return float(max(0.0, np.max((least - self.others) / elongated)))
+
+    def figure(self, name: str, quantity: str, value: float) -> float:
+        """Return the size of a figure over the cycle."""
+        if name.startswith("contact"):
+            return self.force
+        return abs(value) or abs(self.sampler.peak(quantity)) or 1.0
+
+    def margin(self, kind: str) -> float:
+        """Return what a check's margins of a kind are measured by; 0 where nothing of the frame says."""
+        return {"stiffness": self.stiffness, "pressure": 100 * MEGA, "force": self.force}.get(kind, 0.0)
 
 
 def least_stiffness(scene: Scene, start: Number) -> Number | None:

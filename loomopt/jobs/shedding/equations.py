@@ -52,6 +52,11 @@ class FrameSymbols(Motion):
     omega: Number
     omega_dot: Number = None
 
+    @property
+    def direction(self) -> Number:
+        """Sign of X', `worst` in the dwells."""
+        return {RISE: 1, RETURN: -1}.get(self.segment, self.worst)
+
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
     """Return the equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
@@ -63,7 +68,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     found = [*law(cam.law), *motion(cam, known), *_forces(model, known)]
     if model.has_quantity("curvature"):
         found += follower()
-    pose = _pose(cam.segments[0], LEAST)
+    pose = _pose(model, cam.segments[0], LEAST)
     return (*found, *(each for check in model.checks for each in effect_equations.check_equations(check, pose, known)))
 
 
@@ -78,33 +83,37 @@ def _given(model: JobModel) -> Given:
     return effect_equations.given(model, values)
 
 
-def _pose(segment: int, worst: int) -> FrameSymbols:
+def _pose(model: JobModel, segment: int, worst: int) -> FrameSymbols:
     X, X1, X2 = (symbol(name) for name in ("X", "X'", "X''"))
     lowered, u = X / symbol("travel"), symbol("u")
-    return FrameSymbols(symbol("theta"), segment, worst, X, X1, X2, lowered, u, symbol(SPEED))
+    pose = FrameSymbols(symbol("theta"), segment, worst, X, X1, X2, lowered, u, symbol(SPEED))
+    return effect_equations.turning(pose, model)
 
 
 def _forces(model: JobModel, known: Given) -> list[Equation]:
     """Write each term, their balance, the torque on the cam, and contact."""
     segments = frame(model).segments
     found = [_term(model, segments, load, known) for load in model.loads]
-    pose = _pose(segments[0], LEAST)
+    pose = _pose(model, segments[0], LEAST)
     found += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
+    found += effect_equations.crank_motion(model, pose, known, "cam_torque")
     judged = [SEGMENTS[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
     where = " and ".join(judged) if judged else "for every theta"
-    return [*found, relation("contact", symbol("N"), ">=", symbol("N_min"), where)]
+    found.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
+    moves = _pose(model, RISE, LEAST), _pose(model, RETURN, LEAST)
+    return found + effect_equations.event_equations(model, moves, known, "N")
 
 
 def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) -> Equation:
     """Write a load's term by its own formula: by segments where that differs, else as any load's."""
 
     def force(segment: int, worst: int = LEAST) -> Expression:
-        return effect_equations.force(load, _pose(segment, worst), known, 0)
+        return effect_equations.force(load, _pose(model, segment, worst), known, 0)
 
     if len({force(segment) for segment in segments}) > 1:
         rows = [_in_segment(model, load, segment, force) for segment in segments]
         return cases(load.name, symbol(f"N_{load.name}"), rows)
-    return effect_equations.term(load, _pose(segments[0], LEAST), known, "N")
+    return effect_equations.term(load, _pose(model, segments[0], LEAST), known, "N")
 
 
 def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[..., Expression]) -> Case:

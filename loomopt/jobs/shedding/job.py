@@ -38,8 +38,9 @@ class Shedding(Job):
         return programs.held(scene, target, traded)
 
     def demand(self, scene: Scene, target: str) -> None:
-        """Raise BadInput where a target speaks of what the scene does not have."""
+        """Raise BadInput where a target speaks of what the scene does not have, or today's frame cannot be followed."""
         programs.demand(scene, target)
+        self.parted(scene, self.sampler(scene, self.today(scene)))
 
     def numbers(self, scene: Scene) -> dict[str, float]:
         """Return every number of the scene, the knots of a spline law included."""
@@ -65,7 +66,9 @@ class Shedding(Job):
 
     def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
         """Return every figure of a design."""
-        return designs.figures(scene, self.sampler(scene, design))
+        sampler = self.sampler(scene, design)
+        parted = self.parted(scene, sampler)
+        return designs.figures(scene, sampler) | (parted.figures if parted else {})
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""

@@ -86,6 +86,11 @@ class FramePose(Motion):
         """X/h, exactly 1 and 0 in the dwells."""
         return self.maths.choose(self.segment, (self.law.s, 1, self.law.s, 0))
 
+    @property
+    def direction(self) -> Number:
+        """Sign of X˙, `worst` in the dwells."""
+        return self.maths.choose(self.segment, (1, self.worst, -1, self.worst))
+
     @lazy
     def q(self) -> Number:
         """X, m."""
@@ -203,7 +208,8 @@ class CamFrame:
         rate = maths.choose(segment, (1 / values["rise"], 0, -1 / values["return"], 0))
         law = self.law.at(maths, values, u, piece)
         worst = node.switch.get("worst", LEAST)
-        return FramePose(maths, theta, values["travel"], segment, u, rate, law, worst, values.get("speed"))
+        speeds = values.get("speed"), values.get("omega_dot")
+        return FramePose(maths, theta, values["travel"], segment, u, rate, law, worst, *speeds)
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FramePose:
         """Return the pose at the beginning of the rise, from ahead of it."""
@@ -237,6 +243,12 @@ QUANTITIES: dict[str, Quantity] = {
     "law_acceleration": Quantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
     "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }
+AT_REST, FASTEST = "contact at rest", "contact at contact_speed"
+RACED: dict[str, Quantity] = {
+    AT_REST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(0).force),
+    FASTEST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(at.values["contact_speed"]).force),
+}
+"""What a limit on the speed up to which contact holds reads, SI."""
 FOLLOWED: dict[str, Quantity] = {
     "pressure_angle": Quantity(lambda at: contact(at).pressure_angle),
     "curvature": Quantity(lambda at: contact(at).curvature, signed=True),
@@ -280,8 +292,9 @@ def model(
     effects: tuple[Effect, ...],
     words: tuple[tuple[str, str, str], ...],
     known: frozenset[str],
+    raced: tuple[str, ...] = (),
 ) -> JobModel:
-    """Return the frame with its return spring and effects."""
+    """Return the frame with its return spring and effects; raced: what of RACED is limited."""
     followed = known.issuperset(FOLLOWER)
     partly = JobModel(CamFrame(law, dwells), effects, words).known_in
     driven = {} if partly else drive.quantities((RETURN_SPRING, *effects), known)
@@ -290,7 +303,7 @@ def model(
         CamFrame(law, dwells),
         (RETURN_SPRING, *effects),
         words,
-        QUANTITIES | (FOLLOWED if followed else {}) | driven,
+        QUANTITIES | {name: RACED[name] for name in raced} | (FOLLOWED if followed else {}) | driven,
         ROWS | law_rows(law),
         assembled={**arm, "the cam law never falls": ("law_fall", 0.0)},
         known=known,

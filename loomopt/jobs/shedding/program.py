@@ -5,15 +5,11 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from loomopt import maths
-from loomopt.cycle import Floats
 from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CYCLE, survived
-from loomopt.jobs.shedding.model import FOLLOWER, RETURN_SPRING, law_rows
+from loomopt.jobs.shedding.design import CYCLE, Sizes, contact, survived
+from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
@@ -21,23 +17,21 @@ from loomopt.owned import owned
 from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
-from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, inside
+from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
-from loomopt.program.sampling import Sampler, sampled
+from loomopt.program.sampling import sampled
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
+CONTACT_SPEED = "contact_speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"
 SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
 """A start's stiffness over the least that keeps contact at today's law and preload."""
-LEAST_STRETCH = 1e-3
-"""Share of the largest elongation below which a spring is as good as slack."""
-MEGA = 1e6
-FASTER = frozenset(("speed", "contact_speed"))
+FASTER = frozenset(("speed", CONTACT_SPEED))
 """What is traded with the speed free."""
 LINEAR = FASTER | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
 """What is linear, or a quotient of what is, in K1, K1 X0 and the speed's square."""
@@ -49,28 +43,34 @@ def numbers(scene: Scene) -> dict[str, float]:
     return scene_numbers.numbers(scene) | named_knots(map(float, knots))
 
 
-def model(scene: Scene, law: CamLaw | None = None) -> JobModel:
-    """Return the frame with the effects the scene calls for; law: another than the scene's."""
+def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) -> JobModel:
+    """Return the frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     dwells = (True, True) if free else dwelt(scene.mechanism)
     words = scene_numbers.words(scene)
-    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)))
+    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)), raced)
 
 
 def demand(scene: Scene, target: str) -> None:
     """Raise BadInput where a target speaks of what the scene does not have."""
     base.demand(scene, target)
-    if target == "speed" and (model(scene).known_in or math.isinf(_survived(scene))):
-        problem = "nothing limits the speed: as the scene stands, the roller stays on the cam at any"
-        keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
-        allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
-        raise refusal(problem, scene.origin, keys, allowed=allowed, remedy="Correct them, or choose another target.")
+    if target == "speed":
+        _demand_moving(scene, "choose another target")
     own = scene.table(LawTarget)
     fewest, most = cam_spline.FEWEST, cam_spline.MOST
     if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
         problem, key = "a law cannot have so many intervals", "targets.law.intervals"
         allowed = f"{fewest} to {most}, an even number for a symmetric law"
         raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
+
+
+def _demand_moving(scene: Scene, instead: str) -> None:
+    """Raise BadInput where contact holds, or is lost, whatever the speed."""
+    if contact(scene, sampled(model(scene), numbers(scene)))[CONTACT_SPEED] is None:
+        problem = "nothing limits the speed: as the scene stands, the roller stays on the cam at any"
+        keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
+        allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
+        raise refusal(problem, scene.origin, keys, allowed=allowed, remedy=f"Correct them, or {instead}.")
 
 
 def _survived(scene: Scene) -> float:
@@ -94,7 +94,7 @@ def _axis_size(task: "_Task", program: Program, name: str) -> float:
     """Return the natural size, SI, of what of an axis is sought the least of."""
     if name in CYCLE:
         return task.sizes.figure(name, CYCLE[name], 0.0)
-    return scene_numbers.size(program, task.sampler, "speed" if name == "contact_speed" else name)
+    return scene_numbers.size(program, task.sampler, "speed" if name == CONTACT_SPEED else name)
 
 
 class _Task:
@@ -108,26 +108,36 @@ class _Task:
             self.law = Spline(own.intervals, own.symmetric)
             start = cam_spline.cycloid_like(own.intervals)
             self.known |= named_knots(start)
-        self.physics = model(scene, self.law)
         self.limited = scene_numbers.bounds(scene, self.known)
+        self.sped = target == "speed" or bool(self.traded & FASTER)
+        self.survives = [(n, each.min) for n, each in scene.limits.items() if n == CONTACT_SPEED and each.min]
+        self.raced: tuple[str, ...] = (AT_REST, FASTEST) if self.survives else ()
+        if self.survives:
+            _demand_moving(scene, f"take limits.{CONTACT_SPEED} out")
+            # At its own speed the frame is judged anyway: the same row twice would have no price.
+            if self.sped or ("speed" not in self.limited and self.known["speed"] == self.survives[0][1]):
+                self.raced = (AT_REST,)
+        self.physics = model(scene, self.law, self.raced)
         self.sampler = sampled(self.physics, self.known)
         most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
-        self.sizes = _Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
+        self.sizes = Sizes(self.sampler, self.limited["X0"][1] + self.known["travel"], most)
         needed = {key for effect in scene.active for key in effect.needs}
         self.kept = ["travel", *(["speed"] if SPEED in needed else [])]
         self.checks = [effect for effect in scene.active if isinstance(effect, Check)]
         self.tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
-        if target == "speed" or self.traded & FASTER:
+        if self.sped:
             fastest = _survived(scene)
             self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
     def program(self) -> Program:
-        variables = self._variables()
+        bounded = self._variables()
+        asked = {"speed" if self.sped else CONTACT_SPEED: self.survives} if self.survives else {}
+        variables, more = floored(bounded, asked)
         taken = {variable.name for variable in variables}
         parameters = {name: value for name, value in self.known.items() if name not in taken}
-        limits = [*self._bounds(variables), *self._contact(), *self._angles(), *self._figures()]
+        limits = [*self._bounds(bounded), *more, *self._contact(), *self._angles(), *self._figures()]
         limits += self._checks() + (self._law(self.law) if self.law else [])
         starts, moves = self._starts(variables), self._moves(variables)
         # Every force is linear in K1 and K1 X0, and in the speed's square, but power is not [Qiu21, eq 6]. With a free
@@ -155,7 +165,7 @@ class _Task:
             given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
             ends |= {name: (known[name],) * 2 for name in ends if name in given}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.tied else {"K1": (known["K1"],) * 2})
-        if self.target == "speed" or self.traded & FASTER:
+        if self.sped:
             ends["speed"] = self.limited.get("speed", (1e-3 * self.fastest, math.inf))
         for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))
@@ -240,10 +250,11 @@ class _Task:
         """Return the limit that is the job: contact all round, or where the warp's pull is known."""
         least, size = self.known["N_min"], self.sizes.force
         found = Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0)
+        raced = [replace(found, row=row, hidden=True) for row in self.raced]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
-            return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True)]
-        return [found]
+            return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True), *raced]
+        return [found, *raced]
 
     def _angles(self) -> list[Limit]:
         """Return what the near dwell, which takes the rest of the turn, must keep where another angle is free."""
@@ -259,10 +270,11 @@ class _Task:
     def _figures(self) -> list[Limit]:
         """Return the scene's limits on figures."""
         remedy = f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out."
-        demand_figures(self.scene, self.physics, {name: (row,) for name, row in CYCLE.items()}, remedy)
+        read = {name: (row,) for name, row in CYCLE.items()} | {CONTACT_SPEED: ()}
+        demand_figures(self.scene, self.physics, read, remedy)
         found = []
         for name, limit in self.scene.limits.items():
-            if name == "law_acceleration" and self.law:
+            if name == CONTACT_SPEED or (name == "law_acceleration" and self.law):
                 continue
             row = CYCLE.get(name, name)
             cycle = name in CYCLE or self.physics.has_quantity(row)
@@ -298,41 +310,3 @@ class _Task:
         found += [Limit(row, -1, row, 0.0, 1.0, "static", **firm) for row in slopes if row in rows]  # type: ignore[arg-type]
         peaks = [f"law_{side}_{k}" for side in ("push", "pull") for k in knots]
         return found + [Limit("law_acceleration", 1, row, most, most, "static") for row in peaks if row in rows]
-
-
-class _Sizes:
-    """force, N: the largest sum of the loads' magnitudes, the spring apart; stiffness, N/m: what keeps contact.
-
-    sampler: the frame today; stretch: the largest elongation its spring may have, m; most: its largest stiffness.
-    """
-
-    def __init__(self, sampler: Sampler, stretch: float, most: float) -> None:
-        self.sampler = sampler
-        given = sampler.given
-        pieces, u = sampler.grid()
-        at = sampler.model.instant(maths.numpy(), given, sampler.node(pieces, u))
-        acting = {name: term for name, term in at.terms().items() if name != RETURN_SPRING.name}
-        parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for term in acting.values()]
-        self.travelled: Floats = np.asarray(at.pose.q, dtype=float)
-        self.others: Floats = np.sum(parts, axis=0) if parts else np.zeros(u.shape)
-        least = float(given.values.get("N_min", 0.0))
-        self.force = float(np.sum(np.abs(parts), axis=0).max() if parts else 0.0) + least or 1.0
-        self.stretch = stretch
-        preload = stretch - float(given.values["travel"])
-        self.needed = self.stiffness_for(least, preload) or (self.force / stretch if stretch > 0.0 else 1.0)
-        self.stiffness = min(self.needed, most) or self.needed
-
-    def stiffness_for(self, least: float, preload: float) -> float:
-        """Return the stiffness, N/m, that keeps the cam force above `least`, N, at a preload, m, as sampled."""
-        elongated = np.maximum(self.travelled + preload, min(LEAST_STRETCH * self.stretch, preload) or LEAST_STRETCH)
-        return float(max(0.0, np.max((least - self.others) / elongated)))
-
-    def figure(self, name: str, quantity: str, value: float) -> float:
-        """Return the size of a figure over the cycle."""
-        if name.startswith("contact"):
-            return self.force
-        return abs(value) or abs(self.sampler.peak(quantity)) or 1.0
-
-    def margin(self, kind: str) -> float:
-        """Return what a check's margins of a kind are measured by; 0 where nothing of the frame says."""
-        return {"stiffness": self.stiffness, "pressure": 100 * MEGA, "force": self.force}.get(kind, 0.0)

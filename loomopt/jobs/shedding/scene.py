@@ -28,7 +28,7 @@ from loomopt.quantities import (
 from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Figure, Table, Target
+from loomopt.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.tolerances import NARROWEST, SAME_ANGLE
 from loomopt.units import Shown, usual
 
@@ -110,7 +110,7 @@ FIGURES = {
         Figure("contact_min", "force", "least cam force over the cycle", sides=("min",)),
         Figure("contact_angle", "angle", "cam angle where it is least", sides=()),
         Figure("contact_max", "force", "largest cam force over the cycle", sides=("max",)),
-        Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=()),
+        Figure("contact_speed", "angular speed", "speed up to which the roller stays on the cam", sides=("min",)),
         Figure("speed", "angular speed", SAID["speed"], sides=()),
         *drive.FIGURES,
         Figure("spring_force_max", "force", "largest force of the return spring", sides=("max",)),
@@ -259,7 +259,9 @@ SCHEMA = SceneSchema(
     check=check,
     fault=fault,
     own_axes=AXES,
+    conflict=Conflict(("K1", "X0")),
     groups={"rise": SEGMENTS},
     lists={"law": "number"},
     partly_known=True,
+    parts=True,
 )

@@ -19,6 +19,7 @@ from loomopt.scenes import Scene
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
     from loomopt.picture.shapes import Drawing
+    from loomopt.program.parting import Parted
 
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
@@ -58,7 +59,7 @@ class SheddingViews(JobViews):
         return equations.equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-        """Return the dwells, cam angles in rad, and where the cam force is least."""
+        """Return the dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
         job = registry.of(scene)
         values = job.sampler(scene, design).given.values
         found: dict[str, float] = {}
@@ -66,13 +67,22 @@ class SheddingViews(JobViews):
             found |= {"far dwell begins": float(values["begin.far"]), "far dwell ends": float(values["begin.return"])}
         if float(values["near_dwell"]) > 0.0:
             found |= {"near dwell begins": float(values["begin.near"]), "near dwell ends": 0.0}
-        angle = job.figures(scene, design)["contact_angle"]
-        return found | {"least cam force": math.nan if angle is None else angle}
+        parted = job.parted(scene, job.sampler(scene, design))
+        if parted is None or not parted.course.parted:
+            angle = job.figures(scene, design)["contact_angle"]
+            found |= {"least cam force": math.nan if angle is None else angle}
+        if parted is None:
+            return found
+        from loomopt.picture import parted as shown
+
+        return shown.marks(parted, found)
 
     def words(self) -> Mapping[str, Curve]:
         """Return what the curves are called."""
         return {
             "X": Curve("frame travel"),
+            "X_cam": Curve("cam"),
+            "gap": Curve("frame to cam", most="gap_max"),
             "X_1": Curve("frame speed"),
             "X_2": Curve("frame acceleration"),
             "X_3": Curve(shown=False),
@@ -97,13 +107,28 @@ class SheddingViews(JobViews):
         partly = bool(registry.of(scene).model(scene).known_in)
         left = {"s_2 [1]": "law_acceleration" not in scene.limits, "cam_torque [N*m]": partly, POWER: partly}
         shown = [panel for panel in found if not left.get(panel.columns[0])]
-        return tuple(panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown)
+        shown = [panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown]
+        if "X_cam [m]" not in columns:
+            return tuple(shown)
+        from loomopt.picture.parted import together
+
+        return together(shown, ("X [m]", "X_cam [m]"), "travel of frame and cam")
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what there is to remark upon: forces known in the dwells only, a roller that floats, an undercut."""
-        sampler = registry.of(scene).sampler(scene, design)
+        job = registry.of(scene)
+        sampler = job.sampler(scene, design)
         undercut = () if self.missing(scene) else _undercut(scene, design)
-        return (*_partly(sampler), *_floating(scene, sampler), *undercut)
+        parted = _parted(scene, job.parted(scene, sampler))
+        return (*super().remarks(scene, design), *_partly(sampler), *_floating(scene, sampler), *undercut, *parted)
+
+
+def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
+    """Say where the roller leaves the cam, where an effect says what then becomes of the frame."""
+    if parted:
+        from loomopt.picture.parted import remarks
+
+        yield from remarks(scene, parted)
 
 
 def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:

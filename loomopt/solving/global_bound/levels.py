@@ -96,6 +96,8 @@ def _unserved(program: Program, sampler: Sampler) -> str:
     """Return why boxes say nothing of a program, "" where they do."""
     if sampler.hints:
         return "corners of the cycle are found by iteration, which boxes do not enclose"
+    if names := ", ".join(state.name for state in program.model.states):
+        return f"the steady state of {names} is not bounded by boxes of designs"
     if any(len(objective.groups) > 1 for objective in program.objectives):
         return "an objective that is a sum is not bounded by boxes"
     return ""

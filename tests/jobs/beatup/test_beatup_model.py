@@ -196,7 +196,9 @@ def test_figures_without_their_numbers_are_undefined_not_invented():
     bare = BEATUP.without_effect("inertia").set("mechanism", {f"l{k}": f"{x} mm" for k, x in DIMENSIONS.items()})
     found = figures(bare.set("operation", {"M0": "745 N*m"}))
     assert {name for name, value in found.items() if value is None} == {
-        *("alpha_fdc", "J4", "r4", "peak_power", "bearing_force", "shaking_force")
+        *("alpha_fdc", "J4", "r4", "peak_power", "bearing_force", "shaking_force"),
+        *("fluctuation", "speed_fdc", "no_load_speed", "motor_torque_max"),
+        *("shaft_peak", "twist_peak", "reed_front"),
     }
     assert found["M3_fdc"] == 745.0
     assert all(math.isfinite(value) for value in found.values() if value is not None)

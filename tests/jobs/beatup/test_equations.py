@@ -8,6 +8,7 @@ import sympy as sp
 from loomopt import balance
 from loomopt.cycle import Node
 from loomopt.effects import found as declared
+from loomopt.jobs import registry
 from loomopt.jobs.beatup import equations as beatup_equations
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.scene import RESISTED
@@ -208,3 +209,40 @@ def test_latex_names_symbols_the_way_papers_do():
     ):
         assert name in latex
     assert latex.count("{") == latex.count("}")
+
+
+def test_the_cranks_own_equation_of_motion_is_written_and_holds():
+    """Read back and put together, the printed equations close at the solved speed, to rounding."""
+    scene = registry.load("beatup").with_effect("speed_fluctuation")
+    found = registry.of(scene).views.equations(scene)
+    lines = [equation.text for equation in found if equation.name == "speed_fluctuation"]
+    assert lines == [
+        "M_motor = M_rated*(no_load_speed - omega)/(slip*speed)",
+        "M_motor = J_f*omega_dot + Md",
+        "omega_dot = omega*omega'",
+    ]
+    (mean,) = [equation for equation in found if equation.name == "mean speed"]
+    assert mean.text == "Integral(1/omega(phi), (phi, 0, 2*pi)) = 2*pi/speed"
+    assert r"\dot{\omega}" in " ".join(equation.latex for equation in found)
+    sampler = registry.of(scene).sampler(scene, {})
+    node = Node(2.0, sampler.cycle.switch(sampler.cycle.place(2.0)[0]))
+    pose = sampler.model.instant(FLOAT, sampler.given, node).pose
+    named = {"omega": pose.omega, "omega_dot": pose.omega_dot, "q_1": pose.q1, "q_2": pose.q2, "J_f": 2.0, "slip": 0.08}
+    named |= {"M_rated": 35.0, "no_load_speed": sampler.static["no_load_speed"], "speed": SPEED}
+    named |= {"J4": 0.62, "m4e": 0.0, "r4e": 0.0, "M_resistance": 0.0}
+    shown = [tuple(equation.text.split(" = ")) for equation in found]
+    for left in ("M_inertia", "M3", "Md"):
+        (right,) = [right for name, right in shown if name == left]
+        named[left] = value(read(right), named)
+    line, taken = (value(read(right), named) for name, right in shown if name == "M_motor")
+    assert line == pytest.approx(taken, abs=1e-10)
+
+
+def test_at_constant_speed_nothing_is_written_of_a_change_of_speed():
+    assert not words(beatup_equations.equations(model(*OWN))) & {
+        "omega_dot",
+        "no_load_speed",
+        "M_motor",
+        "J_f",
+        "Integral",
+    }

@@ -53,7 +53,8 @@ def test_figures_without_their_numbers_are_undefined():
     document["operation"], document["targets"] = {}, {}
     found = JOB.figures(registry.scene(document), TODAY)
     assert {name for name, value in found.items() if value is None} == {
-        *("dwell_after", "dwell_before", "dwell", "tape_force", "peak_torque", "peak_power", "match_rms")
+        *("dwell_after", "dwell_before", "dwell", "tape_force", "peak_torque", "peak_power", "match_rms"),
+        "head_overrun",
     }
 
 

@@ -1,0 +1,275 @@
+"""Whole fronts beside NSGA-II [pymoo], which gets ten times the time; both judged by plain evaluators of their own.
+
+`python -m benchmarks.front_peers [--quick] [--json]`; also what two workers reach beside two plain loops, and memory.
+"""
+
+import argparse
+import functools
+import pickle
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+import loomopt as lo
+from benchmarks import harness, plain_beatup, plain_shedding
+from benchmarks.fronts import asked_at
+from loomopt.studies import executors, front, runs
+from loomopt.studies.plan import Task
+from loomopt.studies.rows import Row
+
+LONGER = 10.0
+"""Times the front's own that the peer gets."""
+POPULATION, SEED, GRID = 100, 1, 360
+M0 = 745.0
+SCENE = plain_shedding.PAPER
+BEYOND = 0.1
+"""Share of all designs' range by which the corner of the hypervolume lies beyond them."""
+BROKEN = 1e-8
+"""By how much a design may exceed a limit, relative or in rad, and still count."""
+
+Spot = tuple[float, float]
+
+
+class Rival(NamedTuple):
+    """One trade, both axes sought the least of, as a peer gets it.
+
+    low, high: of its variables; evaluate: designs (n, variables) → objectives (n, 2) and rows (n, rows) none of which
+    may be positive; judge: a design → both axes as the referee reads them, None where it breaks a limit; own: a row of
+    the front as such a design.
+    """
+
+    problem: str
+    axes: tuple[str, str]
+    low: np.ndarray
+    high: np.ndarray
+    evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    judge: Callable[[np.ndarray], Spot | None]
+    own: Callable[[Row], np.ndarray]
+
+
+def beatup() -> Rival:
+    """Return peak torque against |M3| at front dead centre, by plain_beatup."""
+    size, phi = plain_beatup.UPPER, np.linspace(-0.5, 2 * np.pi - 0.5, GRID, endpoint=False)
+
+    def evaluate(x):
+        *lengths, s = (x * size).T[:, :, None]
+        peak = np.abs(plain_beatup.crank_torque(*(*lengths, s, M0, phi))).max(axis=1)
+        front_torque = np.abs(plain_beatup.front_torque(*(*lengths, s, M0))[:, 0])
+        return np.column_stack([peak, front_torque]), -plain_beatup.limits(*lengths)[:, :, 0].T
+
+    def judge(x):
+        design = x * size
+        if plain_beatup.violation(design) > BROKEN:
+            return None
+        return float(plain_beatup.peaks(design, M0)[0][1]), abs(float(plain_beatup.front_torque(*(*design, M0))))
+
+    def own(row: Row) -> np.ndarray:
+        known = {**lo.load("beatup").mechanism, **row.design}
+        return np.array([*(known[name] for name in ("l1", "l2", "l3", "l4")), known["m4e"] * known["r4e"] ** 2]) / size
+
+    low, high = plain_beatup.LOWER / size, plain_beatup.UPPER / size
+    return Rival("beatup", ("peak_torque", "M3_fdc"), low, high, evaluate, judge, own)
+
+
+def shedding() -> Rival:
+    """Return stiffness against preload, by plain_shedding: N is linear in K1 and K1 X0."""
+    size, bare = np.array([1e6, 0.080]), replace(SCENE, X0=0.0)
+    spots = [(stretch, np.linspace(stretch[3], stretch[4], GRID // 4)) for stretch in plain_shedding.stretches(SCENE)]
+    travel = np.concatenate([plain_shedding.state(np, SCENE, *spot)[0] for spot in spots])
+    rest = np.concatenate([plain_shedding.force(np, bare, *spot, 0.0) for spot in spots])
+
+    def evaluate(x):
+        stiffness, preload = (x * size).T
+        push = rest + stiffness[:, None] * (travel + preload[:, None])
+        return x * size, -push.min(axis=1)[:, None]
+
+    def judge(x):
+        stiffness, preload = map(float, x * size)
+        needed = float(plain_shedding.least_stiffness(replace(SCENE, X0=preload))[0])
+        return (stiffness, preload) if stiffness >= needed * (1 - BROKEN) else None
+
+    def own(row: Row) -> np.ndarray:
+        return np.array([row.design["K1"], row.design["X0"]]) / size
+
+    return Rival("shedding", ("K1", "X0"), np.zeros(2), np.ones(2), evaluate, judge, own)
+
+
+def evolved(rival: Rival, seconds: float) -> tuple[np.ndarray, int]:
+    """Return the designs that NSGA-II ends with after so much of the processor's time, and how many it looked at."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem
+
+    class Traded(Problem):
+        def __init__(self):
+            rows = rival.evaluate(rival.high[None])[1].shape[1]
+            super().__init__(n_var=len(rival.low), n_obj=2, n_ieq_constr=rows, xl=rival.low, xu=rival.high)
+
+        def _evaluate(self, x, out, *_, **__):
+            with np.errstate(all="ignore"):
+                objectives, rows = rival.evaluate(x)
+            out["F"] = np.nan_to_num(objectives, nan=1e12)
+            out["G"] = np.nan_to_num(rows, nan=1e12)
+
+    problem, algorithm = Traded(), NSGA2(pop_size=POPULATION)
+    algorithm.setup(problem, termination=("n_gen", sys.maxsize), seed=SEED, verbose=False)
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        algorithm.next()
+    return np.atleast_2d(algorithm.opt.get("X")), int(algorithm.evaluator.n_eval)
+
+
+def area(spots: Sequence[Spot], corner: Spot) -> float:
+    """Return the hypervolume of two least-is-best axes below a corner."""
+    total, height = 0.0, corner[0]
+    for first, second in sorted(spots, key=lambda spot: spot[1]):
+        if first < height and second < corner[1]:
+            total += (height - first) * (corner[1] - second)
+            height = first
+    return total
+
+
+def compared(rival: Rival, points: int) -> list[dict[str, object]]:
+    """Return a row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
+    began = time.process_time()
+    trade = front.trade(lo.load(rival.problem), rival.axes, points=points)
+    found = front.read(trade, runs.run(trade))
+    spent, name = time.process_time() - began, " against ".join(rival.axes)
+    certified = [row for row in found.rows if row.certified]
+    mine = _judged(rival, [rival.own(row) for row in certified])
+    if not harness.installed("pymoo"):
+        absent = f"{name}: pymoo is not installed (extra `bench`)"
+        return [_row(f"{name}: loomopt", spent, len(certified), mine, mine), _row(absent, 0.0, 0, [], mine)]
+    designs, looked = evolved(rival, LONGER * spent)
+    theirs = _judged(rival, list(designs))
+    began = time.process_time()
+    asked = [row for _, second in theirs if (row := _asked(trade, found, second))]
+    fuller = [*mine, *_judged(rival, [rival.own(row) for row in asked])]
+    longer = spent + time.process_time() - began
+    whole = [*fuller, *theirs]
+    return [
+        _row(f"{name}: loomopt", spent, len(certified), mine, whole),
+        _row(f"{name}: loomopt, asked at the peer's places too", longer, len(certified) + len(asked), fuller, whole),
+        _row(f"{name}: NSGA-II", LONGER * spent, looked, theirs, whole),
+    ]
+
+
+def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
+    return [spot for design in designs if (spot := rival.judge(design))]
+
+
+def _asked(trade: front.Trade, found: front.Front, second: float) -> Row | None:
+    """Return the front's design at a place; None beside the front."""
+    paid = found.values(trade.axes[1])
+    row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
+    return row if row and row.certified else None
+
+
+def _row(method: str, seconds: float, looked: int, spots: Sequence[Spot], whole: Sequence[Spot]) -> dict[str, object]:
+    """Return what a method ended with; missed: what of the hypervolume of all designs of all methods it has not."""
+    values = np.array(whole)
+    # Beyond the worst of either axis, so that a front's own ends count too.
+    first, second = values.max(axis=0) + BEYOND * np.ptp(values, axis=0)
+    corner = float(first), float(second)
+    missed = 1 - area(spots, corner) / area(whole, corner) if spots else None
+    return {"method": method, "CPU [s]": seconds, "designs": looked, "admissible": len(spots), "missed": missed}
+
+
+# Workers and memory.
+
+
+def plain_loop(points: int) -> int:
+    """Solve a whole front, one point after the other; returns how many rows there are."""
+    trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), points=points)
+    return len(runs.run(trade))
+
+
+@functools.lru_cache(maxsize=2)
+def _trade(payload: bytes) -> front.Trade:
+    found: front.Trade = pickle.loads(payload)
+    return found
+
+
+def half(payload: bytes, work: Sequence[tuple[Task, Row | None]]) -> None:
+    """Solve tasks of a front one after the other, each parent's row at hand: no rounds, nothing handed over."""
+    for task, parent in work:
+        _trade(payload).solved(task, parent)
+
+
+def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool) -> float:
+    """Return how fast two workers are beside two plain loops over half of the same points each, the median of turns.
+
+    In turn, so that the machine's other work hits both alike. fresh: each turn starts processes of its own, which both
+    pay for; else the same two do all, warm.
+    """
+    trade = front.trade(lo.load("beatup"), axes, target)
+    work, payload = list(runs.tasks(trade, runs.run(trade))), pickle.dumps(trade)
+
+    def halves(pool: Executor) -> None:
+        for each in [pool.submit(half, payload, work[first::2]) for first in (0, 1)]:
+            each.result()
+
+    def timed(pool: Executor | None, solve: Callable[[Executor], object]) -> float:
+        began = time.perf_counter()
+        own = pool or executors.workers(2)()
+        solve(own)
+        if not pool:
+            own.shutdown()
+        return time.perf_counter() - began
+
+    pool = None if fresh else executors.workers(2)()
+    if pool:
+        halves(pool)
+        runs.run(trade, pool)
+    turns = [(timed(pool, halves), timed(pool, lambda own: runs.run(trade, own))) for _ in range(repeats)]
+    if pool:
+        pool.shutdown()
+    return statistics.median(plain / ours for plain, ours in turns)
+
+
+MEMORY = """
+import resource, sys
+from benchmarks.front_peers import plain_loop
+plain_loop(3)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+rows = plain_loop(int(sys.argv[1]))
+print(rows, before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def memory(points: int) -> tuple[int, float, float]:
+    """Return of a front so many points long: rows, and the process' largest size before and after it, MB."""
+    done = subprocess.run([sys.executable, "-c", MEMORY, str(points)], capture_output=True, text=True, check=True)
+    rows, *sizes = map(int, done.stdout.split())
+    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
+    return rows, sizes[0] / unit, sizes[1] / unit
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="shedding alone, no workers, no memory")
+    parser.add_argument("--json", action="store_true")
+    asked = parser.parse_args()
+    if asked.quick:
+        harness.show(compared(shedding(), 6), asked.json)
+        return
+    rows = [row for rival in (beatup(), shedding()) for row in compared(rival, front.POINTS)]
+    sizes = [dict(zip(("rows", "MB before", "MB after"), memory(points), strict=True)) for points in (10, 40, 160)]
+    fronts = {"M3": (("peak_torque", "M3_fdc"), None), "m4e": (("peak_torque", "m4e"), "balance")}
+    ratios = [
+        {"front": name, "processes": "own" if fresh else "warm", "of two plain loops": shared(*asking, 5, fresh)}
+        for name, asking in fronts.items()
+        for fresh in (True, False)
+    ]
+    harness.show(rows, asked.json, memory=sizes, two_workers=ratios)
+
+
+if __name__ == "__main__":
+    main()

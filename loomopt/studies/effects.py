@@ -1,0 +1,242 @@
+"""What each effect is worth: how far it moves the objectives of a target, and how much worse a design without it is.
+
+The reference has all effects on that combine. An effect's shift is read at the design of the reference, its regret from
+the design that is found without it and judged in the reference; both are shares of the objectives' natural sizes.
+"""
+
+import functools
+import json
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from loomopt import designs
+from loomopt.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.provenance import versions
+from loomopt.scene_errors import refusal
+from loomopt.scene_numbers import files
+from loomopt.scenes import Scene
+from loomopt.solving import engine
+from loomopt.solving.asked import ACCURACY, OMITTED, target_name
+from loomopt.studies import effects_known
+from loomopt.studies.effects_worth import Judge, Worth
+from loomopt.studies.plan import Task
+from loomopt.studies.rows import Row
+from loomopt.studies.sweep import reason
+
+REFUSED = "refused"
+"""The status of what solve does not take."""
+DESIGNED = "optimal", "uncertified"
+"""Statuses of a solve that ended in a design."""
+Off = frozenset[str]
+"""Names of the effects that are off."""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """The plan of the study: small, and it pickles.
+
+    scene: as given; target: by name; together: the effects that combine, in the order of the job; out, unknown: the
+    others, each with the reason; accuracy, seed: of every solve.
+    """
+
+    scene: Scene
+    target: str
+    tolerance: float
+    together: tuple[str, ...]
+    out: Mapping[str, str]
+    unknown: Mapping[str, str]
+    accuracy: float
+    seed: int
+
+    name = "effects"
+
+    @functools.cached_property
+    def key(self) -> str:
+        """A hash of all that its rows depend on."""
+        import hashlib
+
+        settings = {
+            "study": self.name,
+            "scene": effects_known.with_only(self.scene, self.together).hash,
+            "given": self.scene.hash,
+            "files": files(self.scene),
+            "target": self.target,
+            "tolerance": self.tolerance,
+            "accuracy": self.accuracy,
+            "seed": self.seed,
+            **versions(),
+        }
+        return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:32]
+
+    def without(self, off: Off) -> Scene:
+        """Return the scene of the effects that combine, but for some. Raises BadInput where these cannot be off."""
+        return effects_known.with_only(self.scene, [name for name in self.together if name not in off])
+
+    def batch(self, rows: Sequence[Row]) -> list[Task]:
+        """Return the tasks of the next round, from all rows of earlier ones."""
+        wanted = Course(self, rows).wanted
+        return [Task(len(rows) + k, None, dict.fromkeys(self._ordered(off), 0.0)) for k, off in enumerate(wanted)]
+
+    def _ordered(self, off: Off) -> list[str]:
+        return [name for name in self.together if name in off]
+
+    def solved(self, task: Task, parent: Row | None) -> Row:
+        """Return the row of a task: its place names the effects that are off."""
+        from loomopt.nlp import graph
+
+        scene = self.without(frozenset(task.place))
+        try:
+            answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed)
+        except BadInput as error:
+            return Row(task.point, task.place, None, REFUSED, str(error))
+        job = registry.of(scene)
+        program, design = job.program(scene, self.target), designs.flat(answer.design)
+        return Row(
+            point=task.point,
+            place=task.place,
+            parent=None,
+            status=answer.status,
+            reason=None if answer.status == "optimal" else reason(answer),
+            design=design,
+            certified=answer.certificate is not None and answer.certificate.passed and answer.admissible,
+            seconds=answer.time["total_s"],
+            warm={
+                "nodes": graph.nodes(program, job.values(program, {**job.today(scene), **design})),
+                "build_s": answer.time["build_s"],
+                "solve_s": answer.time["solve_s"],
+            },
+        )
+
+
+def planned(
+    scene: Scene,
+    target: str | None = None,
+    tolerance: float = OMITTED,
+    *,
+    accuracy: float = ACCURACY,
+    seed: int = 0,
+) -> Effects:
+    """Return the plan of the study. Raises BadInput for an unknown target or one that the effects cannot serve."""
+    name = target_name(scene, target)
+    if not 0.0 < tolerance < math.inf:
+        allowed, remedy = "a share, more than 0", "Write 0.01 for 1 %, or leave it out"
+        raise refusal("the tolerance is out of range", "", "tolerance", tolerance, allowed, remedy)
+    given = effects_known.known(scene)
+    together = effects_known.combined(given, scene)
+    names = tuple(effect.name for effect in together.effects)
+    unknown = effects_known.unknown(scene, given)
+    study = Effects(scene, name, tolerance, names, together.out, unknown, accuracy, seed)
+    plain = frozenset(e.name for e in together.effects if isinstance(e, effects_known.YIELDING))
+    served = study.without(plain)
+    registry.of(served).demand(served, name)
+    return study
+
+
+class Course:
+    """How far a study has come by some of its rows: what is to be solved next, and what is known by then.
+
+    base: the effects that the reference leaves off, None without one; reference: its row; measured: of these, effects
+    that solve does not take; aside: effects with which no design is admissible. worths: by effect; together: of those
+    that are left out together, where that was tried.
+    """
+
+    def __init__(self, study: Effects, rows: Sequence[Row]) -> None:
+        self.study = study
+        self.rows = {frozenset(row.place): row for row in rows}
+        self.effects = {effect.name: effect for effect in effects_known.known(study.scene)}
+        self.measured, self.aside = Off(), Off()
+        self.needed: dict[Off, str] = {}
+        self.worths: dict[str, Worth] = {}
+        self.together: Worth | None = None
+        self.left_out: tuple[str, ...] = ()
+        self.judge: Judge | None = None
+        self.base, self.wanted = self._referred()
+        self.reference = None if self.base is None else self.rows[self.base]
+        if self.base is not None and self.reference and self.reference.status in DESIGNED:
+            self.judge = Judge(study.scene, study.without(self.base), study.target, self.reference)
+            self.wanted = self._measure(self.judge, self.base) or self._verify(self.judge, self.base)
+
+    def _referred(self) -> tuple[Off | None, list[Off]]:
+        """Return the effects that the reference leaves off, None without it, and what must be solved to know."""
+        moving = [
+            name for name in reversed(self.study.together) if isinstance(self.effects[name], effects_known.YIELDING)
+        ]
+        for off in (Off(), *(self._closed({name}) for name in moving), self._closed(moving)):
+            if off not in self.rows:
+                return None, [off]
+            if self.rows[off].status != REFUSED:
+                self.measured = off
+                break
+        else:
+            return None, []
+        if self.rows[off].status != "infeasible":
+            return off, []
+        singles = [each for each in dict.fromkeys(self.singles(off).values()) if self._possible(each)]
+        if missing := [single for single in singles if single not in self.rows]:
+            return None, missing
+        good = [single for single in singles if self.rows[single].certified] or [off]
+        self.aside = good[-1] - off
+        return good[-1], []
+
+    def singles(self, base: Off) -> dict[str, Off]:
+        """Return what is off without each effect that a reference has on: the effect, and what needs it."""
+        return {name: base | self._closed({name}) for name in self.study.together if name not in base}
+
+    def _closed(self, off: Collection[str]) -> Off:
+        """Return effects with those that cannot be on without them."""
+        found = Off(off)
+        while more := {name for name in self.study.together if found & set(self.effects[name].beside)} - found:
+            found |= more
+        return found
+
+    def _possible(self, off: Off) -> bool:
+        """Say whether scene and target can do without effects; why not is then told in `needed`."""
+        if off not in self.needed:
+            self.needed[off] = ""
+            try:
+                scene = self.study.without(off)
+                registry.of(scene).demand(scene, self.study.target)
+            except BadInput as error:
+                self.needed[off] = error.problem
+        return not self.needed[off]
+
+    def _measure(self, judge: Judge, base: Off) -> list[Off]:
+        """Measure each effect of the reference by itself; return what must be solved before."""
+        missing: list[Off] = []
+        for name, off in self.singles(base).items():
+            if off in self.rows or not self._possible(off):
+                others = [other for other in self.study.together if other in off - base - {name}]
+                why = f"{', '.join(others)} is off with it" if others else None
+                self.worths[name] = self._worth(judge, name, off, why)
+            else:
+                missing.append(off)
+        for name in self.measured:
+            scene = self.study.without(base - {name, *self.effects[name].beside})
+            self.worths[name] = judge.beside(name, scene, self.study.tolerance)
+        return list(dict.fromkeys(missing))
+
+    def _worth(self, judge: Judge, name: str, off: Off, why: str | None = None) -> Worth:
+        if self.needed.get(off):
+            return judge.needed(name, self.needed[off])
+        return judge.without(name, self.study.without(off), self.rows[off], self.study.tolerance, why)
+
+    def _verify(self, judge: Judge, base: Off) -> list[Off]:
+        """Find what may be left out together; return what must be solved before that is known.
+
+        While leaving it out together fails, the effect that is worth most comes back.
+        """
+        may_go = [name for name in self.study.together if name not in base and self.worths[name].may_go]
+        while may_go := [name for name in may_go if self._closed({name}) - base <= set(may_go)]:
+            off = base | Off(may_go)
+            if off not in self.rows and self._possible(off):
+                return [off]
+            self.together = self._worth(judge, ", ".join(may_go), off)
+            if self.together.may_go:
+                break
+            may_go.remove(max(reversed(may_go), key=lambda name: self.worths[name].most))
+        self.together = self.together if may_go else None
+        beside = [name for name in self.study.together if name in self.measured and self.worths[name].may_go]
+        self.left_out = tuple(name for name in self.study.together if name in {*may_go, *beside})
+        return []

@@ -1,0 +1,313 @@
+"""The plan of a front: its ends, then rounds of points between them, each from a neighbour of an earlier round."""
+
+import functools
+import hashlib
+import itertools
+import json
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from loomopt import designs
+from loomopt.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.lazy import lazy
+from loomopt.provenance import versions
+from loomopt.scene_numbers import files
+from loomopt.scenes import Scene
+from loomopt.schema import Sense
+from loomopt.solving.asked import ACCURACY
+from loomopt.solving.solution import Solution
+from loomopt.solving.words import Words
+from loomopt.studies import front_answer, front_plan, front_read
+from loomopt.studies.findings import Change, Findings
+from loomopt.studies.front_plan import ENDS, Next, Scale
+from loomopt.studies.front_solve import Asking, Reached, Solver
+from loomopt.studies.plan import Task
+from loomopt.studies.rows import Row
+from loomopt.tolerances import SAME_OBJECTIVE
+
+PLAN = 2
+"""Raised when the plan or what a row holds changes: rows of another plan are other rows."""
+POINTS = 40
+SEARCHED = 3
+"""Of the first round, so many points spread over it are searched for beyond their neighbours' basins."""
+WIDE = 8
+"""Times a neighbour's solve that a search beyond its basin takes, roughly."""
+DIVERGED = "Diverging_Iterates"
+"""IPOPT's word for an objective that falls without end."""
+
+
+class Met(NamedTuple):
+    """What a task came to: what was reached, the program that it was reached by, and what was asked, SI, by axis."""
+
+    found: Reached
+    asking: Asking
+    place: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Trade:
+    """A front to be computed, as a plan of tasks: two axes with what is sought of each, and what is demanded of both.
+
+    axes: names; senses: "least" or "most" of each; target: whose demands hold, None for none; ranges: axis → from, to,
+    SI; points: how many.
+    """
+
+    scene: Scene
+    axes: tuple[str, str]
+    senses: tuple[Sense, Sense]
+    target: str | None = None
+    ranges: tuple[tuple[str, tuple[float, float]], ...] = ()
+    points: int = POINTS
+    accuracy: float = ACCURACY
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make it again: what is built from it does not pickle."""
+        return Trade, (self.scene, self.axes, self.senses, self.target, self.ranges, self.points, self.accuracy)
+
+    name = "pareto"
+
+    @property
+    def heading(self) -> str:
+        """Scene, target and axes."""
+        return ", ".join([self.scene.name, *([self.target] if self.target else []), " against ".join(self.labels)])
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        """What each axis is called: of a magnitude it says so."""
+        first, second = self.solver.axes
+        return first.called, second.called
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """What each axis is called → kind of quantity, the second axis first."""
+        words = Words(self.scene)
+        kinds = [each.axis.kind or words.kind(each.axis.name) for each in self.solver.axes]
+        return dict(zip(self.labels[::-1], kinds[::-1], strict=True))
+
+    @property
+    def shown(self) -> list[str]:
+        """The slope of the front."""
+        return [self.solver.slope]
+
+    @property
+    def size(self) -> None:
+        """Nobody knows beforehand how many points it takes."""
+
+    @property
+    def asked(self) -> dict[str, object]:
+        """What is asked of every row, for people."""
+        words, sought = Words(self.scene), zip(self.senses, self.labels, strict=True)
+        found: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
+        for name, ends in self.ranges:
+            found[f"range of {name}"] = " ... ".join(words.shown(name, end) for end in ends)
+        return {**found, "points": self.points, "accuracy": self.accuracy}
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """What its rows depend on, as JSON data."""
+        return {
+            "study": f"{self.name} {PLAN}",
+            "scene": self.scene.hash,
+            "units": dict(self.scene.units),
+            "files": files(self.scene),
+            "target": self.target,
+            "axes": dict(zip(self.axes, self.senses, strict=True)),
+            "ranges": {name: list(ends) for name, ends in self.ranges},
+            "points": self.points,
+            "accuracy": self.accuracy,
+            **versions(),
+        }
+
+    @functools.cached_property
+    def key(self) -> str:
+        """A hash of all that its rows depend on, the order of its axes too."""
+        own = [self.axes, self.settings]
+        return hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()[:32]
+
+    @lazy
+    def solver(self) -> Solver:
+        """The programs of the front, built when first asked for."""
+        return Solver(self.scene, self.target, dict(zip(self.axes, self.senses, strict=True)), self.accuracy)
+
+    @property
+    def signs(self) -> tuple[int, int]:
+        """+1 for an axis of which the least is sought, −1 for the most."""
+        first, second = self.solver.axes
+        return first.sign, second.sign
+
+    def batch(self, rows: Sequence[Row]) -> list[Task]:
+        """Return the tasks that follow from finished rows: both ends, then rounds of halved gaps. Raises BadInput."""
+        if not rows:
+            return [Task(end, None, {}, {"end": end}) for end in ENDS]
+        by_point = {row.point: row for row in rows}
+        self._refuse(by_point)
+        self._reaches([by_point[end] for end in ENDS])
+        if not all(by_point[end].certified for end in ENDS):
+            return []
+        scale = self.scale(rows)
+        if not all(scale.width):
+            return []
+        found = front_plan.following(rows, scale, self.points)
+        wide = _spread(len(found)) if len(rows) == len(ENDS) else set()
+        first = len(rows)
+        return [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
+
+    def _task(self, point: int, each: Next, scale: Scale, rows: Mapping[int, Row], wide: bool) -> Task:
+        others = [rows[other].warm for other in each.near[1:]]
+        held = rows[ENDS[0]].warm["held"]
+        ask = {"also": others, "held": held, "wide": wide}
+        ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
+        length = len(each.near) + WIDE * wide
+        return Task(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
+
+    def scale(self, rows: Sequence[Row]) -> Scale:
+        """Return the scale of finished rows."""
+        first, second = (axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes)
+        return front_plan.scaled({row.point: row for row in rows}, self.axes, self.signs, (first, second))
+
+    def _refuse(self, rows: Mapping[int, Row]) -> None:
+        """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
+        for end, name, other in zip(ENDS, self.axes, self.axes[::-1], strict=True):
+            row, sense = rows[end], self.senses[end]
+            away = self.solver.runaway(row.warm["point"]["x"]) if "point" in row.warm else ""
+            if away or row.reason == DIVERGED:
+                why = f"{away} grows without end towards it" if away else "the search runs away from any design"
+                raise BadInput(
+                    f"the {sense} {name} is not reached: {why}",
+                    file=self.scene.origin,
+                    key=name,
+                    allowed=f"a {sense} {name} that some design has",
+                    remedy=f"Give --range of {name} or of {other}, or bound {away or 'every variable'}.",
+                )
+
+    def _reaches(self, ends: Sequence[Row]) -> None:
+        """Raise BadInput where an end lies outside a range: then no point of the front lies in it."""
+        for (name, (low, high)), row in itertools.product(self.ranges, ends):
+            value = row.warm["axes"][name] if row.certified else low
+            words, least = Words(self.scene), SAME_OBJECTIVE * max(abs(low), abs(high))
+            if not low - least <= value <= high + least:
+                problem = f"no point of the front lies in the range; it comes to {words.shown(name, value)}"
+                asked = f"{words.shown(name, low)} ... {words.shown(name, high)}"
+                raise BadInput(problem, file=self.scene.origin, key=name, value=asked, remedy="Give another range.")
+
+    def place(self, row: Row) -> dict[str, float]:
+        """Return the second axis of a row, SI: as it is there, or as it was asked."""
+        return self._told(row, 1)
+
+    def sought(self, row: Row) -> dict[str, float]:
+        """Return the first axis of a row, SI."""
+        return self._told(row, 0)
+
+    def _told(self, row: Row, axis: int) -> dict[str, float]:
+        known, name = row.warm.get("axes", row.place), self.axes[axis]
+        return {self.labels[axis]: known[name]} if name in known else {}
+
+    def told(self, row: Row) -> dict[str, object]:
+        """Return what `--json` prints of a row: both axes too."""
+        return {**row.told(), "axes": {**self.place(row), **self.sought(row)}}
+
+    def read(self, rows: Sequence[Row]) -> Findings:
+        """Return the points of the front in the order of the second axis, then those without a design."""
+        found = front_read.read(self, rows)
+        changes = (Change(each["between"], each["kind"], tuple(each["limits"]), each["at"]) for each in found.changes)
+        slope = f"{self.solver.slope} is the slope of the front."
+        message = f"{found.message} {slope}" if len(found.values(self.axes[1])) > 1 else found.message
+        return Findings(found.rows, message, tuple(changes), found.gaps)
+
+    def scene_at(self, point: int) -> Scene:
+        """Return the scene: all designs of the front stand in it."""
+        return self.scene
+
+    def solve(self, task: Task, parent: Row | None) -> Solution:
+        """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
+        began = time.perf_counter()
+        found, asking, _ = self.reach(task, parent)
+        return front_answer.answer(self.solver, self.target, found, asking, began)
+
+    def solved(self, task: Task, parent: Row | None) -> Row:
+        """Return the row of a task; it depends on nothing but its arguments."""
+        began = time.perf_counter()
+        found, _, place = self.reach(task, parent)
+        told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near")}}
+        return Row(
+            task.point,
+            place,
+            task.parent,
+            found.status,
+            found.reason,
+            designs.flat(found.design),
+            found.figures,
+            found.multipliers,
+            found.reached,
+            found.certified,
+            time.perf_counter() - began,
+            told,
+        )
+
+    def reach(self, task: Task, parent: Row | None) -> Met:
+        """Return what a task comes to."""
+        if "end" in task.ask:
+            return self._end(int(task.ask["end"]), task.ask.get("also", ()))
+        near = [parent.warm] if parent else []
+        cap = self.solver.axes[1].value(task.place[self.axes[1]])
+        asking = Asking(0, (self._cap(0), cap))
+        found = self.solver.solve(asking, [*near, *task.ask["also"]], bool(task.ask["wide"]))
+        return Met(_kept(found, task.ask["held"]), asking, dict(task.place))
+
+    def _cap(self, axis: int, best: bool = False) -> float | None:
+        """Return the largest value of an axis that its range allows, or the least; None without a range."""
+        asked = dict(self.ranges).get(self.axes[axis])
+        if asked is None:
+            return None
+        values = sorted(map(self.solver.axes[axis].value, asked))
+        return values[0] if best else values[1]
+
+    def _end(self, end: int, near: Sequence[Mapping[str, Any]]) -> Met:
+        """Return an end of the front, and what was asked there: the axis' least, but not beyond its range.
+
+        near: from where it is solved; without, it is searched for.
+        """
+        asking = Asking(1, (self._cap(0), None)) if end else Asking(0, (None, self._cap(1)))
+        found, sought = self.solver.solve(asking, near, not near), self.solver.axes[end]
+        reached = sought.value(found.warm["axes"][self.axes[end]]) if found.certified else -math.inf
+        least = self._cap(end, best=True)
+        if found.status == "infeasible":
+            found = replace(found, reason=self._clash(asking) or found.reason)
+        if least is None or reached >= least:
+            return self._sloped(found) if end and found.certified else Met(found, asking, {})
+        asking = Asking(0, (asking.caps[0], least)) if end else Asking(1, (least, asking.caps[1]))
+        return Met(self.solver.solve(asking, near, not near), asking, {self.axes[end]: sought.figure(least)})
+
+    def _clash(self, asking: Asking) -> str:
+        """Return which limits clash, and why; "" where that is not found."""
+        limits = front_answer.clashing(self.solver, self.solver.program(asking)).limits
+        why = registry.of(self.scene).explain(self.scene, limits)
+        return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
+
+    def _sloped(self, found: Reached) -> Met:
+        """Return the least of the second axis as a point like the others, with its slope, where that is certified."""
+        cap = self.solver.axes[1].value(found.warm["axes"][self.axes[1]])
+        asking = Asking(0, (self._cap(0), cap))
+        again = self.solver.solve(asking, [found.warm], None)
+        sizes = [axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes]
+        known = again.warm.get("axes", {}) if again.certified else {}
+        apart = [abs(known.get(name, math.inf) - found.warm["axes"][name]) for name in self.axes]
+        same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, sizes, strict=True))
+        return Met(again, asking, {}) if same else Met(found, Asking(1, (self._cap(0), None)), {})
+
+
+def _kept(found: Reached, held: Sequence[float]) -> Reached:
+    """Return what was reached, infeasible where what the target holds is not as good as along the front."""
+    now = found.warm.get("held", held)
+    if found.certified and any(one > other + front_plan.ALIKE for one, other in zip(now, held, strict=True)):
+        return Reached("infeasible", "what the target holds is out of reach here")
+    return found
+
+
+def _spread(count: int) -> set[int]:
+    """Return which of so many points are searched for widely: evenly spread, the ends' neighbours apart."""
+    return {round((k + 1) * (count + 1) / (SEARCHED + 1)) - 1 for k in range(SEARCHED)} if count else set()

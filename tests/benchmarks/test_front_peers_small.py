@@ -1,0 +1,74 @@
+"""A front beside the peer that gets ten times its time, in small: who judges, what counts, what is said without it."""
+
+import importlib
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_benchmarks_small import FOLDER
+
+from loomopt import packaged
+from loomopt.studies import references
+
+
+@pytest.fixture(scope="module")
+def peers():
+    """Return the benchmark, as it runs from the checkout's top."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(FOLDER.parent))
+        yield importlib.import_module("benchmarks.front_peers")
+        for name in [name for name in sys.modules if name.partition(".")[0] == "benchmarks"]:
+            del sys.modules[name]
+
+
+@pytest.fixture(scope="module")
+def rival(peers):
+    return peers.shedding()
+
+
+def curve(stiffness, preload):
+    """Return a design as a peer has it."""
+    return np.array([stiffness / 1e6, preload / 0.080])
+
+
+def test_the_area_below_a_corner_is_that_of_the_stairs(peers):
+    assert peers.area([(1.0, 2.0), (2.0, 1.0)], (3.0, 3.0)) == 3.0
+    assert peers.area([(2.0, 2.0), (1.0, 1.0), (4.0, 0.0)], (3.0, 3.0)) == 4.0
+
+
+def test_the_referee_reads_published_designs_and_refuses_softer_ones(rival):
+    assert rival.judge(curve(102602.60943, 0.080)) == pytest.approx((102602.60943, 0.080))
+    assert rival.judge(curve(102602.60, 0.080)) is None
+
+
+def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
+    beatup = peers.beatup()
+    told = references.read(packaged.results_path() / "beatup.balance.csv").iloc[0]
+    design = {str(name).split(" [")[0]: cell for name, cell in told.items()}
+    best = beatup.own(SimpleNamespace(design={n: float(design[n]) for n in ("l1", "l2", "l3", "l4", "m4e", "r4e")}))
+    assert beatup.judge(best) == pytest.approx((88.689413492, 0.0), abs=1e-6)
+    assert beatup.judge(best * [1.1, 1, 1, 1, 1]) is None
+    seen, rows = beatup.evaluate(best[None])
+    assert seen[0] == pytest.approx((88.689, 0.0), abs=0.05)
+    assert rows.max() < 1e-8
+
+
+def test_without_the_peer_the_front_is_judged_alone(peers, rival, monkeypatch):
+    monkeypatch.setattr(peers.harness, "installed", lambda name: False)
+    mine, absent = peers.compared(rival, 3)
+    assert mine["admissible"] == mine["designs"] == 3
+    assert mine["missed"] == 0.0
+    assert "pymoo is not installed" in absent["method"]
+    assert absent["missed"] is None
+
+
+def test_a_peer_that_knows_the_front_adds_nothing_where_the_front_is_asked_at_its_places(peers, rival, monkeypatch):
+    known = [curve(144270.37243, 0.040), curve(119901.39519, 0.060), curve(90e3, 0.060)]
+    monkeypatch.setattr(peers.harness, "installed", lambda name: True)
+    monkeypatch.setattr(peers, "evolved", lambda rival, seconds: (np.array(known), 3))
+    mine, asked, theirs = peers.compared(rival, 3)
+    assert theirs["admissible"] == 2, "one is too soft"
+    assert mine["missed"] > 0.01, "three designs are a coarse front"
+    assert asked["missed"] == pytest.approx(0.0, abs=1e-9)
+    assert theirs["missed"] > 0.05

@@ -1,0 +1,130 @@
+"""The periodic steady state of an oscillator: its equation of motion, however it is damped, in every number system."""
+
+import itertools
+import math
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+from loomopt import maths
+from loomopt.balance import Pose
+from loomopt.effects.beatup import resistance
+from loomopt.motion import harmonic
+
+EXACT = maths.mpmath(50)
+MP = mpmath.MPContext()
+MP.dps = 50
+OMEGA, J = 20 * math.pi, 0.625
+GIVEN, OWN = {"M0": 745.0, "beta": 1.15}, {"pulse": 0.52}
+DAMPED = {
+    "lightly": (2e6, 45.0, "under"),
+    "nearly critically": (2e4, 2 * math.sqrt(2e4 * J) * (1 - 1e-9), "under"),
+    "critically": (J * 128.0**2, 2 * J * 128.0, "critical"),
+    "beyond": (2e4, 900.0, "over"),
+    "far beyond": (2e5, 2e5, "over"),
+}
+"""How the shaft is damped → k, c, what that is called; critically in binary too."""
+every = pytest.mark.parametrize("damped", DAMPED)
+
+
+def oscillator(system, damped):
+    k, c, regime = DAMPED[damped]
+    assert harmonic.regime(J, c, k) == regime
+    numbers = [system.number(value) for value in (J, c, k, OMEGA)]
+    return harmonic.Oscillator(system, regime, harmonic.constants(system, regime, *numbers))
+
+
+def answer(system, damped, phi):
+    """Return z and z˙ in answer to the pulse at a crank angle, rad, in any turn."""
+    given = {name: system.number(value) for name, value in GIVEN.items()}
+    own = {name: system.number(value) for name, value in OWN.items()}
+    inside = float(abs(math.remainder(float(phi) - GIVEN["beta"], 2 * math.pi)) < OWN["pulse"] / 2)
+    pose: Any = Pose(phi, system.number(OMEGA), None, None, None)
+    return resistance.response(system, oscillator(system, damped), pose, given, own, inside)
+
+
+def pulse(phi):
+    away = (phi - GIVEN["beta"] + MP.pi) % (2 * MP.pi) - MP.pi
+    return GIVEN["M0"] * MP.cos(MP.pi * away / OWN["pulse"]) if abs(away) < OWN["pulse"] / 2 else 0
+
+
+@every
+@pytest.mark.parametrize("phi", [0.3, 0.9, 1.15, 1.4, 1.5, 3.0, 4.2, 6.2, 7.0])
+def test_the_answer_obeys_the_equation_of_motion(damped, phi):
+    """z˙ is the slope of z, and J z¨ + c z˙ + k z is the pulse: by differences at 50 digits, in two turns."""
+    k, c, _ = DAMPED[damped]
+    step, time = MP.mpf(10) ** -15, 1 / MP.mpf(OMEGA)
+    (low, low_rate), (z, rate), (high, high_rate) = (
+        answer(EXACT, damped, EXACT.number(phi) + sign * step) for sign in (-1, 0, 1)
+    )
+    assert abs((high - low) / (2 * step * time) - rate) <= 1e-18 * abs(rate) + MP.mpf(10) ** -20
+    left = J * (high_rate - low_rate) / (2 * step * time) + c * rate + k * z
+    assert abs(left - pulse(phi)) <= 1e-18 * GIVEN["M0"]
+
+
+@every
+def test_the_answer_goes_on_through_the_corners_and_comes_back_after_a_turn(damped):
+    corners = [GIVEN["beta"] + side * OWN["pulse"] / 2 for side in (-1, 1)]
+    step = EXACT.number(10) ** -25
+    size = abs(answer(EXACT, damped, EXACT.number(1.2))[0])
+    for corner in corners:
+        before, after = (answer(EXACT, damped, EXACT.number(corner) + sign * step) for sign in (-1, 1))
+        assert abs(after[0] - before[0]) <= 1e-14 * size
+        assert abs(after[1] - before[1]) <= 1e-11 * size * OMEGA
+    for phi in (0.4, 1.2, 5.0):
+        once, again = (answer(EXACT, damped, EXACT.number(phi) + turns * 2 * EXACT.pi) for turns in (0, 3))
+        assert [abs(a - b) <= MP.mpf(10) ** -40 for a, b in zip(once, again, strict=True)] == [True, True]
+
+
+@every
+@pytest.mark.parametrize("system", [maths.FLOAT, maths.numpy(), maths.balls()], ids=lambda system: system.name)
+def test_floats_and_balls_are_right_to_twelve_digits(damped, system):
+    for phi in (0.3, 1.0, 1.15, 1.3, 2.0, 5.5):
+        exact, found = answer(EXACT, damped, EXACT.number(phi)), answer(system, damped, system.number(phi))
+        size = max(abs(answer(EXACT, damped, EXACT.number(x))[0]) for x in (1.15, 1.3, 2.0))
+        for value, true, scale in zip(found, exact, (size, size * math.sqrt(DAMPED[damped][0] / J)), strict=True):
+            assert abs(float(value) - float(true)) <= 1e-12 * float(scale), phi
+
+
+def test_what_is_nearly_critical_goes_over_into_what_is():
+    """The formulas meet: the share by which damping counts as critical is what they differ by."""
+    k = 1.24e4
+    c = 2 * math.sqrt(k * J)
+    found = []
+    for regime, factor in (("under", 1 - 1e-10), ("critical", 1.0), ("over", 1 + 1e-10)):
+        constants = harmonic.constants(maths.FLOAT, regime, J, c * factor, k, OMEGA)
+        found.append(harmonic.Oscillator(maths.FLOAT, regime, constants).ringing((1e-3, 0.2), 0.01))
+    for one, other in itertools.pairwise(found):
+        assert other == pytest.approx(one, rel=1e-9)
+
+
+def test_a_kick_once_a_turn_adds_up_all_that_is_left_of_those_before():
+    for damped in DAMPED:
+        of = oscillator(EXACT, damped)
+        kick = EXACT.number(2e-4), EXACT.number(-0.3)
+        left = of.ringing(of.repeated(*kick), of.turn)
+        assert [abs(a + b - c) < 1e-40 for a, b, c in zip(left, kick, of.repeated(*kick), strict=True)] == [True] * 2
+
+
+def test_harmonics_of_what_is_known_in_closed_form():
+    """1/(1 − a cos φ) with a = 2b/(1 + b²): harmonics fall by b each, so that the tail says when there are enough."""
+
+    def weigh(b):
+        def sums(angles, weights):
+            values = [(1 - b * b) / (1 - 2 * b * math.cos(angle - 0.7) + b * b) for angle in angles]
+            return (np.array(weights) @ np.array(values)).tolist()
+
+        return sums
+
+    series = harmonic.harmonics(maths.FLOAT, 64, weigh(0.4))
+    for n in range(64):
+        size = (2 if n else 1) * 0.4**n
+        assert series.cosines[n] == pytest.approx(size * math.cos(0.7 * n), abs=3e-15)
+        assert series.sines[n] == pytest.approx(size * math.sin(0.7 * n), abs=3e-15)
+    for phi in (0.0, 1.0, 4.0):
+        assert series.at(maths.FLOAT, phi) == pytest.approx(0.84 / (1 - 0.8 * math.cos(phi - 0.7) + 0.16), rel=1e-13)
+    assert [harmonic.enough(weigh(b), maths.FLOAT) for b in (0.3, 0.5, 0.85)] == [32, 64, 256]
+    with pytest.raises(ArithmeticError, match="512 harmonics are too few"):
+        harmonic.enough(weigh(0.97), maths.FLOAT)

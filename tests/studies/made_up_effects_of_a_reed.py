@@ -1,0 +1,73 @@
+"""Made-up effects of the beat-up, each a torque on the reed, in scenes that pickle."""
+
+import copy
+from dataclasses import replace
+
+from loomopt import scenes
+from loomopt.effects.kinds import Clash, Load, ranked
+from loomopt.jobs.beatup.scene import SCHEMA
+from loomopt.jobs.registry import load
+from loomopt.quantities import Torque
+from loomopt.schema import Table
+
+
+class Own(Table):
+    """T: a torque, N·m."""
+
+    T: Torque
+
+
+class Moving(Load):
+    """Stands for a kind that yields."""
+
+
+def push(name, rank, kind=Load, sign=1, **declared):
+    """Return an effect that pushes the reed by a steady torque; sign: −1 for the other way."""
+    return kind(
+        name=name,
+        summary="",
+        own=Own,
+        rank=rank,
+        acts="output",
+        force=lambda maths, pose, given, own, switch: sign * own["T"],
+        **declared,
+    )
+
+
+EFFECTS = (
+    push("push", 201),
+    push("pull", 202),
+    push("leaning", 203, sign=-1, beside=("push",)),
+    push("lone", 204, clashes=(Clash("push", "both push"),)),
+    push("shaft", 10, Moving, clashes=(Clash("push", "it bends"), Clash("motor", "it turns"))),
+    push("motor", 11, Moving),
+    push("lost", 205, beside=("nowhere",)),
+    push("blind", 206, needs=("mechanism.m4",)),
+)
+
+
+class Jobs:
+    """The beat-up with more effects."""
+
+    known = replace(SCHEMA, effects=ranked([*SCHEMA.effects.values(), *EFFECTS]))
+
+    def __reduce__(self):
+        return Jobs, ()
+
+    def __contains__(self, name):
+        return name == "beatup"
+
+    def names(self):
+        return ("beatup",)
+
+    def schema(self, job, document, effects):
+        return self.known
+
+
+def scene(on=(), **available):
+    """Return the packaged beat-up with these effects available, T in N·m or their tables; on: those that are on."""
+    document = copy.deepcopy(dict(load("beatup").document))
+    tables = {k: {"T": f"{v} N*m"} if isinstance(v, int | float) else v for k, v in available.items()}
+    document["available"] = {name: own for name, own in tables.items() if name not in on}
+    document["effects"] |= {name: own for name, own in tables.items() if name in on}
+    return scenes.build(document, Jobs(), "beatup.toml")
