@@ -227,16 +227,26 @@ class Course:
 
         While leaving it out together fails, the effect that is worth most comes back.
         """
-        may_go = [name for name in self.study.together if name not in base and self.worths[name].may_go]
+        may_go = [name for name in self.study.together if name in self.worths and self.worths[name].may_go]
         while may_go := [name for name in may_go if self._closed({name}) - base <= set(may_go)]:
             off = base | Off(may_go)
             if off not in self.rows and self._possible(off):
                 return [off]
-            self.together = self._worth(judge, ", ".join(may_go), off)
+            self.together = self._joint(judge, base, may_go)
             if self.together.may_go:
                 break
             may_go.remove(max(reversed(may_go), key=lambda name: self.worths[name].most))
         self.together = self.together if may_go else None
-        beside = [name for name in self.study.together if name in self.measured and self.worths[name].may_go]
-        self.left_out = tuple(name for name in self.study.together if name in {*may_go, *beside})
+        self.left_out = tuple(may_go)
         return []
+
+    def _joint(self, judge: Judge, base: Off, names: Sequence[str]) -> Worth:
+        """Return what leaving effects out together does, also where some of them solve does not take."""
+        off = base | Off(names)
+        found = self._worth(judge, ", ".join(names), off)
+        beside = self.measured & set(names)
+        if not beside or not self._possible(off):
+            return found
+        needed = {other for name in beside for other in self.effects[name].beside}
+        scene = self.study.without(base - beside - needed)
+        return judge.with_beside(found, scene, self.rows[off], self.study.tolerance)

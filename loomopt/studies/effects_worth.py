@@ -1,5 +1,6 @@
 """What an effect is worth in numbers: designs with and without it, judged beside those of the reference."""
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -124,6 +125,24 @@ class Judge:
         shift = {figure: _negative(value) for figure, value in self._changes(there, _plain).items()}
         excess = self._excess(there)
         return Worth(name, shift, nothing, excess, _within(shift, {}, excess, tolerance), EVALUATED, why)
+
+    def with_beside(self, found: Worth, scene: Scene, row: Row, tolerance: float) -> Worth:
+        """Return the worth of effects beside which others are left out that solve does not take.
+
+        found: of those that it takes; scene: the reference with the others on; row: of the solve without them all.
+        """
+        alone = self.beside(found.effect, scene, tolerance)
+        shift = {
+            figure: None if own is None or other is None else own + other
+            for (figure, own), other in zip(found.shift.items(), alone.shift.values(), strict=True)
+        }
+        try:
+            there = _evaluated(scene, {**self.row.design, **row.design}, self.target)
+        except (BadInput, ValueError, ZeroDivisionError, FloatingPointError) as error:
+            return dataclasses.replace(found, may_go=False, why=str(error))
+        excess = None if found.excess is None else max(found.excess, self._excess(there))
+        may_go = found.may_go and _within(shift, found.regret, excess, tolerance)
+        return dataclasses.replace(found, shift=shift, excess=excess, may_go=may_go)
 
     def needed(self, name: str, why: str) -> Worth:
         """Return that an effect cannot be left out, and why."""

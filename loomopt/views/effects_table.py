@@ -97,6 +97,9 @@ def verdict(found: Found) -> list[str]:
         if len(found.left_out) > 1 and abs(found.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = found.largest_omission.by, found.largest_omission.of, found.largest_omission.value
             lines[-1] += f" Most comes from {found.largest_omission.effect}: {_moved(by, of, value)}."
+    alone = [row.effect for row in found.rows if row.may_go and row.effect not in found.left_out]
+    if alone:
+        lines.append(f"By itself {listed(alone)} may go, but not together with what else is left out.")
     same = [row.effect for row in found.rows if _only_figures(row, found.tolerance)]
     if same:
         lines.append(f"Without {listed(same)} as good a design is found, but its figures are wrong by more than that.")

@@ -82,9 +82,8 @@ def test_shift_and_regret_of_the_reference_table(beatup, name):
 
 
 def test_at_one_percent_two_effects_may_be_left_out_together(beatup):
-    mine = [name for name in beatup.left_out if name in TABLE]
-    assert mine == ["bearing_friction", "centrifugal"]
-    assert beatup.kept == tuple(name for name in beatup.reference.effects if name not in mine)
+    assert beatup.left_out == ("bearing_friction", "centrifugal")
+    assert beatup.kept == tuple(name for name in beatup.reference.effects if name not in beatup.left_out)
     assert beatup.together.effect == "bearing_friction, centrifugal"
     assert beatup.together.may_go
     assert beatup.together.shift["peak_torque"] == pytest.approx(0.39194 / 93.850, rel=1e-4)
@@ -290,6 +289,19 @@ def test_what_solve_does_not_take_is_measured_at_the_reference(refusing, torque,
     assert "motor" not in found.kept
 
 
+@pytest.mark.parametrize(("motor", "left_out"), [(0.5, ("motor", "push")), (4.0, ("motor",)), (6.0, ("push",))])
+def test_what_solve_does_not_take_is_left_out_only_if_that_holds_together(refusing, motor, left_out):
+    """1 % allows 7.35 N*m, and push takes 5; of two that may go by themselves only, the one worth more comes back."""
+    torques = {"push": 5.0, "motor": motor}
+    found = lo.effects(made_up.scene(**torques))
+    assert [row_of(found, name).may_go for name in torques] == [True, True]
+    assert found.left_out == left_out
+    assert found.judged == (() if "motor" in left_out else ("motor",))
+    assert found.together.shift["M3_fdc"] == pytest.approx(-sum(torques[n] for n in left_out) / 734.985, rel=1e-5)
+    stays = sorted(set(torques) - set(left_out))
+    assert (f"By itself {' '.join(stays)} may go, but not together" in found._repr_html_()) is bool(stays)
+
+
 def test_without_an_admissible_design_the_rows_say_so():
     found = lo.effects(lo.load("shedding-static").set("bounds.K1.max", "100 N/m"))
     assert found.reference.status == "infeasible"
@@ -320,7 +332,9 @@ def test_a_target_that_no_effect_serves_is_refused():
 def test_it_says_what_it_is_and_shows_itself(beatup):
     assert repr(beatup).startswith("<EffectsStudy beatup, balance: at 1 % bearing_friction, centrifugal")
     page = beatup._repr_html_()
-    assert "At 1 %, bearing_friction, centrifugal and speed_fluctuation may be left out" in page
+    assert "At 1 %, bearing_friction and centrifugal may be left out" in page
+    assert "By itself speed_fluctuation may go, but not together with what else is left out." in page
+    assert "Evaluate the design with speed_fluctuation, which solve does not take." in page
     assert "resistance, rod_inertia and gravity as good a design is found, but its figures are wrong" in page
     assert "solve" not in page.split("</thead>")[0], "times differ from run to run"
     with pytest.raises(TypeError, match="never changes"):
@@ -332,7 +346,7 @@ def test_the_table_has_shares_and_units_and_says_where_it_comes_from(beatup):
     assert table.index.name == "without"
     assert table.loc["rocker_inertia", "M3_fdc shift [N*m]"] == pytest.approx(54.59525, abs=1e-5)
     assert table.loc["rocker_inertia", "M3_fdc regret [%]"] == pytest.approx(7.114, abs=1e-3)
-    assert table["may go"].sum() == len(beatup.left_out)
+    assert set(table.index[table["may go"]]) == {*beatup.left_out, "speed_fluctuation"}
     assert table.attrs["study"] == "effects"
     assert table.attrs["tolerance"] == "0.01"
 
