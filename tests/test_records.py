@@ -1,15 +1,20 @@
 """Records are the standard library's frozen dataclasses in everything that a class can be asked."""
 
+import ast
 import copy
 import dataclasses
 import inspect
 import pickle
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import field, fields
+from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
 import pytest
 
+import loomopt
 from loomopt import records
 
 Item = TypeVar("Item")
@@ -210,3 +215,25 @@ def test_what_the_standard_library_refuses_is_refused(decorator):
 def test_only_frozen_ones_are_made():
     with pytest.raises(TypeError, match="frozen"):
         records.record(frozen=False)
+
+
+def test_every_frozen_dataclass_of_the_package_is_one():
+    """Compiling the others would be most of what importing their modules takes, on the Pythons that compile each."""
+    for path in Path(loomopt.__file__).parent.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        taken = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "dataclasses"]
+        assert path.stem == "records" or "dataclass" not in {name.name for node in taken for name in node.names}, path
+        calls = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        assert not [call for call in calls if call.startswith("dataclasses.dataclass(frozen")], path
+
+
+def test_a_class_compiles_one_function_where_the_standard_library_compiles_many():
+    """Counted by what the interpreter reports of every source it compiles."""
+    script = (
+        "import sys\nfrom loomopt.records import dataclass, record\nseen = []\n"
+        "sys.addaudithook(lambda event, about: seen.append(about) if event == 'compile' else None)\n"
+        "record(frozen=True)(type('Link', (), {'__annotations__': {'length': float}, '__doc__': 'A link.'}))\n"
+        "print(len(seen), dataclass is record)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", str(sys.version_info < (3, 13))]
