@@ -8,8 +8,10 @@ import functools
 import importlib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+from loomopt.records import dataclass
 
 if TYPE_CHECKING:
     from loomopt.tracing import Tape

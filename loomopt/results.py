@@ -3,12 +3,13 @@
 import dataclasses
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs, showing
 from loomopt.lazy import lazy
+from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import check_numbers, target_name

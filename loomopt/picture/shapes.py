@@ -4,13 +4,14 @@ import itertools
 import math
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from loomopt.picture.placing import STEP, Box, Floats
 from loomopt.picture.units import Unit
+from loomopt.records import dataclass
 
 
 class Point(NamedTuple):

@@ -1,12 +1,13 @@
 """The active set of one design: rows that touch their limits, and the smooth pieces that make up each objective."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Extreme, Sampler
+from loomopt.records import dataclass
 from loomopt.tolerances import ACTIVE, FEASIBLE
 
 Groups = tuple[tuple[int, ...], ...]

@@ -1,8 +1,9 @@
 """How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
 
+import dataclasses
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from loomopt.nlp import exchange
@@ -82,7 +83,7 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     return search
 
 
-@dataclass
+@dataclasses.dataclass
 class _Steps:
     """Starts as they are explored: what is told of each; count: how many are known to come."""
 

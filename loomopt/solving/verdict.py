@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 from loomopt.program.program import Limit, Objective
+from loomopt.records import dataclass
 from loomopt.tolerances import ROUNDED
 
 

@@ -1,9 +1,10 @@
 """What a study is before it runs: points to be solved, planned from finished rows alone."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol
 
+from loomopt.records import dataclass
 from loomopt.studies.rows import Row
 
 

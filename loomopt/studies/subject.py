@@ -3,7 +3,6 @@
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
+from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution

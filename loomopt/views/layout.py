@@ -1,13 +1,15 @@
-"""Text for terminals and pipes: paragraphs and tables, laid out by Rich; nothing is wrapped in a pipe."""
+"""Text for terminals and pipes: paragraphs and tables. Nothing is wrapped in a pipe, by Rich what a terminal needs."""
 
 import os
 import re
 import shutil
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import StringIO
+from itertools import zip_longest
 from typing import Any
+
+from loomopt.records import dataclass
 
 GAP = "  "
 JOINED = "\ue000"
@@ -16,6 +18,10 @@ RULED = "    \n    \n -- \n    \n    \n    \n    \n    \n"
 """One rule under the heading and no other line, in Rich's terms."""
 UNWRAPPED = 10_000
 """Columns of a pipe or a file."""
+ONE_CELL = re.compile(
+    "[ -~\u00a1-\u00ac\u00ae-\u02ff\u0370-\u0482\u2010-\u2027\u2030-\u205e\u2070-\u20cf\u2100-\u22ff" + JOINED + "]*"
+)
+"""Text whose characters take one cell of a terminal each, and are no white space but the space."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +57,51 @@ def show(*parts: str | Grid) -> None:
 
 def render(parts: Sequence[str | Grid], columns: int | None) -> str:
     """Return paragraphs and tables as text no wider than `columns` where that can be."""
+    blocks = [_spread(part) if isinstance(part, Grid) else part.split("\n") for part in parts]
+    if all(_fits(block, columns or UNWRAPPED) for block in blocks):
+        text = "\n".join(line for block in blocks for line in block)
+    else:
+        text = _wrapped(parts, columns or UNWRAPPED)
+    lines = [line.rstrip() for line in spaced(text).split("\n")]
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n")
+
+
+def _fits(lines: list[str], columns: int) -> bool:
+    """Say whether lines are as wide as they are long, and none is wider than that."""
+    return bool(lines) and all(len(line) <= columns and ONE_CELL.fullmatch(line) for line in lines)
+
+
+def _spread(grid: Grid) -> list[str]:
+    """Return a table's lines unwrapped, a blank one around it; none for a wider title, no heading, an empty column."""
+    rows = [[cell.split("\n") for cell in row] for row in (grid.columns, *grid.lines)]
+    widths = [max(len(line) for cell in column for line in cell) for column in zip(*rows, strict=True)]
+    below = max(map(len, rows[0]))
+    rows[0] = [[""] * (below - len(cell)) + cell for cell in rows[0]]
+    lines = [
+        GAP.join(
+            line.rstrip(" ").rjust(width) if place in grid.right else line.ljust(width)
+            for place, (line, width) in enumerate(zip(row, widths, strict=True))
+        )
+        for cells in rows
+        for row in zip_longest(*cells, fillvalue="")
+    ]
+    if len(grid.title) > len(lines[0]) or not any(grid.columns) or not all(widths):
+        return []
+    return ["", *([grid.title] if grid.title else []), *lines[:below], "-" * len(lines[0]), *lines[below:], ""]
+
+
+def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
+    """Return paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
 
-    console = Console(file=StringIO(), width=columns or UNWRAPPED, color_system=None, highlight=False, markup=False)
+    console = Console(file=StringIO(), width=columns, color_system=None, highlight=False, markup=False)
     for part in parts:
         if isinstance(part, Grid):
             console.print(_table(part), crop=False)
         else:
             for line in part.split("\n"):
                 console.print(_paragraph(line), crop=False)
-    text = spaced(console.file.getvalue())  # type: ignore[attr-defined]
-    lines = [line.rstrip() for line in text.split("\n")]
-    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n")
+    return str(console.file.getvalue())  # type: ignore[attr-defined]
 
 
 def _paragraph(line: str) -> Any:

@@ -27,6 +27,7 @@ from loomopt.picture import effect_equations
 from loomopt.picture.cam_laws import Unwritten, law
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
 from loomopt.program.model import JobModel
+from loomopt.records import dataclass
 
 SPEED = "omega"
 SEGMENTS = {
@@ -37,7 +38,7 @@ SEGMENTS = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class FrameSymbols(Motion):
     """The frame at one instant, as loads read it: X, X', X'' are symbols; segment, worst: data."""
 
