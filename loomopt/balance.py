@@ -7,11 +7,11 @@ Only loads that stand in the scene are in the sums. Each term is written in its 
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from loomopt.effects.kinds import Load, Motion, State
 from loomopt.maths import Maths, Number
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 Acting = Load[Any] | State

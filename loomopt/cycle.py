@@ -6,6 +6,7 @@ one piece and u = 0 of the next. As a function of the design, a node's angle is 
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from loomopt.lazy import lazy
 from loomopt.maths import Number
-from loomopt.records import dataclass
 from loomopt.schema import Values
 from loomopt.tolerances import SAME_ANGLE
 

@@ -3,11 +3,11 @@
 import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt.lazy import lazy
-from loomopt.records import dataclass
 from loomopt.results import Answer, solved
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene

@@ -8,10 +8,8 @@ import functools
 import importlib
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
-
-from loomopt.records import dataclass
 
 if TYPE_CHECKING:
     from loomopt.tracing import Tape

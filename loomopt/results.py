@@ -3,13 +3,12 @@
 import dataclasses
 import os
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs, showing
 from loomopt.lazy import lazy
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import check_numbers, target_name

@@ -4,10 +4,10 @@ A scene may come from somebody else, and a message about it may go back there: i
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from loomopt.errors import BadInput
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 
 

@@ -1,12 +1,11 @@
 """All that a scene needs to know of its job, so that it can be read and checked without knowing any."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from loomopt.effects.kinds import Effect
 from loomopt.lazy import lazy
-from loomopt.records import dataclass
 from loomopt.schema import Axis, Conflict, Figure, Sense, Table, Target
 from loomopt.units import Shown
 

@@ -1,7 +1,7 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from loomopt import scene_display
@@ -10,7 +10,6 @@ from loomopt.effects.kinds import Effect
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
 from loomopt.owned import label, owned
-from loomopt.records import dataclass
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_errors import clean, refusal, shown, unknown
 from loomopt.scene_paths import Paths

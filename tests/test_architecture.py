@@ -16,7 +16,7 @@ TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
 ROOMS = (
-    "records jets boxes box_series tracing",
+    "jets boxes box_series tracing",
     "maths errors frozen interrupts tolerances lazy showing",
     "units",
     "quantity_patterns",

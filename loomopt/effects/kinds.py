@@ -5,11 +5,10 @@ An effect that is absent from a scene is absent from its equations.
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from loomopt.maths import Maths, Number
-from loomopt.records import dataclass
 from loomopt.schema import Figure, Table, Values
 from loomopt.units import Shown
 

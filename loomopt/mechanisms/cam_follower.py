@@ -7,12 +7,12 @@ arm l is pivoted at the distance a from the cam's axis. Seen along the arm the c
 """
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from loomopt.lazy import lazy
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
-from loomopt.records import dataclass
 from loomopt.units import Shown, usual
 
 if TYPE_CHECKING:

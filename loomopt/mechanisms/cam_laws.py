@@ -9,11 +9,11 @@ Gutman 1961 and Freudenstein 1960 (first and third harmonics).
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
 from loomopt.maths import Maths, Number
-from loomopt.records import dataclass
 
 
 class Derivatives(NamedTuple):

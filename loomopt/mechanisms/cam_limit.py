@@ -6,9 +6,10 @@ s = 1. On the arc s'' = −(α + β s), a straight line on each side of the midd
 from energy and its duration from arc cosines; what is left is one unknown, the stiffness for which both fill the rise.
 """
 
+from dataclasses import dataclass
+
 from loomopt import maths
 from loomopt.maths import Maths, Number
-from loomopt.records import dataclass
 
 DIGITS, ROUNDS = 40, 400
 

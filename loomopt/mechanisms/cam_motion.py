@@ -4,6 +4,7 @@ import bisect
 import functools
 import itertools
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
@@ -11,7 +12,6 @@ from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
 from loomopt.mechanisms.turning_points import crossing
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 PREFIX = "law_"

@@ -7,12 +7,12 @@ interval a cubic is its analytic continuation.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.records import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

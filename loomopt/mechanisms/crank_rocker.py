@@ -4,13 +4,13 @@ Angles in rad from AD, derivatives with respect to φ; lengths in m (any one uni
 the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cranks and near dead centres.
 """
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number, numpy
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector
-from loomopt.records import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

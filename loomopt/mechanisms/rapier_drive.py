@@ -6,12 +6,13 @@ centre, counter-clockwise. Five-bar C0 C D B2 B0: crank l4 turns the other way a
 link l5 = CD; l6 = B2D carries the gear sector; B2 on the sley at radius l3p, angle φ3 + α. Lengths in m, angles in rad.
 """
 
+from dataclasses import dataclass
+
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker, dyad
 from loomopt.mechanisms.crank_rocker import Lengths
 from loomopt.mechanisms.dyad import Vector, dot
-from loomopt.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ the motion turns, is found by steps that no root can be inside of: a bound on th
 contact the body is at x_c, and it leaves where the force that would hold it there falls below zero.
 """
 
-import dataclasses
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from loomopt.mechanisms.turning_points import crossing
 from loomopt.motion.free import Body, Moving, Piece, bound, safe, unhindered
-from loomopt.records import dataclass
 
 TURN = 2 * math.pi
 CHATTER = 1e-6
@@ -166,7 +165,7 @@ def _same(one: State | None, other: State | None, cam: Cam) -> bool:
     return near and abs(one.v - other.v) <= REPEATED * cam.stroke * cam.omega
 
 
-@dataclasses.dataclass
+@dataclass
 class _Rule:
     """One turn after another: state at its beginning → turn."""
 

@@ -5,9 +5,8 @@ M ẍ + C ẋ + k x + f + F sgn ẋ = 0        k, f: one pair between corners of
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
-
-from loomopt.records import dataclass
 
 SERIES_REACH, SERIES_TERMS = 1.0, 26
 """Time, over the shorter of period and decay, up to which a power series gives the response, and its terms: 1/25! is

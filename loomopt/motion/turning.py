@@ -8,13 +8,12 @@ piece's degree is doubled until the end of its Chebyshev series is lost in round
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-
-from loomopt.records import dataclass
 
 Floats = NDArray[np.float64]
 Pieces = NDArray[np.intp]

@@ -7,6 +7,7 @@ Numerical Optimization, 2nd ed., section 15.3].
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.nlp.expressions import Expressions
 from loomopt.nlp.lifted import Lifted
-from loomopt.records import dataclass
 
 
 class Entries:

@@ -3,13 +3,12 @@
 import functools
 import math
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler, sampled
-from loomopt.records import dataclass
 from loomopt.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, POLISH_FARTHEST, ROUNDING, SAMPLED, SAMPLES
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})

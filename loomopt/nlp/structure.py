@@ -7,6 +7,7 @@ through a few slots, each a node that the exchange fills; an unused slot weighs 
 import functools
 import itertools
 from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,6 @@ from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import DATUM, quadrature
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 
 
 class NodeParameters(NamedTuple):

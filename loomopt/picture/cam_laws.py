@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Hashable
+from dataclasses import dataclass
 from fractions import Fraction
 
 from loomopt import maths
@@ -10,7 +11,6 @@ from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
 from loomopt.picture.equations import Equation, Expression, cases, equation, symbol, sympy
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 PRIMES = ("s", "s'", "s''")

@@ -4,12 +4,12 @@ import dataclasses
 import functools
 import importlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from loomopt import balance, maths
 from loomopt.balance import Acting
 from loomopt.effects.kinds import Effect, Load, Motion
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 Expression = Any

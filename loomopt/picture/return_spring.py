@@ -5,12 +5,12 @@ schematic. Its elongation and the travel are drawn at full scale.
 """
 
 import math
+from dataclasses import dataclass
 
 from loomopt.picture.drawing import Label, along
 from loomopt.picture.shapes import Line, Point, Primitive
 from loomopt.picture.symbols import dimension, ground, spring
 from loomopt.picture.units import Units
-from loomopt.records import dataclass
 from loomopt.units import show
 
 LAYER = "schematic"

@@ -4,14 +4,13 @@ import itertools
 import math
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from loomopt.picture.placing import STEP, Box, Floats
 from loomopt.picture.units import Unit
-from loomopt.records import dataclass
 
 
 class Point(NamedTuple):

@@ -1,13 +1,12 @@
 """A mechanism as joints and links in the positions that matter, full scale in m: what pictures of it share."""
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from loomopt.picture.shapes import Circle, Line, Point, Primitive, Trace
 from loomopt.picture.symbols import fixed_pivot, mass
 from loomopt.picture.units import METRIC, Units
-from loomopt.records import dataclass
 from loomopt.units import factor
 
 JOINT = 0.35

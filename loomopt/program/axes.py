@@ -2,14 +2,13 @@
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from loomopt.errors import BadInput
 from loomopt.maths import Number
 from loomopt.program.instant import Formula, Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Objective, Program
-from loomopt.records import dataclass
 from loomopt.schema import Axis, Sense
 
 Asked = Mapping[str, Sense]

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Collection, Hashable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from loomopt.program import drive
 from loomopt.program.instant import Instant, Row
 from loomopt.program.kinematics import Arcs, Group, Kinematics
 from loomopt.program.sampling import KEPT, Sampler
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.schema import Values

@@ -7,7 +7,7 @@ eliminates states, where there are any.
 import functools
 import math
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from loomopt import cycle
@@ -21,7 +21,6 @@ from loomopt.program import formulas
 from loomopt.program.corners import cornered
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics, Squares
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 __all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]

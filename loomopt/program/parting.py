@@ -3,6 +3,7 @@
 import bisect
 import functools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from loomopt.motion.free import Moving
 from loomopt.program.curves import ANGLE, POWER, Columns, Rows, columns_at, load_name, rows, split
 from loomopt.program.free_loads import SAMPLES, Forms, UnfollowedError, body, forms, sizes
 from loomopt.program.sampling import Sampler
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY, SAME_ANGLE

@@ -6,14 +6,13 @@ serves every scene of the same structure.
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from loomopt.cycle import Where
 from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import JobModel
-from loomopt.records import dataclass
 from loomopt.schema import Values
 from loomopt.tolerances import FEASIBLE
 

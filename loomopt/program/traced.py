@@ -11,17 +11,15 @@ themselves are run on a sampler's own grid, where the quantities that are asked 
 design alone, which share their dead centres (in jets a recording takes nine times as long); and by the NLPs.
 """
 
-import dataclasses
 import weakref
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.maths import Maths, Number
 from loomopt.program.model import JobModel
-from loomopt.records import dataclass
 from loomopt.tracing import Bind, Program, Recorded, Tape
 
 WORTH_IT = 64
@@ -57,7 +55,7 @@ class Recording:
         return at
 
 
-@dataclasses.dataclass
+@dataclass
 class _History:
     """How often quantities of a model were evaluated, and their recording, if they have one."""
 

@@ -8,6 +8,7 @@ inside the balls.
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,6 @@ from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler, Tally
-from loomopt.records import dataclass
 from loomopt.tolerances import MEAN_BOXES, MOST_BOXES, NEAR_TOP
 
 CycleRow = tuple[str, float, Where | None]

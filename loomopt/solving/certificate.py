@@ -7,14 +7,13 @@ figure that decides is too near its threshold for floats, all is judged again in
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.records import dataclass
 from loomopt.solving import kkt, second_order
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.derivatives import Derivatives

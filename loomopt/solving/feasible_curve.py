@@ -9,6 +9,7 @@ the directions that are curved, to where the Lagrangian is least.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,6 @@ from loomopt.lazy import lazy
 from loomopt.nlp.point import sampler_at
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import Row
 from loomopt.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET, PROBES, RANK, SAME_NODE

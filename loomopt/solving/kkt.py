@@ -7,11 +7,11 @@ by multipliers that sum to 1. A limit or an earlier objective that binds is an e
 import math
 import sys
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.records import dataclass
 from loomopt.solving.nnls import nnls
 from loomopt.solving.rows import ActiveSet, Groups
 from loomopt.tolerances import POSITIVE

@@ -2,10 +2,10 @@
 
 import functools
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from loomopt.nlp.point import sampler_at
 from loomopt.program.program import Program
-from loomopt.records import dataclass
 from loomopt.tolerances import FALL_MARGIN, FALLEN, PROBES
 
 

@@ -6,7 +6,7 @@ touches its limit, so it is proven up to a slack: a share of the quantity's larg
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,7 +19,6 @@ from loomopt.jobs.base import Job
 from loomopt.program import states
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.showing import Shown
 from loomopt.solving.asked import check_sought, target_name

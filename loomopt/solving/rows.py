@@ -1,13 +1,12 @@
 """The active set of one design: rows that touch their limits, and the smooth pieces that make up each objective."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 from loomopt.tolerances import ACTIVE, FEASIBLE
 
 Groups = tuple[tuple[int, ...], ...]

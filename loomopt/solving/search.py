@@ -4,13 +4,12 @@ import functools
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, Settings, sampler_at
 from loomopt.program.program import Program
-from loomopt.records import dataclass
 from loomopt.solving.certificate import certify
 from loomopt.solving.settle import settle
 from loomopt.solving.verdict import Certificate

@@ -14,14 +14,13 @@ Lagrangian is read at a few steps along the line and at designs beside it that k
 
 import math
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from loomopt.cycle import Floats
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
-from loomopt.records import dataclass
 from loomopt.solving import settle
 from loomopt.solving.cone import least_on_cone
 from loomopt.solving.derivatives import Derivatives

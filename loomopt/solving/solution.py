@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from loomopt.frozen import freeze
 from loomopt.lazy import lazy
-from loomopt.records import dataclass
 from loomopt.scene_document import copied
 from loomopt.solving.verdict import Certificate, GlobalBound
 

@@ -1,9 +1,8 @@
 """How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
 
-import dataclasses
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from loomopt.nlp import exchange
@@ -83,7 +82,7 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     return search
 
 
-@dataclasses.dataclass
+@dataclass
 class _Steps:
     """Starts as they are explored: what is told of each; count: how many are known to come."""
 

@@ -2,11 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from loomopt.program.program import Limit, Objective
-from loomopt.records import dataclass
 from loomopt.tolerances import ROUNDED
 
 

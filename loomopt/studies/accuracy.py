@@ -5,12 +5,12 @@ A method is a ladder (studies/ladders.py); one more method is one more function 
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from loomopt import tables
 from loomopt.jobs import registry
 from loomopt.program import states
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving.asked import check_sought
 from loomopt.studies import optima, readings

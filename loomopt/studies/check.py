@@ -2,13 +2,13 @@
 
 import functools
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt import packaged, tables
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import ACCURACY

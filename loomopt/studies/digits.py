@@ -4,6 +4,7 @@ Each whole-cycle value stands on its own extreme, found by Newton's method in th
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from loomopt.program.chains import stations
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 from loomopt.studies.tolerances import (
     EXTREME_FAR,
     EXTREME_STEPS,

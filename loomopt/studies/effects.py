@@ -8,12 +8,12 @@ import functools
 import json
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from loomopt import designs
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.provenance import versions
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene

@@ -1,10 +1,10 @@
 """What came of a study of effects: the reference, a row for each effect, and what may be left out together."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from loomopt.frozen import freeze
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.solving.words import Words

@@ -3,12 +3,12 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from loomopt.errors import BadInput
 from loomopt.frozen import freeze
 from loomopt.jobs import registry
 from loomopt.program.program import Objective, Program
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Evaluation, Finding

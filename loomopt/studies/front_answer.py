@@ -3,7 +3,7 @@
 import functools
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
@@ -12,7 +12,6 @@ from loomopt.nlp.point import Settings
 from loomopt.program.axes import Traded
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import sampled
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine, report
 from loomopt.solving.certificate import certify

@@ -1,9 +1,9 @@
 """What the rows of a front come to: its points in order, where other limits bind, where nothing lies on it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from loomopt.records import dataclass
 from loomopt.studies import front_plan
 from loomopt.studies.front_plan import ENDS
 from loomopt.studies.rows import Row

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 from loomopt.jobs import registry
@@ -12,7 +12,6 @@ from loomopt.nlp.point import Settings
 from loomopt.program.axes import Asked, Traded, opposite
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import change, report
 from loomopt.solving.rows import Row as Touched

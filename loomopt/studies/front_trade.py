@@ -7,7 +7,7 @@ import json
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from loomopt import designs
@@ -15,7 +15,6 @@ from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.lazy import lazy
 from loomopt.provenance import versions
-from loomopt.records import dataclass
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene
 from loomopt.schema import Sense

@@ -8,6 +8,7 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ import numpy as np
 from loomopt.errors import BadInput
 from loomopt.maths import Number
 from loomopt.program.sampling import Tally
-from loomopt.records import dataclass
 from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
 
 Setting = float | int | str

@@ -8,10 +8,9 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-
-from loomopt.records import dataclass
 
 COARSE = 8
 """Steps of each axis between two points that are searched from scratch; a power of two."""

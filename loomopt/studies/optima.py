@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from loomopt.nlp import exchange
@@ -10,7 +11,6 @@ from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point, Settings
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Family
-from loomopt.records import dataclass
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import digits

@@ -1,10 +1,9 @@
 """What a study is before it runs: points to be solved, planned from finished rows alone."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from loomopt.records import dataclass
 from loomopt.studies.rows import Row
 
 

@@ -1,11 +1,10 @@
 """The rows of a study: plain records that are the same numbers in memory, in a store and in a worker process."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from loomopt.frozen import freeze
-from loomopt.records import dataclass
 
 UNTIMED = "seconds"
 """The one part of a row that is not the same each time."""

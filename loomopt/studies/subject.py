@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution

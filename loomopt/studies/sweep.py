@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from loomopt import designs
 from loomopt.errors import BadInput
@@ -12,7 +13,6 @@ from loomopt.jobs import registry
 from loomopt.nlp.point import Point
 from loomopt.provenance import versions
 from loomopt.quantities import QuantityError
-from loomopt.records import dataclass
 from loomopt.scene_errors import misread, refusal
 from loomopt.scene_numbers import files, quantity
 from loomopt.scenes import Scene

@@ -5,11 +5,10 @@ import re
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from io import StringIO
 from itertools import zip_longest
 from typing import Any
-
-from loomopt.records import dataclass
 
 GAP = "  "
 JOINED = "\ue000"

@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 
 from loomopt.designs import Design
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 from loomopt.solving.proof import Proofs
 from loomopt.solving.solution import Evaluation, Solution

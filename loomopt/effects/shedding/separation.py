@@ -9,13 +9,13 @@ speed ends in contact. Cam and follower are rigid, the landing takes no time; co
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from loomopt.effects.kinds import Clash, Event, Motion, Rule, Terms
 from loomopt.quantities import Quantity
-from loomopt.records import dataclass
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from loomopt.errors import BadInput
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
@@ -13,7 +14,6 @@ from loomopt.picture.shapes import Arc, Drawing, Point, Primitive
 from loomopt.picture.skeleton import Mass, Skeleton
 from loomopt.picture.symbols import POINTER, angle_between, pointer
 from loomopt.picture.units import METRIC, Units
-from loomopt.records import dataclass
 from loomopt.units import show
 
 REED, COUNTERWEIGHT = "G", "E"

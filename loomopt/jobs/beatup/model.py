@@ -6,6 +6,7 @@ q = −ψ, Q = M3 (positive pushes the reed toward the fell), crank torque = Md 
 import functools
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from loomopt import balance
@@ -18,7 +19,6 @@ from loomopt.mechanisms import crank_rocker
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
-from loomopt.records import dataclass
 from loomopt.schema import Values
 
 FRONT, REAR = "front dead centre", "rear dead centre"

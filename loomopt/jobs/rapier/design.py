@@ -4,6 +4,7 @@ grid: stroke, dwells, turning points.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.turning import settled
-from loomopt.records import dataclass
 from loomopt.scenes import Scene
 
 SAMPLES = 720

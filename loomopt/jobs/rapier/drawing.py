@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from loomopt.picture.shapes import Drawing, Line, Point, Primitive
 from loomopt.picture.skeleton import Skeleton
 from loomopt.picture.symbols import POINTER, angle_between, arrow, pointer
 from loomopt.picture.units import METRIC, Units
-from loomopt.records import dataclass
 
 FRONT, REAR, OVER = "front dead centre", "rear dead centre", "hand-over"
 LINKS = (("A0", "A"), ("A", "B1"), ("B0", "B1"), ("B0", "B2"), ("C0", "C"), ("C", "D"), ("B2", "D"))

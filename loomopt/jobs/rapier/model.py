@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from loomopt import maths as systems
@@ -21,7 +21,6 @@ from loomopt.mechanisms.dyad import Vector, dot
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
-from loomopt.records import dataclass
 from loomopt.schema import Values
 from loomopt.tolerances import ASSEMBLY_MARGIN
 

@@ -6,6 +6,7 @@ The cam stands still as it is at the beginning of the rise, and the arm goes rou
 import functools
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.picture.symbols import arrow, fixed_pivot
 from loomopt.picture.units import Units, told
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO

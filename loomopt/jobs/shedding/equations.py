@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from loomopt import maths
 from loomopt.balance import Acting, Given
@@ -27,7 +28,6 @@ from loomopt.picture import effect_equations
 from loomopt.picture.cam_laws import Unwritten, law
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
 from loomopt.program.model import JobModel
-from loomopt.records import dataclass
 
 SPEED = "omega"
 SEGMENTS = {

@@ -7,6 +7,7 @@ must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning 
 import functools
 import math
 from collections.abc import Collection, Hashable, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 
 from loomopt.balance import Given
@@ -22,7 +23,6 @@ from loomopt.mechanisms.turning_points import followed
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Chain, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
-from loomopt.records import dataclass
 from loomopt.schema import Table, Values
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")

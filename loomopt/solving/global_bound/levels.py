@@ -6,12 +6,12 @@ Each level is asked of all designs that are as good as the answer at the levels 
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from loomopt.boxes import Floats
 from loomopt.jobs.base import Job
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Sampler
-from loomopt.records import dataclass
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.cuts import multipliers
 from loomopt.solving.global_bound.reading import Reader

@@ -7,6 +7,7 @@ of a box only if the corners of all of them come in the same order, and events l
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from loomopt.cycle import TURN, Node, Where
 from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.records import dataclass
 from loomopt.solving.global_bound.task import Task
 from loomopt.tolerances import SAME_ANGLE
 

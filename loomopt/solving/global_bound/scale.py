@@ -5,6 +5,7 @@ Whether it changes nothing is not believed of a program: every row is read at de
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from loomopt import maths
 from loomopt.maths import Number
 from loomopt.program.program import Move, Program
 from loomopt.program.sampling import Sampler
-from loomopt.records import dataclass
 
 DRAWN, TRIED = 3, 60
 """Random designs at which rows are read at two sizes, and draws to find them: formulas that agree to 30 digits at one

@@ -1,7 +1,7 @@
 """A program as branch and bound sees it: variables with finite ends, and what stands for all others."""
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from loomopt.boxes import Floats, Interval
 from loomopt.maths import Maths, Number
 from loomopt.maths import boxes as box_system
 from loomopt.program.program import Limit, Program, Variable
-from loomopt.records import dataclass
 from loomopt.solving.global_bound.rows import BoxRows, OpenError
 from loomopt.solving.global_bound.scale import Scale
 

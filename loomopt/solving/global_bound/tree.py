@@ -4,14 +4,13 @@ A box in which some row exceeds its bound is discarded; one whose rows are linea
 [Neumaier, Complete search in continuous global optimization, Acta Numerica 13 (2004), 271-369].
 """
 
-import dataclasses
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from loomopt.boxes import Floats, Interval, interval
-from loomopt.records import dataclass
 from loomopt.solving.global_bound.cuts import with_cut
 from loomopt.solving.global_bound.reading import LIMIT, Read, Reader
 from loomopt.tolerances import FEASIBLE
@@ -28,7 +27,7 @@ ROOM = 1e-14
 """Share of the terms of a sum of floats by which it may be wrong: a hundred roundings of a dozen terms."""
 
 
-@dataclasses.dataclass
+@dataclass
 class Tree:
     """How far a search has come.
 
