@@ -147,6 +147,15 @@ def test_no_angle_exceeds_a_peak(case):
         assert found.peak(name) * (1 - 1e-4) < values.max() <= found.peak(name) * (1 + 1e-13)
 
 
+@pytest.mark.parametrize(("k", "ratio"), [(2e6, 1.3), (2e6, 3.0), (5e5, 10.0), (3e5, 43.0)])
+def test_peaks_of_an_overdamped_shaft_are_found_beside_the_corners_of_the_pulse(k, ratio):
+    """What decays there does so 2 ratio times as fast as the shaft would swing."""
+    found = sampler(k, 2 * ratio * math.sqrt(k * J4))
+    pieces, u = found.grid(400_000)
+    values = np.abs(found.at("shaft_peak", pieces, u))
+    assert values.max() <= found.peak("shaft_peak") * (1 + 1e-10)
+
+
 def test_the_largest_torque_of_the_packaged_shaft_is_where_it_was_found():
     found = sampler(2e6, 45.0)
     assert math.degrees(found.angle(found.extremes("shaft_peak")[0])) % 360 == pytest.approx(82.02645, abs=5e-6)
