@@ -235,9 +235,17 @@ that leave nothing to correct: a hundred times rounding."""
 CORRECTIONS, PRECISE = 4, 1e-9
 """Newton's steps after a solve, each of which doubles the digits (1e-6 needs two), and the residual that ends them."""
 
+SLOPE_ERROR = 1e-12
+"""Error of a slope by jets, relative to the largest of a row where that exceeds 1: five times what is seen of
+JET_ERROR. Where an earlier level stays least is found to that over its curvature."""
+
 DIGITS, FIRST_STEP, SECOND_STEP = 40, "1e-20", "1e-12"
 """Digits of the number system, and the steps of its differences. First, one-sided: error 1e-20 of both kinds. Second,
 central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-24."""
+
+THIRD_STEP, THIRD_STEPS = "1e-8", (4e-3, 2e-3, 1e-3)
+"""Steps of third derivatives. At 40 digits central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-16. In floats by
+differences of the curvatures, extrapolated: their rounding of 1e-16/1e-3 = 1e-13, truncation (1e-3)⁶ beside 1."""
 
 NEWTON_SHIFT = "1e-3"
 """How far, in u, one Newton step may move a sampled extreme: it is right to 1e-8, what moves farther is no extreme."""

@@ -188,7 +188,7 @@ def _doubtful(local: Local, levels: Sequence[JudgedLevel]) -> bool:
         errors = [error / STATIONARY]
         if each.curvature:
             figures += list(each.curvature.figures)
-            errors.append(JET_ERROR * each.curvature.largest / FLAT)
+            errors.append(each.curvature.error / FLAT)
         if max(errors) >= 1.0 or any(1 / DOUBT < figure < DOUBT for figure in figures):
             return True
     return False

@@ -17,6 +17,8 @@ class Derivatives(abc.ABC):
     """
 
     by: ClassVar[str]
+    error: ClassVar[float]
+    """Of slopes and curvatures, relative to the largest derivative of a row where that exceeds 1."""
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
         self.program, self.sampler, self.rows = program, sampler, tuple(rows)
@@ -36,6 +38,15 @@ class Derivatives(abc.ABC):
 
         At an interior extreme of the cycle, g_xx − g_xφ g_φx / g_φφ: the extreme moves with the design [Hettich and
         Kortanek, Semi-infinite programming, SIAM Review 35 (1993), 380-429].
+        """
+
+    @abc.abstractmethod
+    def thirds(self, line: Floats, basis: Floats) -> tuple[Floats, Floats]:
+        """Return (rows, k, k), third derivatives once along a line (variables,), twice along basis (variables, k).
+
+        And the largest error of each row's. Extremes of the cycle move along: to third order it is enough that each
+        does so by its first, u_x = −g_ux / g_uu, for its value does not change with u [Wigner's 2n + 1 rule; Griewank
+        and Walther, Evaluating Derivatives, 2nd ed., section 15.4].
         """
 
     def at_corner(self, node: Extreme) -> bool:

@@ -4,7 +4,8 @@ Where a level neither rises nor falls to second order, higher orders decide. Alo
 binding rows bend: the Lagrangian may fall there though no design that keeps the rows is better, and the other way
 round. So each step along the line is first corrected onto the rows by Gauss and Newton's method with the slopes at the
 design [Nocedal and Wright, Numerical Optimization, 2nd ed., section 12.5: feasible sequences], then moved once along
-the directions that are curved, to where the Lagrangian is least.
+the directions that are curved, to where the Lagrangian is least. Where an earlier level is least along directions by
+its curvature alone, and this one has a slope along them, designs are moved on to where that level stays least.
 """
 
 import math
@@ -18,17 +19,16 @@ from loomopt.cycle import Floats
 from loomopt.lazy import lazy
 from loomopt.nlp.point import sampler_at
 from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
+from loomopt.program.sampling import Sampler
 from loomopt.solving.lagrangian import Lagrangian
-from loomopt.solving.rows import Row
-from loomopt.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET, PROBES, RANK, SAME_NODE
+from loomopt.solving.rows import Row, moved
+from loomopt.solving.valley import Closed, inverted
+from loomopt.tolerances import FALL_MARGIN, FEASIBLE, POLISH_DONE, POLISH_MET, PROBES
 
 Design = dict[str, float]
 Verdict = Literal["holds", "falls", "open"]
 STEPS = 40
 """Corrections onto the rows, each of which leaves the step's share of what was missed: of 1e-2 eight are enough."""
-MOVED = 100 * SAME_NODE
-"""How far, in u, an extreme may move with a design: what is farther is another."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,8 @@ class FeasibleCurve:
     """Designs around x (SI) at which sums (m, rows) of rows are what they are at x.
 
     jacobian: (m, variables), slopes of the sums in natural sizes; basis: (variables, k), orthonormal, the directions
-    that no sum forbids; curved: (k, c), those of them along which the Lagrangian curves by bends (c,).
+    that no sum forbids; curved: (k, c), those of them along which the Lagrangian curves by bends (c,); valley: of an
+    earlier level, that counts, and the Lagrangian's slopes (v,) along its directions.
     """
 
     program: Program
@@ -48,14 +49,15 @@ class FeasibleCurve:
     basis: Floats
     curved: Floats
     bends: Floats
+    valley: tuple[Closed, Floats] | None = None
 
     def judged(self, lagrangian: Lagrangian, way: Floats, slope: float) -> Verdict:
         """Say whether the Lagrangian falls along a direction (k,) at every probe, more than a slope explains.
 
         "open" where the rows cannot be kept, or where every design that is better breaks another limit: it falls, but
-        only within the first probe.
+        only within the first probe; or by less than an earlier level's valley is known to.
         """
-        better = []
+        better: list[Design] = []
         for step in PROBES:
             designs = self._lowest(lagrangian, step, way)
             if not designs:
@@ -63,26 +65,11 @@ class FeasibleCurve:
             lower = [x for x in designs if lagrangian.is_lower(x, step, slope)]
             if not lower:
                 return "holds"
-            better += lower
+            surely = [x for x in lower if lagrangian.is_lower(x, step, slope, self._unsure)]
+            if not surely:
+                return "open"
+            better += surely
         return "falls" if any(map(self._is_kept, better)) else "open"
-
-    def bent(self, lagrangian: Lagrangian, lines: Floats, ways: Floats) -> Floats | None:
-        """Return (c, n, n): the Lagrangian's third derivatives along lines (k, c), once, and ways (k, n), twice.
-
-        Central differences of its slopes along the lines; None where a design beside x cannot be read.
-        """
-        step, count = PROBES[-1], ways.shape[1]
-        found = np.zeros((lines.shape[1], count, count))
-        for i in range(count):
-            for j in range(i + 1):
-                both = [sign * (ways[:, i] + side * ways[:, j]) / 2 for side in (1.0, -1.0) for sign in (1.0, -1.0)]
-                slopes = [self._slopes(lagrangian, lines, step * way) for way in both]
-                if any(each is None for each in slopes):
-                    return None
-                # w_i w_j = ((w_i + w_j)/2)² − ((w_i − w_j)/2)²; the slope at x itself cancels.
-                sums = np.array(slopes, dtype=np.float64)
-                found[:, i, j] = found[:, j, i] = (sums[0] + sums[1] - sums[2] - sums[3]) / step**2
-        return found
 
     def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
         """Return the Lagrangian's slopes along lines (k, c) at coordinates in the basis."""
@@ -102,14 +89,36 @@ class FeasibleCurve:
             x = self._moved(moved)
             sampler = sampler_at(self.program, x)
             values = None if sampler is None else self._values(sampler)
-            if values is None or self._here is None:
+            along = self._along(x)
+            if values is None or self._here is None or along is None:
                 return None
             missed = self.sums @ (values - self._here)
             largest = float(np.abs(missed).max(initial=0.0))
-            if largest <= POLISH_DONE or before <= 2 * largest:
+            if not np.any(along) and (largest <= POLISH_DONE or before <= 2 * largest):
                 return x if largest <= POLISH_MET else None
-            moved, before = moved - self._back @ missed, largest
+            moved, before = moved - self._back @ missed + along, largest
         return None
+
+    def _along(self, x: Mapping[str, float]) -> Floats | None:
+        """Return the step (variables,) from a design (SI) to the valley, 0 where there is none left to take.
+
+        What an earlier level holds is kept there alone. None where it is not known.
+        """
+        if self.valley is None:
+            return np.zeros(len(self.basis))
+        closed, _ = self.valley
+        steps = closed.step(x)
+        if steps is None or np.abs(steps).max() > 1.0:
+            return None
+        return np.where(np.abs(steps) > closed.step_errors, steps, 0.0) @ closed.directions
+
+    @lazy
+    def _unsure(self) -> float:
+        """What the Lagrangian may differ by on the valley."""
+        if self.valley is None:
+            return 0.0
+        closed, pull = self.valley
+        return FALL_MARGIN * float(np.abs(pull) @ closed.step_errors)
 
     def _lowest(self, lagrangian: Lagrangian, step: float, way: Floats) -> list[Design]:
         """Return the design a step along a direction, and the one moved along what is curved to the least there."""
@@ -134,7 +143,7 @@ class FeasibleCurve:
     @lazy
     def _back(self) -> Floats:
         """The shortest step (variables, m) that changes each sum by 1."""
-        return np.asarray(np.linalg.pinv(self.jacobian, rcond=RANK), dtype=np.float64)
+        return inverted(self.jacobian)
 
     @lazy
     def _here(self) -> Floats | None:
@@ -148,20 +157,11 @@ class FeasibleCurve:
 
     def _values(self, sampler: Sampler) -> Floats | None:
         """Return every row at a design, in its natural size; extremes move along. None where one is gone."""
-        found = [self._value(sampler, row) for row in self.rows]
-        return None if None in found else np.array(found, dtype=np.float64)
-
-    def _value(self, sampler: Sampler, row: Row) -> float | None:
-        if row.node is None:
-            return sampler.excess(row.limit) if row.limit else row.sign * sampler.single(row.reads) / row.scale
-        if row.node.u in (0.0, 1.0):
-            at = float(sampler.at(row.reads, np.array([row.node.piece]), np.array([row.node.u]))[0])
-            return row.sign * at / row.scale
-        near = _nearest(sampler.extremes(row.reads), row.node)
-        return None if near is None else row.sign * near.value / row.scale
+        rows = moved(self.rows, sampler)
+        return None if rows is None else np.array([_value(row, sampler) for row in rows])
 
 
-def _nearest(extremes: list[Extreme], node: Extreme) -> Extreme | None:
-    """Return the extreme that a node has become; None where there is none near it."""
-    own = [each for each in extremes if each.piece == node.piece and abs(each.u - node.u) <= MOVED]
-    return min(own, key=lambda each: abs(each.u - node.u), default=None)
+def _value(row: Row, sampler: Sampler) -> float:
+    if row.limit and row.node is None:
+        return sampler.excess(row.limit)
+    return row.sign * (row.node.value if row.node else sampler.single(row.reads)) / row.scale

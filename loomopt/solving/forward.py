@@ -3,6 +3,7 @@
 Nothing here comes from the solver or from CasADi: the same formulas, run in another number system.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -18,7 +19,7 @@ from loomopt.program.reading import DATUM, Reading, quadrature
 from loomopt.program.sampling import Sampler
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
-from loomopt.tolerances import NEWTON_SHIFT
+from loomopt.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
 
 
 class JetReading(Reading):
@@ -51,7 +52,7 @@ def _total(values: Number, count: int) -> Number:
 class Forward(Derivatives):
     """Derivatives by jets. Raises ArithmeticError where one of them is no number."""
 
-    by = "jets"
+    by, error = "jets", JET_ERROR
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
         super().__init__(program, x, sampler, rows)
@@ -82,32 +83,66 @@ class Forward(Derivatives):
     def curvatures(self, basis: Floats) -> Floats:
         """Return (rows, k, k): second derivatives along the columns of basis (variables, k); extremes move along."""
         width = basis.shape[1]
-        # The last direction is a node's own u.
+        bent = self._bent(self.x, self.u, basis)
+        mixed = bent[:, :width, width]
+        return _finite(
+            bent[:, :width, :width] - self._share(bent)[:, None, None] * mixed[:, :, None] * mixed[:, None, :]
+        )
+
+    def thirds(self, line: Floats, basis: Floats) -> tuple[Floats, Floats]:
+        """Return (rows, k, k), third derivatives, and their errors, (rows,): by differences of the curvatures."""
+        bent, width = self._bent(self.x, self.u, np.column_stack([basis, line])), basis.shape[1]
+        shifts = -self._share(bent)[:, None] * bent[:, :-1, -1]
+        ways = np.concatenate([np.tile(np.eye(width), (len(bent), 1, 1)), shifts[:, None, :-1]], axis=1)
+        sizes = dict(zip(self.names, self.sizes, strict=True))
+        slopes = []
+        for step in THIRD_STEPS:
+            ends = []
+            for sign in (step, -step):
+                x = {n: self.x[n] + sign * sizes[n] * float(by) for n, by in zip(self.names, line, strict=True)}
+                u = {name: self.u[name] + sign * shifts[places, -1] for name, places in self.groups.items()}
+                ends.append(ways.swapaxes(1, 2) @ self._bent(x, u, basis) @ ways)
+            slopes.append((ends[0] - ends[1]) / (2 * step))
+        # Each step is half the one before: h² and then h⁴ leave the differences.
+        first, second = ((4 * fine - coarse) / 3 for coarse, fine in itertools.pairwise(slopes))
+        found = (16 * second - first) / 15
+        rounding = ROUNDED / THIRD_STEPS[-1] * np.abs(bent).max(axis=(1, 2), initial=0.0)
+        return _finite(found), np.abs(second - first).max(axis=(1, 2), initial=0.0) + rounding
+
+    def _bent(self, x: Mapping[str, float], u: Mapping[str, Floats], basis: Floats) -> Floats:
+        """Return (rows, k + 1, k + 1): second derivatives along a basis (variables, k) and u, each for itself."""
+        width = basis.shape[1] + 1
         directions = np.hstack([basis, np.zeros((len(basis), 1))])
         found = np.zeros((len(self.rows), width, width))
         with np.errstate(all="ignore"):
-            reading = self._reading(directions, curved=True)
-            for k, jet in self._static(reading, width + 1):
-                found[k] = jet.curvature[:width, :width]
+            reading = self._reading(directions, curved=True, x=x)
+            for k, jet in self._static(reading, width):
+                found[k] = jet.curvature
             for name, places in self.groups.items():
-                value = _jet(reading.along(name, self.pieces[name], _moving(self.u[name], width + 1)), width + 1)
-                bent = np.broadcast_to(value.curvature, (len(places), width + 1, width + 1))
-                mixed, bend = bent[:, :width, width], bent[:, width, width]
-                moves = self.inner[name] & (bend != 0.0)
-                share = np.where(moves, 1.0, 0.0) / np.where(moves, bend, 1.0)
-                own = bent[:, :width, :width] - share[:, None, None] * mixed[:, :, None] * mixed[:, None, :]
-                found[places] = self._factors(places)[:, None, None] * own
-        return _finite(found)
+                value = _jet(reading.along(name, self.pieces[name], _moving(u[name], width)), width)
+                found[places] = self._factors(places)[:, None, None] * value.curvature
+        return found
+
+    def _share(self, bent: Floats) -> Floats:
+        """Return (rows,): 1 over how a row bends along its extreme's own u; 0 where that does not move."""
+        inner = np.zeros(len(self.rows), dtype=bool)
+        for name, places in self.groups.items():
+            inner[places] = self.inner[name]
+        moves = inner & (bent[:, -1, -1] != 0.0)
+        return np.asarray(np.where(moves, 1.0, 0.0) / np.where(moves, bent[:, -1, -1], 1.0))
 
     def _factors(self, places: Pieces) -> Floats:
         return np.array([self.rows[k].sign / self.rows[k].scale for k in places])
 
-    def _reading(self, directions: Floats | None, curved: bool) -> JetReading:
-        """Return the design with jets along directions (variables, n) in the variables' own scale, floats without."""
-        x: Mapping[str, Number] = self.x
+    def _reading(self, directions: Floats | None, curved: bool, x: Mapping[str, Number] | None = None) -> JetReading:
+        """Return a design, the own one without x, with jets along directions (variables, n) in the variables' scale.
+
+        In floats without directions.
+        """
+        x = self.x if x is None else x
         if directions is not None:
             moved = np.array(self.sizes)[:, None] * directions
-            x = dict(zip(self.names, variables(list(self.x.values()), moved, curved), strict=True))
+            x = dict(zip(self.names, variables(list(x.values()), moved, curved), strict=True))
         given = self.program.model.given(maths.jets(), {**self.known, **x})
         return JetReading(self.program.model, maths.jets(), given, self.sampler.cycle, self.sampler.stills)
 

@@ -28,10 +28,13 @@ class Lagrangian:
         found = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
         return all(self.is_lower(there, step, slope) for step, there in found)
 
-    def is_lower(self, there: Mapping[str, float], step: float, slope: float) -> bool:
-        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains."""
+    def is_lower(self, there: Mapping[str, float], step: float, slope: float, unsure: float = 0.0) -> bool:
+        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains.
+
+        unsure: what it may differ by there, beside rounding.
+        """
         base, value = self._base, self.value(there)
-        return base is not None and value is not None and value - base < -(FALL_MARGIN * slope * step + FALLEN)
+        return base is not None and value is not None and value - base < -(FALL_MARGIN * slope * step + FALLEN + unsure)
 
     @functools.cached_property
     def _base(self) -> float | None:

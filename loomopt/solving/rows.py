@@ -1,16 +1,18 @@
 """The active set of one design: rows that touch their limits, and the smooth pieces that make up each objective."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import ACTIVE, FEASIBLE
+from loomopt.tolerances import ACTIVE, FEASIBLE, SAME_NODE
 
 Groups = tuple[tuple[int, ...], ...]
 """Places of rows: of each group of an objective, the pieces whose largest counts."""
+MOVED = 100 * SAME_NODE
+"""How far, in u, an extreme may move with a design: what is farther is another."""
 
 
 @dataclass(frozen=True)
@@ -106,3 +108,20 @@ def _smooth(sampler: Sampler, objective: Objective, name: str) -> list[tuple[flo
     if abs(value) <= FEASIBLE * objective.scale:
         return [(abs(value), 1.0, None), (abs(value), -1.0, None)]
     return [(abs(value), float(np.sign(value)), None)]
+
+
+def moved(rows: Sequence[Row], sampler: Sampler) -> tuple[Row, ...] | None:
+    """Return rows with their extremes as they are at another design; None where one is gone."""
+    found = [_moved(row, sampler) for row in rows]
+    return None if None in found else tuple(row for row in found if row)
+
+
+def _moved(row: Row, sampler: Sampler) -> Row | None:
+    if row.node is None:
+        return row
+    piece, u = row.node.piece, row.node.u
+    if u in (0.0, 1.0):
+        value = float(sampler.at(row.reads, np.array([piece]), np.array([u]))[0])
+        return replace(row, node=row.node._replace(value=value))
+    own = [each for each in sampler.extremes(row.reads) if each.piece == piece and abs(each.u - u) <= MOVED]
+    return replace(row, node=min(own, key=lambda each: abs(each.u - u))) if own else None

@@ -9,7 +9,9 @@ Where H is positive on the whole subspace of the equalities the verdict is prove
 decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
 (`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
 Lagrangian is read at a few steps along the line and at designs beside it that keep the binding rows
-(`feasible_curve`); of many such directions only what falls along a straight line is followed.
+(`feasible_curve`); of many such directions only what falls along a straight line is followed. A level that pulls along
+what an earlier one closes by its curvature alone is read where that level stays least (`valley`); its curvature is then
+known to an error of its own, within which it counts as none.
 """
 
 import math
@@ -28,35 +30,12 @@ from loomopt.solving.feasible_curve import FeasibleCurve, Verdict
 from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
+from loomopt.solving.valley import Closed
 from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 
 FOLLOWED = 3
 """Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall
 along a straight line."""
-
-
-@dataclass(frozen=True)
-class Closed:
-    """Directions that a level closes to those after it: it rises along them, though to second order only.
-
-    directions: (c, variables), orthonormal; bends: (c,), its curvatures; curve, lagrangian: of that level; first:
-    whether no level before it closes any.
-    """
-
-    directions: Floats
-    bends: Floats
-    curve: FeasibleCurve
-    lagrangian: Lagrangian
-    first: bool
-
-    def moves(self, basis: Floats) -> Floats | None:
-        """Return (c, k, k): second derivatives of where that level is least, along directions (variables, k).
-
-        None where they cannot be read.
-        """
-        ways, lines = self.curve.basis.T @ basis, self.curve.basis.T @ self.directions.T
-        found = self.curve.bent(self.lagrangian, lines, ways)
-        return None if found is None else -found / self.bends[:, None, None]
 
 
 @dataclass(frozen=True)
@@ -97,8 +76,9 @@ class Curvature:
 
     minimum: nothing falls along a curved direction; unique: along every open direction something rises; higher: what
     higher orders do along directions without curvature; settled: a single design is left, but for moves that change
-    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; closed: to later levels; level:
-    directions (k, variables) that no binding row forbids and along which nothing curves, orthonormal in natural sizes.
+    nothing; step: Newton's, in natural sizes, empty where there is nothing to correct; error: of the curvature; closed:
+    to later levels; level: directions (k, variables) that no binding row forbids and along which nothing curves,
+    orthonormal in natural sizes.
     """
 
     minimum: bool = True
@@ -107,7 +87,7 @@ class Curvature:
     settled: bool = False
     step: Floats = field(default_factory=lambda: np.zeros(0))
     figures: Floats = field(default_factory=lambda: np.zeros(0))
-    largest: float = 0.0
+    error: float = 0.0
     closed: Closed | None = None
     level: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -168,53 +148,68 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
         return Curvature(settled=True, step=step, figures=cone.figures)
     bends = local.derivatives.curvatures(cone.basis)
     hessian = np.tensordot(weights, bends, axes=1)
-    followed = _followed(local, cone.basis, slope)
-    if followed is None:
+    gained = _followed(local, cone.basis, slope)
+    if gained is None:
         return Curvature(unique=False, higher="open", figures=cone.figures)
-    hessian += followed
-    values, vectors = np.linalg.eigh(hessian)
-    curved = values > NEWTON_CURVED
+    followed, unsure = gained
+    values, vectors = np.linalg.eigh(hessian + followed)
+    error = local.derivatives.error * float(np.abs(weights) @ np.abs(bends).max(axis=(1, 2), initial=1.0)) + unsure
+    flat, curved = FLAT + unsure, values > max(NEWTON_CURVED, 2 * unsure)
     found = Curvature(
-        settled=bool(values.min() > FLAT) or _settled_but_for_moves(local, level, cone.basis, hessian),
+        settled=bool(values.min() > flat) or _settled_but_for_moves(local, level, cone.basis, hessian + followed, flat),
         step=_newton(cone, vectors[:, curved], values[curved], slope),
-        figures=np.concatenate([cone.figures, np.abs(values) / FLAT]),
-        largest=float(np.abs(weights) @ np.abs(bends).max(axis=(1, 2), initial=1.0)),
+        figures=np.concatenate([cone.figures, np.abs(values) / flat]),
+        error=error,
     )
-    if values.min() < -FLAT:
-        least = least_on_cone(hessian, cone.slopes)
-        found = replace(found, figures=np.append(found.figures, abs(least) / FLAT))
-        if least < -FLAT:
+    if values.min() < -flat:
+        least = least_on_cone(hessian + followed, cone.slopes)
+        found = replace(found, figures=np.append(found.figures, abs(least) / flat))
+        if least < -flat:
             return replace(found, minimum=False, unique=False)
-    still = vectors.T[values <= FLAT]
+    still = vectors.T[values <= flat]
     found = replace(found, unique=not any(map(cone.ways, still)), level=still @ cone.basis.T)
-    bent, rising = values > FAINT, values > FLAT
-    curve, lagrangian = _curve(local, cone, vectors[:, bent], values[bent]), _lagrangian(local, level, multipliers)
-    if rising.any() and values.min() >= -FLAT:
-        directions = (cone.basis @ vectors[:, rising]).T
-        found = replace(found, closed=Closed(directions, values[rising], curve, lagrangian, not local.closed))
-    faint = vectors.T[values <= FAINT]
+    bent, rising = values > max(FAINT, flat), values > flat
+    lagrangian = _lagrangian(local, level, multipliers)
+    if rising.any() and values.min() >= -flat:
+        found = replace(found, closed=_closed(local, cone, weights, vectors[:, rising], values[rising]))
+    curve = _curve(local, cone, vectors[:, bent], values[bent], next(iter(_pulled(local, slope)), None))
+    faint = vectors.T[~bent]
     ways = [way for line in _lines(faint) for way in cone.ways(line)]
     higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
-    if higher == "falls" and np.abs(local.shut @ slope).max(initial=0.0) > FLAT:
-        # A design that is better here may be worse at an earlier level, whose least bends away.
+    if higher == "falls" and curve.valley:
+        # A design that is better here may be worse at an earlier level, which rises to higher order along the valley.
         higher = "open"
     return replace(found, higher=higher)
 
 
-def _followed(local: Local, basis: Floats, slope: Floats) -> Floats | None:
-    """Return (k, k): what a level gains along a basis by following where earlier levels are least; None: not known.
+def _pulled(local: Local, slope: Floats) -> list[tuple[Closed, Floats]]:
+    """Return the earlier levels that close directions along which a later one's slope (variables,) does not vanish."""
+    pulls = [(closed, closed.directions @ slope) for closed in local.closed]
+    return [(closed, pull) for closed, pull in pulls if np.abs(pull).max(initial=0.0) > FLAT]
 
-    slope: of its Lagrangian; along closed directions it need not vanish.
+
+def _followed(local: Local, basis: Floats, slope: Floats) -> tuple[Floats, float] | None:
+    """Return (k, k): what a level gains along a basis by following where earlier levels are least, and its error.
+
+    slope: of its Lagrangian; along closed directions it need not vanish. None where the gain is not known.
     """
-    found = np.zeros((basis.shape[1],) * 2)
-    for closed in local.closed:
-        pull = closed.directions @ slope
-        if np.abs(pull).max(initial=0.0) > FLAT:
-            moves = closed.moves(basis) if closed.first else None
-            if moves is None:
-                return None
-            found += np.tensordot(pull, moves, axes=1)
-    return found
+    width = basis.shape[1]
+    found, error = np.zeros((width, width)), 0.0
+    for closed, pull in _pulled(local, slope):
+        moves = closed.moves(basis)
+        if moves is None:
+            return None
+        found += np.tensordot(pull, moves.values, axes=1)
+        most = np.abs(moves.values).max(axis=(1, 2), initial=0.0)
+        error += width * float(np.abs(pull) @ moves.errors + closed.off @ most)
+    return found, error
+
+
+def _closed(local: Local, cone: Critical, weights: Floats, rising: Floats, bends: Floats) -> Closed:
+    """Return what a level closes: directions in the cone's basis along which it rises, with their curvatures."""
+    rows, directions, first = local.active.rows, (cone.basis @ rising).T, not local.closed
+    derivatives, gradients = local.derivatives, local.gradients
+    return Closed(local.program, rows, derivatives, gradients, directions, bends, weights, cone.sums, first)
 
 
 def _lines(level: Floats) -> list[Floats]:
@@ -238,8 +233,8 @@ def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Fl
     return np.asarray(cone.back - directions @ (pull / bends))
 
 
-def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats) -> bool:
-    """Say whether all but moves that change nothing is curved: then later levels have nothing to choose."""
+def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats, flat: float = FLAT) -> bool:
+    """Say whether all but moves that change nothing curves, more than flat: later levels have nothing to choose."""
     last = level == len(local.program.objectives) - 1
     moves = [] if last else settle.unchanging(local.program, local.x)
     directions = [np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales for move in moves]
@@ -248,7 +243,7 @@ def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Flo
         return False
     left, sizes, _ = np.linalg.svd(np.array(inside).T)
     rest = left[:, int(np.sum(sizes > RANK)) :]
-    return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > FLAT)
+    return bool(np.linalg.eigvalsh(rest.T @ hessian @ rest).min(initial=np.inf) > flat)
 
 
 def _is_open(basis: Floats, way: Floats) -> bool:
@@ -256,12 +251,17 @@ def _is_open(basis: Floats, way: Floats) -> bool:
     return bool(np.linalg.norm(way - basis @ (basis.T @ way)) <= RANK)
 
 
-def _curve(local: Local, cone: Critical, curved: Floats, bends: Floats) -> FeasibleCurve:
-    """Return the designs that keep the binding rows; curved, bends: directions in the cone's basis that curve."""
+def _curve(
+    local: Local, cone: Critical, curved: Floats, bends: Floats, valley: tuple[Closed, Floats] | None = None
+) -> FeasibleCurve:
+    """Return the designs that keep the binding rows, and an earlier level's valley if it counts.
+
+    curved, bends: directions in the cone's basis that curve.
+    """
     scales = dict(zip(local.derivatives.names, map(float, local.scales), strict=True))
     jacobian = cone.sums @ local.slopes
     rows = local.active.rows
-    return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends)
+    return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends, valley)
 
 
 def _lagrangian(local: Local, level: int, multipliers: Multipliers) -> Lagrangian:
@@ -284,7 +284,8 @@ def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], sl
     found: set[Verdict] = set()
     for way in ways:
         along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
-        straight = lagrangian.falls(along, slope)
+        # A straight line leaves an earlier level's valley.
+        straight = curve.valley is not None or lagrangian.falls(along, slope)
         verdict = curve.judged(lagrangian, curve.basis.T @ way, slope) if straight or every else "holds"
         if straight or verdict == "falls":
             found.add(verdict)

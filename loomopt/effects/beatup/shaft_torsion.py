@@ -30,6 +30,10 @@ would show no more than the ringing of a pulse whose corners are assumed."""
 SAMPLES = 24
 """Samples of one swing of the shaft's own: extremes are refined from them to rounding."""
 
+MOST_DECAYS = 2000
+"""Decays in the time of a radian of the crank beyond which no more samples are taken: what is left of the corners of a
+pulse has faded within 0.1 degrees there."""
+
 
 class Own(Table):
     """Values of the shaft between rocker and reed."""
@@ -98,9 +102,11 @@ def coordinate(maths: Maths, pose: "Motion", given: Values, own: Values, reply: 
 
 
 def samples(given: Values, own: Values) -> float:
-    """Return how many samples of a turn show every swing of the shaft."""
-    natural = (given[f"{NAME}.stiffness"] / given[f"{NAME}.inertia"]) ** 0.5
-    return float(SAMPLES * natural / given["speed"])
+    """Return how many samples of a turn show every swing of the shaft, or what decays faster than it would swing."""
+    square = given[f"{NAME}.stiffness"] / given[f"{NAME}.inertia"]
+    half = given[f"{NAME}.damping"] / given[f"{NAME}.inertia"] / 2
+    rate = half + (half**2 - square) ** 0.5 if half**2 > square else square**0.5
+    return float(SAMPLES * min(rate / given["speed"], MOST_DECAYS))
 
 
 def motion(written: "Written", own: Values) -> tuple[Number, Number]:
