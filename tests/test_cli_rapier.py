@@ -16,7 +16,7 @@ FIGURES = ["stroke", "dwell_after", "dwell_before", "peak_acceleration", "peak_j
 UNITS = {"stroke": "m", "dwell_after": "rad", "peak_acceleration": "m/rad^2", "peak_jerk": "m/rad^3", "mu_min": "rad"}
 UNITS |= {"l4": "m", "alpha": "rad", "C0x": "m", "phi40": "rad", "phi_stroke": "rad"}
 OBJECTIVE = {"stroke-dwell": "peak_acceleration", "dwell": "dwell", "smooth": "rms_jerk", "match": "match_rms"}
-OUT_OF_REACH = ("--set", "operation.stroke=2000 mm")
+OUT_OF_REACH = ("--set", "operation.stroke=2000 mm", "--starts", "2")
 
 
 @pytest.fixture
