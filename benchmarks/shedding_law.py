@@ -219,4 +219,5 @@ def main():
 
 if __name__ == "__main__":
     harness.one_thread()
+    harness.processor_time()
     main()

@@ -1,5 +1,6 @@
 """Where a table comes from, and tables as CSV text that says so."""
 
+import functools
 from typing import TYPE_CHECKING
 
 from loomopt.scenes import Scene
@@ -12,9 +13,14 @@ VERSIONED = ("loomopt", "casadi", "numpy")
 
 def versions() -> dict[str, str]:
     """Return the versions that numbers depend on: this package's, CasADi's with its IPOPT, NumPy's."""
+    return {name: _version(name) for name in VERSIONED}
+
+
+@functools.cache
+def _version(name: str) -> str:
     import importlib.metadata
 
-    return {name: importlib.metadata.version(name) for name in VERSIONED}
+    return importlib.metadata.version(name)
 
 
 def provenance(scene: Scene, **more: object) -> dict[str, str]:

@@ -4,6 +4,7 @@ Numbers and unit factors are exact fractions until the last step, so "155 mm", "
 give the same float64. Angle is a dimension of its own: an angle and an angular speed must name their unit.
 """
 
+import functools
 import math
 import re
 import typing
@@ -31,6 +32,7 @@ from loomopt.units import show as show
 _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque": "745", "inertia": "0.62"}
 _LONGEST_TEXT = 100
 _MOST_DIGITS, _MOST_ZEROS = 20, 16
+_MOST_REMEMBERED = 4096
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
 _PLAIN = re.compile(_NUMBER)
 _QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
@@ -40,6 +42,7 @@ _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9]
 _ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
 
 
+@functools.lru_cache(maxsize=_MOST_REMEMBERED)
 def read(text: str, kind: str) -> float:
     """Return the quantity that text gives, in SI units, correctly rounded; kind: a key of `SI_UNIT`.
 

@@ -1,5 +1,6 @@
 """A scene's raw tables: read from a file, copied, looked into and changed without touching the original."""
 
+import functools
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,14 +11,15 @@ from loomopt.scene_errors import refusal, shown
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8
+_MOST_REMEMBERED = 16
 
 
-def read_document(path: Path | str) -> dict[str, Any]:
+def read_document(path: Path | str) -> Mapping[str, Any]:
     """Return the tables of a TOML file. Raises BadInput for a file that cannot be read as one."""
     origin = str(path)
     text = _read_text(Path(path), origin)
     try:
-        return tomllib.loads(text)
+        return _tables(text)
     except tomllib.TOMLDecodeError as error:
         problem, remedy = f"it is not TOML: {str(error)[:200]}", "Correct the line"
     except RecursionError:
@@ -25,6 +27,11 @@ def read_document(path: Path | str) -> dict[str, Any]:
     except ValueError:
         problem, remedy = "it holds a whole number of thousands of digits", "Correct the number"
     raise refusal(problem, origin, allowed="a scene in TOML", remedy=remedy) from None
+
+
+@functools.lru_cache(maxsize=_MOST_REMEMBERED)
+def _tables(text: str) -> dict[str, Any]:
+    return tomllib.loads(text)
 
 
 def _read_text(path: Path, origin: str) -> str:

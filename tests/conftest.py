@@ -1,7 +1,16 @@
 """One Hypothesis profile for every run: the same examples each time, no clock; "thorough" looks farther by hand.
 
 pytest tests/properties --hypothesis-profile=thorough
+
+Beside other workers (pytest -n) linear algebra keeps to one thread, as in the command: threads of several processes
+wait for each other, which takes up to three times the processor time.
 """
+
+import os
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # before NumPy is imported: afterwards it would not listen
+    for library in ("OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 from hypothesis import settings
 

@@ -1,6 +1,7 @@
 """Imports run one way, without a circle; a job and an effect are known by name in their own files only."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -75,8 +76,11 @@ def room(name):
     return name.split(".")[0]
 
 
+tree_of = functools.cache(ast.parse)
+
+
 def parsed(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return tree_of(path.read_text(encoding="utf-8"))
 
 
 def for_types(tree):
@@ -85,9 +89,10 @@ def for_types(tree):
     return {id(node) for block in blocks for inner in block.body for node in ast.walk(inner)}
 
 
+@functools.cache
 def imports(source):
     """Return the loomopt modules that source imports at run time, inside functions too, with the line of each."""
-    tree, names = ast.parse(source), []
+    tree, names = tree_of(source), []
     apart = for_types(tree)
     for node in (node for node in ast.walk(tree) if id(node) not in apart):
         if isinstance(node, ast.Import):
@@ -194,7 +199,7 @@ def test_jobs_have_the_same_files():
 
 def mentions_casadi(source):
     """Say whether code, comments and documentation apart, speaks of CasADi."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree_of(source)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
         names += [node.attr] if isinstance(node, ast.Attribute) else [node.id] if isinstance(node, ast.Name) else []
@@ -248,6 +253,12 @@ def test_files_and_functions_end_naturally():
     assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
     assert sorted(lengths.values())[len(lengths) // 2] <= MEDIAN_FILE
     assert {name: lines for name, lines in bodies() if lines > LONGEST_FUNCTION} == {}
+
+
+def test_files_of_tests_end_where_those_of_the_package_do():
+    lengths = {name: lines_of(path) for name, path in modules(TESTS).items()}
+    assert Path(__file__).stem in lengths
+    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
 
 
 def test_jobs_are_small():

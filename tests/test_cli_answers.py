@@ -46,7 +46,7 @@ def evaluated(cli, *arguments):
     [
         ("beatup", GRAVITY),
         ("beatup", ("--without", "resistance", "--with", "centrifugal")),
-        ("rapier", ("--set", "operation.stroke=860 mm", "--free", "sley")),
+        ("rapier", ("--set", "operation.stroke=860 mm", "--free", "sley", "--starts", "1")),
         ("rapier", ("--with", "head_inertia", "--target", "dwell")),
         ("shedding", ("--with", "damping", "--set", "operation.speed=500 rpm", "--free", "rise")),
         ("shedding", ("--target", "law", "--set", "targets.law.intervals=8")),

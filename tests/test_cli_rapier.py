@@ -16,7 +16,7 @@ FIGURES = ["stroke", "dwell_after", "dwell_before", "peak_acceleration", "peak_j
 UNITS = {"stroke": "m", "dwell_after": "rad", "peak_acceleration": "m/rad^2", "peak_jerk": "m/rad^3", "mu_min": "rad"}
 UNITS |= {"l4": "m", "alpha": "rad", "C0x": "m", "phi40": "rad", "phi_stroke": "rad"}
 OBJECTIVE = {"stroke-dwell": "peak_acceleration", "dwell": "dwell", "smooth": "rms_jerk", "match": "match_rms"}
-OUT_OF_REACH = ("--set", "operation.stroke=2000 mm")
+OUT_OF_REACH = ("--set", "operation.stroke=2000 mm", "--starts", "2")
 
 
 @pytest.fixture
@@ -31,11 +31,17 @@ def cli(capsys, monkeypatch):
     return call
 
 
+PRINTED: dict[tuple[str, ...], str] = {}
+
+
 def answered(cli, *arguments, status=0):
-    """Return the one JSON object a command prints."""
-    code, out, err = cli(*arguments, "--json")
-    assert (code, err) == (status, "")
-    return json.loads(out, parse_constant=pytest.fail)
+    """Return the one JSON object a command prints; what it prints of the packaged scene alone is asked for once."""
+    asked = tuple(map(str, arguments))
+    if asked not in PRINTED or asked[1] != "rapier" or "--design" in asked:
+        code, out, err = cli(*asked, "--json")
+        assert (code, err) == (status, "")
+        PRINTED[asked] = out
+    return json.loads(PRINTED[asked], parse_constant=pytest.fail)
 
 
 def check_contract(data, design=DESIGN):
@@ -159,7 +165,7 @@ def test_show_names_targets_bounds_and_equations(cli):
 
 
 def test_free_sley_adds_the_four_bar_to_the_design_and_is_better(cli):
-    held, freed = answered(cli, "solve", "rapier"), answered(cli, "solve", "rapier", "--free", "sley")
+    held, freed = answered(cli, "solve", "rapier"), answered(cli, "solve", "rapier", "--free", "sley", "--starts", "1")
     check_contract(freed, DESIGN + SLEY)
     assert freed["status"] == "optimal"
     assert freed["figures"]["peak_acceleration"] < 0.999 * held["figures"]["peak_acceleration"]

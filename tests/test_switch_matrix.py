@@ -57,6 +57,7 @@ WITH = {
 }
 """A job's own figures that effects give: with any of these."""
 PHI = (np.arange(97) + 0.37) * TURN / 97
+packaged = functools.cache(registry.load)
 
 
 class One(NamedTuple):
@@ -85,7 +86,7 @@ class Combination(NamedTuple):
 
 def completed(combination):
     """Return a combination with the effects that its own need beside them, at their first example."""
-    effects = registry.load(combination.job).schema.effects
+    effects = packaged(combination.job).schema.effects
     needed = {name for one in combination.ones for name in effects[one.effect].beside} - set(combination.names)
     ones = {one.effect: one for one in (*combination.ones, *(One(name, 0) for name in needed))}
     return combination._replace(ones=tuple(ones[name] for name in effects if name in ones))
@@ -98,7 +99,7 @@ def without(combination, one):
 
 def combines(combination):
     """Say whether a combination may be on together."""
-    effects = registry.load(combination.job).schema.effects
+    effects = packaged(combination.job).schema.effects
     own = {effects[n]: effects[n].own.model_validate(effects[n].examples[k]) for n, k in combination.ones}
     return not any(faults(own))
 
@@ -111,7 +112,7 @@ def matrix():
 def tried():
     """Yield nothing, all, each alone and every pair."""
     for job in registry.own_names():
-        effects = registry.load(job).schema.effects
+        effects = packaged(job).schema.effects
         each = {name: [One(name, k) for k in range(len(effect.examples))] for name, effect in effects.items()}
         yield Combination(job, ())
         for k in range(max(map(len, each.values()))):
@@ -129,7 +130,7 @@ COMBINATIONS = list(dict.fromkeys(matrix()))
 @functools.cache
 def scene_of(combination):
     """Return the job's packaged scene with exactly these effects on, at their examples."""
-    scene = registry.load(combination.job)
+    scene = packaged(combination.job)
     for name in scene.effects:
         scene = scene.without_effect(name)
     examples = {one.effect: scene.schema.effects[one.effect].examples[one.example] for one in combination.ones}
@@ -156,7 +157,7 @@ def at_phi(table, column):
 @functools.cache
 def offered(job):
     """Return the names of all numbers of a job's effects and tables."""
-    effects = registry.load(job).schema.effects
+    effects = packaged(job).schema.effects
     lasts = [completed(Combination(job, (One(name, len(each.examples) - 1),))) for name, each in effects.items()]
     return frozenset().union(*(registry.find(job).numbers(scene_of(last)) for last in lasts))
 
@@ -187,7 +188,7 @@ def alone(combination):
 
 
 def effects_of(combination):
-    schema = registry.load(combination.job).schema
+    schema = packaged(combination.job).schema
     return [schema.effects[name] for name in schema.effects if name in combination.names]
 
 
@@ -200,8 +201,9 @@ def each_of(combinations):
     return pytest.mark.parametrize("combination", combinations, ids=str)
 
 
+IN_MOTION = frozenset(has(State | Speed))
 every, stated, turned = each_of(COMBINATIONS), each_of(has(State)), each_of(has(Speed))
-algebraic = each_of([each for each in COMBINATIONS if each not in has(State | Speed)])
+algebraic = each_of([each for each in COMBINATIONS if each not in IN_MOTION])
 
 
 def loads_of(combination):
@@ -288,7 +290,7 @@ def test_an_absent_effect_leaves_no_symbol_in_the_graph(combination):
     demanded = {f"{effect.name}.{demand.value}" for effect in active for demand in getattr(effect, "demands", ())}
     unread = demanded.union(*(UNREAD.get(str(one), set()) for one in combination.ones))
     expected = own.intersection(registry.find(combination.job).numbers(scene_of(combination))) - unread
-    effects = registry.load(combination.job).schema.effects
+    effects = packaged(combination.job).schema.effects
     found = {name for name in read_by(combination) if name.split(".")[0] in effects}
     assert found == expected
 

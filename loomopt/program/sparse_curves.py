@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from loomopt.cycle import TURN, Floats
+from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.program import spikes
 from loomopt.program.curves import ANGLE
 from loomopt.program.sampling import Sampler
@@ -56,8 +57,9 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
         top = float(np.nanmax(sizes))
         with np.errstate(invalid="ignore"):
             inner = (sizes >= sizes[left]) & (sizes >= sizes[right]) & (sizes >= SPARSE_NEARLY * top)
-        tops = [k for k in np.flatnonzero(inner) if 0 < k < len(phi) - 1]
-        for k in tops:
+        inner[[0, -1]] = False
+        tops = np.flatnonzero(inner)
+        for k in tops[~_on_levels(phi, sizes, tops)]:
             rise = _rise(phi, sizes, int(k)) / top if top > 0.0 else 0.0
             worst = max(worst, rise)
             if rise > max(least, ROUNDED):
@@ -65,18 +67,25 @@ def _around_tops(columns: Mapping[str, Floats], least: float) -> tuple[list[floa
     return sorted(found), worst
 
 
-def _rise(phi: Floats, sizes: Floats, k: int) -> float:
-    """Return by how much a top at row k may still rise between it and its neighbours on its own side of any corner.
+def _on_levels(phi: Floats, sizes: Floats, tops: Pieces) -> NDArray[np.bool_]:
+    """Say of each top whether it cannot rise: on one side, of any corner too, two rows are as large as it is."""
+    found = np.zeros(len(tops), dtype=bool)
+    for side in (-1, 1):
+        near, beyond = tops + side, tops + 2 * side
+        there = (beyond >= 0) & (beyond < len(sizes)) & (phi[near] != phi[tops]) & np.isfinite(sizes[near])
+        far = sizes[np.clip(beyond, 0, len(sizes) - 1)]
+        drop = np.fmax(np.abs(sizes[tops] - sizes[near]), np.abs(sizes[tops] - far))
+        found |= there & (drop <= SPARSE_LEVEL * sizes[tops])
+    return found
 
-    On a level it cannot. At a corner that the curve rises to, only what its bend leaves; else no more than the top
-    stands above its neighbours.
+
+def _rise(phi: Floats, sizes: Floats, k: int) -> float:
+    """Return by how much a top at row k, on no level, may still rise between it and its neighbours on its own side.
+
+    At a corner that the curve rises to, only what its bend leaves; else no more than the top stands above its
+    neighbours.
     """
     sides = [side for side in (-1, 1) if phi[k + side] != phi[k] and np.isfinite(sizes[k + side])]
-    same = SPARSE_LEVEL * sizes[k]
-    for side in sides:
-        beyond = k + 2 * side
-        if 0 <= beyond < len(sizes) and max(abs(sizes[k] - sizes[k + side]), abs(sizes[k] - sizes[beyond])) <= same:
-            return 0.0
     if len(sides) == 1:
         bent = _bent(phi, sizes, k, sides[0])
         if bent is not None:

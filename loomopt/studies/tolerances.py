@@ -13,7 +13,7 @@ that still leads there; share by which float64 may order two extremes wrongly.""
 
 MET_ROUNDS, MET = 6, 1e-28
 """Steps onto what binds with slopes in float64, each worth at least 8 digits, and where they have arrived: references
-must be 100 times tighter than errors of 1e-25 (tests/studies/test_accuracy.py)."""
+must be 100 times tighter than errors of 1e-25 (tests/studies/test_accuracy_references.py)."""
 
 OPEN_RANK, OPEN_TURNS, OPEN_FLAT = 1e-9, 3, 1e-7
 """Directions that what binds moves by less than this share are open; Newton steps along them; curvature below which
@@ -25,7 +25,8 @@ REFERENCE_ACCURACY = 1e-11
 TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
 """Work-precision rows: how many times better a reference is known than the error it judges; errors that are rounding;
 factor of the least error within which errors have stopped falling; factor of the middle slope within which slopes are
-one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 % (test_accuracy)."""
+one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 %
+(test_accuracy_ladders)."""
 
 REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 """Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,

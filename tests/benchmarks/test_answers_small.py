@@ -1,10 +1,11 @@
 """Certified answers a second, in the small size: every answer certified by jets, its steps told, memory looked at."""
 
 import importlib
+import math
 import time
 
 import pytest
-from test_benchmarks_small import FOLDER
+from test_benchmarks_small import ATTEMPTS, FOLDER
 
 import loomopt as lo
 from loomopt.jobs import registry
@@ -30,16 +31,22 @@ def test_warm_answers_are_certified_by_jets_and_tell_their_steps(answers, name):
 
 
 def test_slopes_by_jets_take_a_fraction_of_those_in_40_digits():
-    """A fiftieth of what those of a free cam law took; 0.2 leaves room for a busy machine."""
+    """A fiftieth of what those of a free cam law took; 0.2 leaves room for a busy machine.
+
+    Least processor times of rounds in turn, no more than it takes: other work on the machine can only add to them.
+    """
     scene = lo.load("shedding")
     program, answer = registry.of(scene).program(scene, "law"), lo.solve(scene, "law")
     sampler = Sampler(program.model, {**program.parameters, **answer.point.x})
     rows = active_set(program, sampler).rows
-    spent = {}
-    for kind in (Forward, Exact):
-        began = time.process_time()
-        kind(program, answer.point.x, sampler, rows).gradients()
-        spent[kind.by] = time.process_time() - began
+    spent = {Forward.by: math.inf, Exact.by: math.inf}
+    for _ in range(ATTEMPTS):
+        for kind in (Forward, Exact):
+            began = time.process_time()
+            kind(program, answer.point.x, sampler, rows).gradients()
+            spent[kind.by] = min(spent[kind.by], time.process_time() - began)
+        if spent["jets"] <= 0.2 * spent["40 digits"]:
+            break
     assert spent["jets"] <= 0.2 * spent["40 digits"]
 
 

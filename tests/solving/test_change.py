@@ -223,7 +223,8 @@ def test_a_rapier_turns_back_toward_today_as_far_as_its_bounds_allow(unsettled):
     [
         (freed(operation__speed="60 rpm"), "stiffness"),
         (uneven(), "stiffness"),
-        (freed(operation__speed="100 rpm"), "law"),
+        (freed(operation__speed="100 rpm", targets__law__intervals=8), "law"),
+        pytest.param(freed(operation__speed="100 rpm"), "law", marks=pytest.mark.slow),
         (lo.load("rapier").update(ROOM), "stroke-dwell"),
     ],
 )

@@ -10,6 +10,9 @@ from plain_beatup import DESIGN, LENGTHS, Machine, dead_centres, least, least_pe
 import loomopt as lo
 
 TARGETS = ("balance", "pulse", "torque", "retrofit")
+each_draw = pytest.mark.parametrize(
+    "seed", [*range(5), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(5, 10))]
+)
 INCHES = {
     "l1": ("1.5 in", "1.3 in", "1.7 in"),
     "l2": ("3.25 in", "2.9 in", "3.6 in"),
@@ -244,7 +247,7 @@ def random_scene(seed):
     return lo.scene(document)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@each_draw
 def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
     scene = random_scene(seed)
     answer = lo.solve(scene)
@@ -264,7 +267,7 @@ def test_random_machines_are_optimal_and_slsqp_finds_nothing_better(seed):
         assert answer.figures["peak_torque"] <= machine.peaks(end)["peak_torque"] * (1 + 1e-5)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@each_draw
 @pytest.mark.parametrize("target", ["torque", "retrofit", "pulse"])
 def test_random_machines_are_optimal_or_honestly_infeasible(seed, target):
     scene = random_scene(seed)

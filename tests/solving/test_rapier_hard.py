@@ -132,7 +132,9 @@ def other():
     return lo.load("rapier").update({"mechanism.l4": "11 mm", "mechanism.l6": "190 mm"})
 
 
-@pytest.mark.parametrize("every", [18, 19], ids=["today's", "another drive's"])
+@pytest.mark.parametrize(
+    "every", [pytest.param(18, id="today's"), pytest.param(19, id="another drive's", marks=pytest.mark.slow)]
+)
 def test_a_drives_own_travel_is_recovered(tmp_path, every):
     """To 1e-7 m of 0.85 m: the mean square is then at rounding, its root is not."""
     scene = lo.load("rapier") if every == 18 else other()

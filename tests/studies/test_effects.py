@@ -134,6 +134,7 @@ def test_a_plan_in_another_process_is_the_same(plan, rows):
     assert plan.batch(rows) == []
 
 
+@pytest.mark.slow
 def test_inches_change_units_and_nothing_else(shedding):
     found = lo.effects(uncoiled.scene(inch.scene("shedding")))
     assert found.left_out == shedding.left_out

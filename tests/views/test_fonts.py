@@ -25,8 +25,14 @@ def test_what_no_font_has_takes_no_font_of_boxes():
     assert fonts._characters(__file__) == frozenset()
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
-@pytest.mark.parametrize("title", [CHINESE, FRAKTUR, "نول", "🧵", "\ue000"])
+@pytest.mark.parametrize(
+    ("title", "ending"),
+    [
+        pytest.param(title, ending, marks=[pytest.mark.slow] * (title != CHINESE and ending != "png"))
+        for title in (CHINESE, FRAKTUR, "نول", "🧵", "\ue000")
+        for ending in ("png", "svg", "pdf")
+    ],
+)
 def test_a_title_in_any_script_is_drawn_without_a_warning(tmp_path, ending, title):
     scene = lo.load("beatup").set("problem.title", title)
     with warnings.catch_warnings():

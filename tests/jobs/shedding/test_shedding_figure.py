@@ -124,8 +124,14 @@ def test_dwells_are_shaded_and_named(name):
     assert {text.get_text() for text in axes.texts} == {"far dwell", "near dwell", "least cam force"}
 
 
-@pytest.mark.parametrize("name", PACKAGED)
-@pytest.mark.parametrize("ending", figure.SUFFIXES)
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [
+        pytest.param(name, ending, marks=[pytest.mark.slow] * (name != "shedding" and ending != ".svg"))
+        for name in PACKAGED
+        for ending in figure.SUFFIXES
+    ],
+)
 def test_figures_of_every_scene_are_written(tmp_path, name, ending):
     scene = lo.load(name)
     for write, file in ((outputs.curves, "curves"), (outputs.picture, "cam")):

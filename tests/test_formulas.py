@@ -1,0 +1,126 @@
+"""What formulas are made of: nothing that only some number systems can do."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import loomopt
+
+# What formulas are made of. An `if X is None` asks how the scene is built, not what a number is; everything else that
+# branches, compares, rounds or names a number system is out.
+
+PACKAGE = Path(loomopt.__file__).parent
+FORBIDDEN_NODES = (
+    *(ast.If, ast.IfExp, ast.Compare, ast.BoolOp, ast.While, ast.Try, ast.Assert, ast.Match),
+    *(ast.FloorDiv, ast.Mod, ast.Import, ast.ImportFrom),
+)
+FORBIDDEN_NAMES = {
+    *("abs", "max", "min", "round", "divmod", "sign", "where", "piecewise", "Piecewise", "if_else", "heaviside"),
+    *("fabs", "copysign", "fmod", "floor", "ceil", "clip", "maximum", "minimum", "fmax", "fmin", "hypot", "norm_2"),
+    *("acos", "asin", "arccos", "arcsin", "math", "np", "numpy", "ca", "casadi", "sp", "sympy", "mp", "mpmath"),
+}
+NOT_FORMULAS = {"crank_rocker.py": {"curves"}, "crank_rocker_synthesis.py": {"synthesise"}}
+"""Parts of the crank-rocker that talk to people or fill arrays: they run on plain floats only."""
+EFFECT_FILES = sorted(
+    f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"
+)
+
+
+def offences(node):
+    """Return what stands in a piece of code and must not stand in a formula."""
+    found = []
+    for part in ast.walk(node):
+        if isinstance(part, FORBIDDEN_NODES):
+            found.append(f"line {part.lineno if hasattr(part, 'lineno') else '?'}: {type(part).__name__}")
+        name = getattr(part, "id", getattr(part, "attr", None))
+        if isinstance(part, ast.Name | ast.Attribute) and name in FORBIDDEN_NAMES:
+            found.append(f"line {part.lineno}: {name}")
+        if isinstance(part, ast.Constant) and isinstance(part.value, float) and not part.value.is_integer():
+            found.append(f"line {part.lineno}: {part.value}")
+    return found
+
+
+def functions(tree):
+    """Return the functions and methods of a module by name; what is inside a function belongs to it."""
+    owners = [tree, *(node for node in tree.body if isinstance(node, ast.ClassDef))]
+    return {node.name: node for owner in owners for node in owner.body if isinstance(node, ast.FunctionDef)}
+
+
+def read(*path):
+    return ast.parse(PACKAGE.joinpath(*path).read_text())
+
+
+def without_structure(node):
+    """Return a function without what asks how the scene is built: `if X is None: return`, `A if X == "word" else B`."""
+
+    class Structure(ast.NodeTransformer):
+        def visit_ImportFrom(self, found):
+            return None  # of what only scenes that call for it import
+
+        def visit_If(self, found):
+            test = found.test
+            structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is)
+            return found.body if structural and ast.unparse(test.comparators[0]) == "None" else found
+
+        def visit_IfExp(self, found):
+            test = found.test
+            structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Eq)
+            word = structural and isinstance(getattr(test.comparators[0], "value", None), str)
+            return ast.Tuple([found.body, found.orelse], ast.Load()) if word else found
+
+    return Structure().visit(node)
+
+
+def test_what_asks_how_the_scene_is_built_is_no_offence_and_what_asks_a_number_is():
+    assert not offences(without_structure(ast.parse('f(x) if own["shape"] == "linear" else ()')))
+    for formula in ("x if y == 0 else 0", 'abs(x) if own["shape"] == "linear" else 0'):
+        assert offences(without_structure(ast.parse(formula)))
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "x if y > 0 else 0",
+        "abs(x)",
+        "np.where(a, b, c)",
+        "maths.fmax(x, 0)",
+        "0.5 * x",
+        "x % 2",
+        "x and y",
+        "maths.acos(x)",
+    ],
+)
+def test_the_search_for_offences_finds_them(formula):
+    assert offences(ast.parse(formula))
+
+
+def test_the_search_passes_a_plain_formula():
+    assert not offences(ast.parse("def f(maths, x):\n    return maths.sqrt(x) ** 2 - 3 * x / 2"))
+
+
+@pytest.mark.parametrize("name", sorted(functions(read("mechanisms", "dyad.py"))))
+def test_formulas_of_the_dyad_hold_no_branch(name):
+    assert not offences(functions(read("mechanisms", "dyad.py"))[name])
+
+
+@pytest.mark.parametrize("file", NOT_FORMULAS)
+def test_formulas_of_the_crank_rocker_hold_no_branch(file):
+    found = functions(read("mechanisms", file))
+    assert found.keys() > NOT_FORMULAS[file]
+    assert {name: offences(found[name]) for name in found.keys() - NOT_FORMULAS[file] if offences(found[name])} == {}
+
+
+@pytest.mark.parametrize("name", ["_under", "_critical", "_over", "constants"])
+def test_formulas_of_an_oscillator_hold_no_branch(name):
+    assert not offences(without_structure(functions(read("motion", "harmonic.py"))[name]))
+
+
+@pytest.mark.parametrize("file", EFFECT_FILES)
+def test_formulas_of_an_effect_hold_no_branch(file):
+    found = functions(read("effects", file))
+    formulas = {name: node for name, node in found.items() if any(a.arg == "maths" for a in node.args.args)}
+    assert formulas or file == "shedding/separation.py", "flight is followed in floats alone"
+    for name, node in formulas.items():
+        checked = node if name == "force" else without_structure(node)
+        assert not offences(checked), name
