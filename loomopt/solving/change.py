@@ -202,13 +202,25 @@ def left(program: Program, x: Mapping[str, float], certificate: Certificate, kep
     if not names:
         return level
     scales = {v.name: v.scale for v in program.variables}
-    moves = [*unchanging(program, x), *({name: 1.0} for name in kept)]
-    ways = np.array([[move.get(name, 0.0) / scales[name] for name in names] for move in moves]).reshape(-1, len(names))
-    ways = np.array([way / np.linalg.norm(way) for way in ways if way.any()]).reshape(-1, len(names))
-    inside = ways @ level.T
-    inside = inside[np.linalg.norm(ways - inside @ level, axis=1) <= RANK]
-    turned, sizes, _ = np.linalg.svd(inside.T)
+    inside = functools.partial(_inside, level, {name: scales[name] for name in names})
+    # Whether a move changes nothing is looked at only where that counts: most lead out of the level.
+    moves = unchanging(program, x, lambda way: not way.keys() <= set(kept) and inside(way) is not None)
+    found = [shares for move in (*moves, *({name: 1.0} for name in kept)) if (shares := inside(move)) is not None]
+    turned, sizes, _ = np.linalg.svd(np.array(found).reshape(-1, len(level)).T)
     return np.asarray(turned[:, int(np.sum(sizes > RANK)) :].T @ level)
+
+
+def _inside(level: Floats, scales: Mapping[str, float], move: Mapping[str, float]) -> Floats | None:
+    """Return a move's direction (k,) in a level (k, variables), in natural sizes; None where it leads out of it.
+
+    scales: of the level's variables, SI.
+    """
+    way = np.array([move.get(name, 0.0) / scale for name, scale in scales.items()])
+    if not way.any():
+        return None
+    way /= np.linalg.norm(way)
+    shares = np.asarray(level @ way)
+    return shares if np.linalg.norm(way - shares @ level) <= RANK else None
 
 
 def _called(program: Program, ways: Floats, of: Judged) -> tuple[str, ...]:

@@ -240,10 +240,15 @@ def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Fl
 
 def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats) -> bool:
     """Say whether all but moves that change nothing is curved: then later levels have nothing to choose."""
-    last = level == len(local.program.objectives) - 1
-    moves = [] if last else settle.unchanging(local.program, local.x)
-    directions = [np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales for move in moves]
-    inside = [basis.T @ way for way in (d / np.linalg.norm(d) for d in directions) if _is_open(basis, way)]
+    if level == len(local.program.objectives) - 1:
+        return False
+
+    def along(move: Mapping[str, float]) -> Floats:
+        way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
+        return np.asarray(way / np.linalg.norm(way))
+
+    moves = settle.unchanging(local.program, local.x, lambda move: _is_open(basis, along(move)))
+    inside = [basis.T @ along(move) for move in moves]
     if not inside:
         return False
     left, sizes, _ = np.linalg.svd(np.array(inside).T)
