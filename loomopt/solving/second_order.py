@@ -63,7 +63,7 @@ class Closed:
 class Local:
     """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
 
-    closed: by each earlier level.
+    closed: by each earlier level; shown: of how many first levels it is known that none falls to higher order.
     """
 
     program: Program
@@ -73,6 +73,7 @@ class Local:
     derivatives: Derivatives
     gradients: Floats
     closed: tuple[Closed, ...] = ()
+    shown: int = 0
 
     @property
     def shut(self) -> Floats:
@@ -192,6 +193,8 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
     if rising.any() and values.min() >= -FLAT:
         directions = (cone.basis @ vectors[:, rising]).T
         found = replace(found, closed=Closed(directions, values[rising], curve, lagrangian, not local.closed))
+    if level < local.shown:
+        return found
     faint = vectors.T[values <= FAINT]
     ways = [way for line in _lines(faint) for way in cone.ways(line)]
     higher = _higher(lagrangian, curve, ways, multipliers.residual, len(faint) <= FOLLOWED)
