@@ -292,9 +292,11 @@ def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], sl
     found: set[Verdict] = set()
     for way in ways:
         along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
-        straight = lagrangian.falls(along, slope)
-        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope) if straight or every else "holds"
-        if straight or verdict == "falls":
+        if not every and not lagrangian.falls(along, slope):
+            continue
+        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope)
+        # Where designs beside the line tell nothing, the line itself must fall for doubt.
+        if verdict == "falls" or (verdict == "open" and (not every or lagrangian.falls(along, slope))):
             found.add(verdict)
     return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 
