@@ -66,7 +66,7 @@ def test_without_the_peer_the_front_is_judged_alone(peers, rival, monkeypatch):
 def test_a_peer_that_knows_the_front_adds_nothing_where_the_front_is_asked_at_its_places(peers, rival, monkeypatch):
     known = [curve(144270.37243, 0.040), curve(119901.39519, 0.060), curve(90e3, 0.060)]
     monkeypatch.setattr(peers.harness, "installed", lambda name: True)
-    monkeypatch.setattr(peers, "evolved", lambda rival, seconds: (np.array(known), 3))
+    monkeypatch.setattr(peers, "evolved", lambda rival, designs, seconds: (np.array(known), 3))
     mine, asked, theirs = peers.compared(rival, 3)
     assert theirs["admissible"] == 2, "one is too soft"
     assert mine["missed"] > 0.01, "three designs are a coarse front"
