@@ -16,9 +16,9 @@ M0 = 745.0
 SCENE = plain_shedding.PAPER
 BROKEN = 1e-8
 """By how much a design may exceed a limit, relative or in rad, and still count."""
-FARTHEST, FEW, SECANTS, ON_GRID = np.radians(90), 120, 8, 1e-4
-"""Of the rapier: the longest dwell that a peer's grid sees; angles that a stroke is first read on, steps to its l4, and
-how closely that meets it: the referee sets l4 to the stroke itself."""
+FARTHEST, FEW, SECANTS, ON_GRID, BETWEEN = np.radians(90), 120, 8, 1e-4, 3e-7
+"""Of the rapier: the longest dwell that a peer's grid sees; angles that a stroke is read on, steps to its l4, and how
+closely that meets it: the referee sets l4 to the stroke itself; what a parabola on the grid misses of a cosine."""
 
 Spot = tuple[float, float]
 
@@ -109,7 +109,7 @@ def rapier() -> Rival:
         arcs = [_arc(np.abs(travel), side) for travel in beside]
         rows = [
             np.abs(_top(S) / plain_rapier.NEEDS.stroke - 1) - ON_GRID,
-            _top(np.abs(cosine)) - np.cos(plain_rapier.NEEDS.transmission),
+            _top(np.abs(cosine)) - np.cos(plain_rapier.NEEDS.transmission) + BETWEEN,
             plain_rapier.MARGIN - (l5 + l6) / reach.max(axis=1),
             plain_rapier.MARGIN - reach.min(axis=1) / np.abs(l5 - l6),
         ]

@@ -54,6 +54,20 @@ def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
     assert rows.max() < 1e-8
 
 
+def test_the_referee_of_the_rapier_reads_the_published_optimum(peers):
+    rapier = peers.rapier()
+    told = references.read(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
+    design = {str(name).split(" [")[0]: float(cell) for name, cell in told.items() if str(name)[0] in "laCp"}
+    best = rapier.own(SimpleNamespace(design=design))
+    peak, dwell = rapier.judge(best)
+    assert peak == pytest.approx(0.694984753570, rel=1e-6)
+    assert -np.degrees(dwell) == pytest.approx(30.0, rel=1e-6)
+    seen, rows = rapier.evaluate(best[None])
+    assert seen[0] == pytest.approx((peak, dwell), rel=1e-3)
+    assert rows.max() < 1e-6, "the transmission angle is at its limit"
+    assert rapier.judge(np.zeros(7)) is None, "no l4 has the stroke"
+
+
 def test_without_the_peer_the_front_is_judged_alone(peers, rival, monkeypatch):
     monkeypatch.setattr(peers.harness, "installed", lambda name: False)
     mine, absent = peers.compared(rival, 3)
