@@ -1,6 +1,7 @@
 """Whole fronts beside NSGA-II [pymoo], which gets ten times the time; both judged by plain evaluators of their own.
 
-`python -m benchmarks.front_peers [--quick] [--json]`; also what two workers reach beside two plain loops, and memory.
+`python -m benchmarks.front_peers [--points N] [--only PROBLEM] [--quick] [--json]`: as many points are asked of the
+front as NSGA-II has designs. Without --only also what two workers reach beside two plain loops, and memory.
 """
 
 import argparse
@@ -12,13 +13,12 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 import loomopt as lo
-from benchmarks import harness, plain_beatup, plain_shedding
+from benchmarks import harness
+from benchmarks.front_rivals import Rival, Spot, beatup, rapier, shedding
 from benchmarks.fronts import asked_at
 from loomopt.studies import executors, front, runs
 from loomopt.studies.plan import Task
@@ -26,83 +26,13 @@ from loomopt.studies.rows import Row
 
 LONGER = 10.0
 """Times the front's own that the peer gets."""
-POPULATION, SEED, GRID = 100, 1, 360
-M0 = 745.0
-SCENE = plain_shedding.PAPER
+POINTS, SEED = 100, 1
 BEYOND = 0.1
 """Share of all designs' range by which the corner of the hypervolume lies beyond them."""
-BROKEN = 1e-8
-"""By how much a design may exceed a limit, relative or in rad, and still count."""
-
-Spot = tuple[float, float]
 
 
-class Rival(NamedTuple):
-    """One trade, both axes sought the least of, as a peer gets it.
-
-    low, high: of its variables; evaluate: designs (n, variables) → objectives (n, 2) and rows (n, rows) none of which
-    may be positive; judge: a design → both axes as the referee reads them, None where it breaks a limit; own: a row of
-    the front as such a design.
-    """
-
-    problem: str
-    axes: tuple[str, str]
-    low: np.ndarray
-    high: np.ndarray
-    evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-    judge: Callable[[np.ndarray], Spot | None]
-    own: Callable[[Row], np.ndarray]
-
-
-def beatup() -> Rival:
-    """Return peak torque against |M3| at front dead centre, by plain_beatup."""
-    size, phi = plain_beatup.UPPER, np.linspace(-0.5, 2 * np.pi - 0.5, GRID, endpoint=False)
-
-    def evaluate(x):
-        *lengths, s = (x * size).T[:, :, None]
-        peak = np.abs(plain_beatup.crank_torque(*(*lengths, s, M0, phi))).max(axis=1)
-        front_torque = np.abs(plain_beatup.front_torque(*(*lengths, s, M0))[:, 0])
-        return np.column_stack([peak, front_torque]), -plain_beatup.limits(*lengths)[:, :, 0].T
-
-    def judge(x):
-        design = x * size
-        if plain_beatup.violation(design) > BROKEN:
-            return None
-        return float(plain_beatup.peaks(design, M0)[0][1]), abs(float(plain_beatup.front_torque(*(*design, M0))))
-
-    def own(row: Row) -> np.ndarray:
-        known = {**lo.load("beatup").mechanism, **row.design}
-        return np.array([*(known[name] for name in ("l1", "l2", "l3", "l4")), known["m4e"] * known["r4e"] ** 2]) / size
-
-    low, high = plain_beatup.LOWER / size, plain_beatup.UPPER / size
-    return Rival("beatup", ("peak_torque", "M3_fdc"), low, high, evaluate, judge, own)
-
-
-def shedding() -> Rival:
-    """Return stiffness against preload, by plain_shedding: N is linear in K1 and K1 X0."""
-    size, bare = np.array([1e6, 0.080]), replace(SCENE, X0=0.0)
-    spots = [(stretch, np.linspace(stretch[3], stretch[4], GRID // 4)) for stretch in plain_shedding.stretches(SCENE)]
-    travel = np.concatenate([plain_shedding.state(np, SCENE, *spot)[0] for spot in spots])
-    rest = np.concatenate([plain_shedding.force(np, bare, *spot, 0.0) for spot in spots])
-
-    def evaluate(x):
-        stiffness, preload = (x * size).T
-        push = rest + stiffness[:, None] * (travel + preload[:, None])
-        return x * size, -push.min(axis=1)[:, None]
-
-    def judge(x):
-        stiffness, preload = map(float, x * size)
-        needed = float(plain_shedding.least_stiffness(replace(SCENE, X0=preload))[0])
-        return (stiffness, preload) if stiffness >= needed * (1 - BROKEN) else None
-
-    def own(row: Row) -> np.ndarray:
-        return np.array([row.design["K1"], row.design["X0"]]) / size
-
-    return Rival("shedding", ("K1", "X0"), np.zeros(2), np.ones(2), evaluate, judge, own)
-
-
-def evolved(rival: Rival, seconds: float) -> tuple[np.ndarray, int]:
-    """Return the designs that NSGA-II ends with after so much of the processor's time, and how many it looked at."""
+def evolved(rival: Rival, designs: int, seconds: float) -> tuple[np.ndarray, int]:
+    """Return so many designs that NSGA-II ends with after so much of the processor's time; how many it looked at."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem
 
@@ -117,7 +47,7 @@ def evolved(rival: Rival, seconds: float) -> tuple[np.ndarray, int]:
             out["F"] = np.nan_to_num(objectives, nan=1e12)
             out["G"] = np.nan_to_num(rows, nan=1e12)
 
-    problem, algorithm = Traded(), NSGA2(pop_size=POPULATION)
+    problem, algorithm = Traded(), NSGA2(pop_size=designs)
     algorithm.setup(problem, termination=("n_gen", sys.maxsize), seed=SEED, verbose=False)
     began = time.process_time()
     while time.process_time() - began < seconds:
@@ -138,7 +68,7 @@ def area(spots: Sequence[Spot], corner: Spot) -> float:
 def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     """Return a row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
     began = time.process_time()
-    trade = front.trade(lo.load(rival.problem), rival.axes, points=points)
+    trade = front.trade(lo.load(rival.problem), rival.axes, rival.target, points=points)
     found = front.read(trade, runs.run(trade))
     spent, name = time.process_time() - began, " against ".join(rival.axes)
     certified = [row for row in found.rows if row.certified]
@@ -146,10 +76,10 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     if not harness.installed("pymoo"):
         absent = f"{name}: pymoo is not installed (extra `bench`)"
         return [_row(f"{name}: loomopt", spent, len(certified), mine, mine), _row(absent, 0.0, 0, [], mine)]
-    designs, looked = evolved(rival, LONGER * spent)
+    designs, looked = evolved(rival, points, LONGER * spent)
     theirs = _judged(rival, list(designs))
     began = time.process_time()
-    asked = [row for _, second in theirs if (row := _asked(trade, found, second))]
+    asked = [row for _, second in theirs if (row := _asked(trade, found, rival.sign * second))]
     fuller = [*mine, *_judged(rival, [rival.own(row) for row in asked])]
     longer = spent + time.process_time() - began
     whole = [*fuller, *theirs]
@@ -251,16 +181,25 @@ def memory(points: int) -> tuple[int, float, float]:
     return rows, sizes[0] / unit, sizes[1] / unit
 
 
+RIVALS = (beatup, shedding, rapier)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--points", type=int, default=POINTS)
+    parser.add_argument("--only", choices=[rival.__name__ for rival in RIVALS])
     parser.add_argument("--quick", action="store_true", help="shedding alone, no workers, no memory")
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     if asked.quick:
         harness.show(compared(shedding(), 6), asked.json)
         return
-    rows = [row for rival in (beatup(), shedding()) for row in compared(rival, front.POINTS)]
+    wanted = [rival() for rival in RIVALS if asked.only in (None, rival.__name__)]
+    rows = [row for rival in wanted for row in compared(rival, asked.points)]
+    if asked.only:
+        harness.show(rows, asked.json)
+        return
     sizes = [dict(zip(("rows", "MB before", "MB after"), memory(points), strict=True)) for points in (10, 40, 160)]
     fronts = {"M3": (("peak_torque", "M3_fdc"), None), "m4e": (("peak_torque", "m4e"), "balance")}
     ratios = [

@@ -1,6 +1,7 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
+import weakref
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
+from loomopt.program.parabolas import inside, vertex
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
 from loomopt.program.traced import Quantities
@@ -50,24 +52,8 @@ def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
 
 
-def _inside(values: Floats, margin: Floats) -> Floats:
-    """Return values moved into [margin, 1 − margin]."""
-    return np.minimum(np.maximum(values, margin), 1 - margin)
-
-
-def _vertex(values: Floats) -> Floats:
-    """Return where a polynomial through three or five equidistant values is highest, in steps from the middle one."""
-    middle = len(values) // 2
-    low, mid, high = values[middle - 1 : middle + 2]
-    slope, bend = (high - low) / 2, low - 2 * mid + high
-    if middle == 2:
-        outer = values[4] - values[0]
-        third = outer / 2 - 2 * slope
-        slope, bend = (16 * slope - outer) / 12, bend - (values[4] - 4 * high + 6 * mid - 4 * low + values[0]) / 12
-    down = np.where(bend < 0, -bend, np.inf)
-    first = slope / down
-    shift = first + third * first**2 / (2 * down) if middle == 2 else first
-    return np.asarray(np.minimum(np.maximum(shift, -middle), middle), dtype=np.float64)
+_ASKED: weakref.WeakKeyDictionary[JobModel, set[str]] = weakref.WeakKeyDictionary()
+"""Quantities that were asked for on samplers' own grids."""
 
 
 class Tally:
@@ -223,9 +209,13 @@ class Sampler:
         return sorted(found, key=lambda extreme: -extreme.height)
 
     def _sampled(self, name: str) -> Floats:
-        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
-        pieces, u = self.grid()
-        if len(u) > CHUNK:
+        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next.
+
+        Where a model is only ever asked for one quantity, there is no next.
+        """
+        (pieces, u), asked = self.grid(), _ASKED.setdefault(self.model, set())
+        asked.add(name)
+        if len(u) > CHUNK or len(asked) == 1:
             return self.at(name, pieces, u)
         Tally.positions += len(u)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -282,17 +272,17 @@ class Sampler:
         sampled = sign * values[peaks]
         inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
         step = u[inner + 1] - u[inner]
-        centre = u[inner] + step * _vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
+        centre = u[inner] + step * vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
         step = CLOSER * step
-        centre = _inside(centre, 2 * step)
+        centre = inside(centre, 2 * step)
         nodes = centre + step * np.arange(-2, 3)[:, None]
         around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
-        vertex = _inside(centre + step * _vertex(sign * around), np.zeros_like(step))
-        refined = sign * self.at(name, piece, vertex)
+        top = inside(centre + step * vertex(sign * around), np.zeros_like(step))
+        refined = sign * self.at(name, piece, top)
         # A level stretch's extreme is its beginning.
         bent = (around[0] != around[2]) | (around[4] != around[2])
         better = (refined >= sampled) & bent
-        best_u, best = np.where(better, vertex, u[peaks]), sign * np.where(better, refined, sampled)
+        best_u, best = np.where(better, top, u[peaks]), sign * np.where(better, refined, sampled)
         found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
         return [Extreme(*extreme, signed=signed) for extreme in found]
 

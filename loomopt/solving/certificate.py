@@ -57,23 +57,26 @@ class Cycle:
     bound: str
 
 
-def certify(program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
+def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0) -> Certificate:
     """Return the certificate of variables x (SI) as an optimum of the program's target.
 
-    By jets; by 40 digits where floats leave a verdict in doubt.
+    By jets; by 40 digits where floats leave a verdict in doubt. shown: of how many first levels it is known that none
+    falls here to higher order, from the certificate of a program with those levels that holds nothing more than this.
     """
-    quick = certified(Forward, program, x, accuracy)
-    return quick if quick.clear else certified(Exact, program, x, accuracy)
+    quick = certified(Forward, program, x, accuracy, shown)
+    return quick if quick.clear else certified(Exact, program, x, accuracy, shown)
 
 
-def certified(derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float) -> Certificate:
-    """Return the certificate of variables x (SI) by one way to derivatives."""
+def certified(
+    derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0
+) -> Certificate:
+    """Return the certificate of variables x (SI) by one way to derivatives; shown: as in `certify`."""
     settings = Settings(accuracy)
     try:
         sampler = sampled(program.model, {**program.parameters, **x}, settings.sampled)
         active = active_set(program, sampler)
         found = derivatives(program, x, sampler, active.rows)
-        local = Local(program, x, sampler, active, found, found.gradients())
+        local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
         rows = cycle_rows(program)
         cycle = Cycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
         return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))

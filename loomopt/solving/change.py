@@ -15,6 +15,7 @@ import numpy as np
 from loomopt.cycle import Floats
 from loomopt.maths import Number
 from loomopt.program.instant import Instant, Row
+from loomopt.program.model import JobModel
 from loomopt.program.numbers import LEAST_CHANGE
 from loomopt.program.program import Objective, Program, Variable
 from loomopt.solving.certificate import certify
@@ -27,6 +28,8 @@ from loomopt.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUN
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
 CHANGED = Objective(CHANGE, CHANGE, "value", 1.0)
+MODELS = 8
+"""Models with the change as a row that are kept: a front has one for every set of variables that are held."""
 
 
 def with_least_change(search: Search) -> Search:
@@ -95,17 +98,16 @@ def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]
 
 def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> tuple[Judged, Certificate] | None:
     """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
-    judging = Search(search.job, task, search.settings)
-    found = judged_as_is(judging, candidate)
+    judging, here = Search(search.job, task, search.settings), exact(search, best.x)
+    found = judged_as_is(judging, candidate, here)
     for _ in range(CORRECTIONS):
         before, found = found, corrected(judging, found)
         if found is before or (found.certificate.passed and found.certificate.residual <= PRECISE):
             break
     if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
         return None
-    here = exact(search, found.x)
-    stayed = here == exact(search, best.x)
-    alone = best.certificate if stayed else certify(search.program, here, search.settings.accuracy)
+    there = exact(search, found.x)
+    alone = best.certificate if there == here else certify(search.program, there, search.settings.accuracy)
     return (found, alone) if alone.passed else None
 
 
@@ -139,17 +141,23 @@ def changing(
     if not free:
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
-    row = Row(functools.partial(_change, tuple(free)))
     held = tuple(replace(v, lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
     return replace(
         program,
-        model=replace(program.model, own_rows={**program.model.own_rows, CHANGE: row}),
+        model=_measuring(program.model, tuple(free)),
         variables=held,
         parameters={**program.parameters, **given},
         limits=tuple(limit for limit in program.limits if limit.family != "variable" or limit.row not in kept),
         objectives=(*program.objectives, CHANGED),
         moves=(),
     )
+
+
+@functools.lru_cache(maxsize=MODELS)
+def _measuring(model: JobModel, names: tuple[str, ...]) -> JobModel:
+    """Return a model with the change of variables as a row: one for all designs, whose formulas are recorded once."""
+    row = Row(functools.partial(_change, names))
+    return replace(model, own_rows={**model.own_rows, CHANGE: row})
 
 
 def _change(names: Iterable[str], at: Instant) -> Number:
@@ -202,13 +210,25 @@ def left(program: Program, x: Mapping[str, float], certificate: Certificate, kep
     if not names:
         return level
     scales = {v.name: v.scale for v in program.variables}
-    moves = [*unchanging(program, x), *({name: 1.0} for name in kept)]
-    ways = np.array([[move.get(name, 0.0) / scales[name] for name in names] for move in moves]).reshape(-1, len(names))
-    ways = np.array([way / np.linalg.norm(way) for way in ways if way.any()]).reshape(-1, len(names))
-    inside = ways @ level.T
-    inside = inside[np.linalg.norm(ways - inside @ level, axis=1) <= RANK]
-    turned, sizes, _ = np.linalg.svd(inside.T)
+    inside = functools.partial(_inside, level, {name: scales[name] for name in names})
+    # Whether a move changes nothing is looked at only where that counts: most lead out of the level.
+    moves = unchanging(program, x, lambda way: not way.keys() <= set(kept) and inside(way) is not None)
+    found = [shares for move in (*moves, *({name: 1.0} for name in kept)) if (shares := inside(move)) is not None]
+    turned, sizes, _ = np.linalg.svd(np.array(found).reshape(-1, len(level)).T)
     return np.asarray(turned[:, int(np.sum(sizes > RANK)) :].T @ level)
+
+
+def _inside(level: Floats, scales: Mapping[str, float], move: Mapping[str, float]) -> Floats | None:
+    """Return a move's direction (k,) in a level (k, variables), in natural sizes; None where it leads out of it.
+
+    scales: of the level's variables, SI.
+    """
+    way = np.array([move.get(name, 0.0) / scale for name, scale in scales.items()])
+    if not way.any():
+        return None
+    way /= np.linalg.norm(way)
+    shares = np.asarray(level @ way)
+    return shares if np.linalg.norm(way - shares @ level) <= RANK else None
 
 
 def _called(program: Program, ways: Floats, of: Judged) -> tuple[str, ...]:

@@ -208,13 +208,19 @@ def _certified(search: Search, candidate: Candidate) -> Search:
     return replace(search, best=Judged(candidate, x, certificate))
 
 
-def _settled(search: Search, x: Mapping[str, float]) -> tuple[Search, dict[str, float], Certificate]:
-    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate."""
+def _settled(
+    search: Search, x: Mapping[str, float], known: Mapping[str, float] | None = None
+) -> tuple[Search, dict[str, float], Certificate]:
+    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate.
+
+    known: where (SI) all levels but the last have a certificate, if anywhere.
+    """
     job, program, began = search.job, search.program, time.perf_counter()
     search.settings.at("certifying")
     settled, said = settle(program, job.tidy(program, x))
-    at = time.perf_counter()
-    certificate = replace(certify(program, exact(search, settled), search.settings.accuracy), settled=said)
+    at, there = time.perf_counter(), exact(search, settled)
+    shown = len(program.objectives) - 1 if there == known else 0
+    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=said)
     certified = search.certified + time.perf_counter() - at
     return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
 
@@ -224,9 +230,12 @@ def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
     return search.job.values(search.program, search.job.design(search.program, x))
 
 
-def judged_as_is(search: Search, candidate: Candidate) -> Judged:
-    """Return a candidate after the silent levels with its certificate, not corrected."""
-    _, x, certificate = _settled(search, candidate.point.x)
+def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Judged:
+    """Return a candidate after the silent levels with its certificate, not corrected.
+
+    known: where (SI) all levels but the last have a certificate, if anywhere.
+    """
+    _, x, certificate = _settled(search, candidate.point.x, known)
     return Judged(candidate, x, certificate)
 
 

@@ -42,7 +42,7 @@ along a straight line."""
 class Local:
     """A program around one design x (SI): its active set with slopes (rows, variables), and what curves them.
 
-    closed: by each earlier level.
+    closed: by each earlier level; shown: of how many first levels it is known that none falls to higher order.
     """
 
     program: Program
@@ -52,6 +52,7 @@ class Local:
     derivatives: Derivatives
     gradients: Floats
     closed: tuple[Closed, ...] = ()
+    shown: int = 0
 
     @property
     def shut(self) -> Floats:
@@ -169,9 +170,11 @@ def judged(local: Local, level: int, system: System, multipliers: Multipliers) -
     still = vectors.T[values <= flat]
     found = replace(found, unique=not any(map(cone.ways, still)), level=still @ cone.basis.T)
     bent, rising = values > max(FAINT, flat), values > flat
-    lagrangian = _lagrangian(local, level, multipliers)
     if rising.any() and values.min() >= -flat:
         found = replace(found, closed=_closed(local, cone, weights, vectors[:, rising], values[rising]))
+    if level < local.shown:
+        return found
+    lagrangian = _lagrangian(local, level, multipliers)
     curve = _curve(local, cone, vectors[:, bent], values[bent], next(iter(_pulled(local, slope)), None))
     faint = vectors.T[~bent]
     ways = [way for line in _lines(faint) for way in cone.ways(line)]
@@ -235,10 +238,15 @@ def _newton(cone: Critical, vectors: Floats, bends: Floats, slope: Floats) -> Fl
 
 def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Floats, flat: float = FLAT) -> bool:
     """Say whether all but moves that change nothing curves, more than flat: later levels have nothing to choose."""
-    last = level == len(local.program.objectives) - 1
-    moves = [] if last else settle.unchanging(local.program, local.x)
-    directions = [np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales for move in moves]
-    inside = [basis.T @ way for way in (d / np.linalg.norm(d) for d in directions) if _is_open(basis, way)]
+    if level == len(local.program.objectives) - 1:
+        return False
+
+    def along(move: Mapping[str, float]) -> Floats:
+        way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
+        return np.asarray(way / np.linalg.norm(way))
+
+    moves = settle.unchanging(local.program, local.x, lambda move: _is_open(basis, along(move)))
+    inside = [basis.T @ along(move) for move in moves]
     if not inside:
         return False
     left, sizes, _ = np.linalg.svd(np.array(inside).T)
@@ -284,10 +292,13 @@ def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], sl
     found: set[Verdict] = set()
     for way in ways:
         along = dict(zip(curve.scales, map(float, way * np.array(list(curve.scales.values()))), strict=True))
-        # A straight line leaves an earlier level's valley.
-        straight = curve.valley is not None or lagrangian.falls(along, slope)
-        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope) if straight or every else "holds"
-        if straight or verdict == "falls":
+        # A straight line leaves an earlier level's valley: what it does tells nothing.
+        crooked = curve.valley is not None
+        if not every and not crooked and not lagrangian.falls(along, slope):
+            continue
+        verdict = curve.judged(lagrangian, curve.basis.T @ way, slope)
+        # Where designs beside the line tell nothing, the line itself must fall for doubt.
+        if verdict == "falls" or (verdict == "open" and (crooked or not every or lagrangian.falls(along, slope))):
             found.add(verdict)
     return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 

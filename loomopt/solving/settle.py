@@ -4,7 +4,7 @@ They run only along moves verified flat at this design: objectives unchanged to 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -70,12 +70,15 @@ def _factors(move: Move, x: Numbers) -> tuple[float, float]:
     return max(low for low, _ in scales), min(high for _, high in scales)
 
 
-def unchanging(program: Program, x: Numbers) -> list[dict[str, float]]:
+def unchanging(
+    program: Program, x: Numbers, asked: Callable[[Numbers], bool] = lambda way: True
+) -> list[dict[str, float]]:
     """Return the directions, SI, of the moves along which nothing changes at x (SI) as far as bounds allow.
 
-    Neither an objective, nor a limit that is touched, but for the bounds of what moves.
+    Neither an objective, nor a limit that is touched, but for the bounds of what moves. asked: says of a direction
+    whether it is of interest, every one without it.
     """
-    ways = ((move, way) for move in program.moves for way in _directions(move, x))
+    ways = ((move, way) for move in program.moves for way in _directions(move, x) if asked(way))
     return [way for move, way in ways if _is_same(program, x, list(_ends(move, way, x)))]
 
 

@@ -1,5 +1,6 @@
 """How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -51,7 +52,8 @@ def searched(search: Search, count: int | None, seed: int, near: Sequence[Point]
 def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     """Return the search after the job's own starts, the best of a look at many designs, and the best with flips.
 
-    From the best, each variable in turn is put to its far end: basins lie side by side along bounds.
+    From the best, each variable in turn is put to its far end: basins lie side by side along bounds. Where the best is
+    as good as any design can be, nothing more is solved.
     """
     own = exchange.starts(search.program, 1, seed)
     search = at(search, "looking at designs")
@@ -70,7 +72,7 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     for start in drawn:
         search = steps.explored(search, start)
     for _ in range(FLIPS):
-        if screening is None or not search.reached:
+        if screening is None or not search.reached or _unbeatable(search):
             break
         before = search.ranked[0]
         flipped = _completed(search, screening.flipped(before.point.x))
@@ -91,8 +93,13 @@ class _Steps:
     done: int = 0
 
     def explored(self, search: Search, start: Mapping[str, float]) -> Search:
-        """Return the search after a solve that is left as soon as it cannot be better than the best so far."""
+        """Return the search after a solve that is left as soon as it cannot be better than the best so far.
+
+        It is not begun where nothing can.
+        """
         self.done += 1
+        if _unbeatable(search):
+            return search
         if self.on_start:
             self.on_start(self.done, self.count)
         search = at(search, f"start {self.done} of {self.count}")
@@ -100,6 +107,16 @@ class _Steps:
             return tried(search, start)
         best = search.ranked[0]
         return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
+
+
+def _unbeatable(search: Search) -> bool:
+    """Say whether the best is as good as bounds alone let any design be: none can be better by as much as counts."""
+    lower = {v.name: v.lower for v in search.program.variables}
+    least = 0.0
+    for level in search.program.objectives:
+        alone = lower.get(level.row, -math.inf) if level.form == "value" and len(level.rows) == 1 else -math.inf
+        least = search.settings.penalty * least + (0.0 if level.form == "magnitude" else alone / level.scale)
+    return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
 
 
 def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> "Screening | None":

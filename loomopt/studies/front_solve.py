@@ -17,7 +17,7 @@ from loomopt.solving import change, report
 from loomopt.solving.rows import Row as Touched
 from loomopt.solving.rows import active_set
 from loomopt.solving.search import Judged, Search, judged, objectives, tried
-from loomopt.solving.strategy import searched
+from loomopt.solving.strategy import searched, spread
 from loomopt.studies import warm
 from loomopt.tolerances import FEASIBLE
 
@@ -130,7 +130,9 @@ class Solver:
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
         search = judged(search) if search.reached else search
-        if (wide and not program.single) or not (search.passed or wide is None):
+        if wide and search.passed and not program.single:
+            search = judged(spread(search, 0, None))
+        if not (search.passed or wide is None):
             search = searched(search, None, 0, (), None)
         return search
 

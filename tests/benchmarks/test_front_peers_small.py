@@ -54,6 +54,20 @@ def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
     assert rows.max() < 1e-8
 
 
+def test_the_referee_of_the_rapier_reads_the_published_optimum(peers):
+    rapier = peers.rapier()
+    told = references.read(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
+    design = {str(name).split(" [")[0]: float(cell) for name, cell in told.items() if str(name)[0] in "laCp"}
+    best = rapier.own(SimpleNamespace(design=design))
+    peak, dwell = rapier.judge(best)
+    assert peak == pytest.approx(0.694984753570, rel=1e-6)
+    assert -np.degrees(dwell) == pytest.approx(30.0, rel=1e-6)
+    seen, rows = rapier.evaluate(best[None])
+    assert seen[0] == pytest.approx((peak, dwell), rel=1e-3)
+    assert rows.max() < 1e-6, "the transmission angle is at its limit"
+    assert rapier.judge(np.zeros(7)) is None, "no l4 has the stroke"
+
+
 def test_without_the_peer_the_front_is_judged_alone(peers, rival, monkeypatch):
     monkeypatch.setattr(peers.harness, "installed", lambda name: False)
     mine, absent = peers.compared(rival, 3)
@@ -66,7 +80,7 @@ def test_without_the_peer_the_front_is_judged_alone(peers, rival, monkeypatch):
 def test_a_peer_that_knows_the_front_adds_nothing_where_the_front_is_asked_at_its_places(peers, rival, monkeypatch):
     known = [curve(144270.37243, 0.040), curve(119901.39519, 0.060), curve(90e3, 0.060)]
     monkeypatch.setattr(peers.harness, "installed", lambda name: True)
-    monkeypatch.setattr(peers, "evolved", lambda rival, seconds: (np.array(known), 3))
+    monkeypatch.setattr(peers, "evolved", lambda rival, designs, seconds: (np.array(known), 3))
     mine, asked, theirs = peers.compared(rival, 3)
     assert theirs["admissible"] == 2, "one is too soft"
     assert mine["missed"] > 0.01, "three designs are a coarse front"

@@ -32,7 +32,7 @@ def certified(monkeypatch):
     """Return what is put before the certificate, and a way to say what it answers: by x, or for all."""
     seen, answers = [], dict[float | str, Any]()
 
-    def certify(program, x, accuracy):
+    def certify(program, x, accuracy, shown):
         seen.append(x["x"])
         answer = answers.get(x["x"], answers.get("all", GOOD))
         return answer(len(seen)) if callable(answer) else answer

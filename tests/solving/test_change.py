@@ -12,7 +12,7 @@ from loomopt.maths import FLOAT
 from loomopt.mechanisms.cam_spline import spline
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Move, Wish
-from loomopt.solving import change
+from loomopt.solving import change, second_order, settle
 from loomopt.solving.certificate import certify
 from loomopt.solving.change import with_least_change
 from loomopt.solving.search import Search, judged, objectives, tried
@@ -134,6 +134,62 @@ def test_a_design_that_has_changed_least_already_stays_to_the_last_bit_and_is_no
     assert again.certificate.passed
     assert again.certificate.settled == (f"y: {LEAST}",)
     assert again.certificate.change.stationarity <= 1e-6
+
+
+def test_levels_that_are_shown_at_a_design_are_not_followed_there_again(monkeypatch):
+    followed = []
+
+    def counted(lagrangian, *others):
+        followed.append(lagrangian.level)
+        return higher(lagrangian, *others)
+
+    higher = second_order._higher
+    program = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (1.0, 9.0)})
+    first = solved(program, {"x": 4.0, "y": 3.0}, {"y": 2.0}).best
+    monkeypatch.setattr(second_order, "_higher", counted)
+    stays = solved(program, first.x, {"y": first.x["y"]}).best
+    assert (followed, stays.certificate.passed) == ([0, 1], True), "once at the level, once at the change"
+    followed.clear()
+    moves = solved(program, {"x": 4.0, "y": 3.0}, {"y": 2.0}).best
+    assert followed.count(0) > 1, "another design"
+    assert moves.x == first.x
+
+
+def test_a_level_that_is_shown_says_as_much_as_one_that_is_followed():
+    program = toy.program("xy", {"f": lambda v: v["x"] ** 2 + v["y"] ** 4, "g": lambda v: v["y"] ** 2}, objectives="fg")
+    x = {"x": 0.0, "y": 0.0}
+    assert certify(program, x, 1e-8, 1) == certify(program, x, 1e-8)
+    falls = toy.program("xy", {"f": lambda v: v["x"] ** 2 - v["y"] ** 4, "g": lambda v: v["y"] ** 2}, objectives="fg")
+    assert not certify(falls, x, 1e-8).passed
+
+
+def test_designs_that_change_share_one_model():
+    program = toy.program("xy", {"f": lambda v: v["x"] ** 2})
+    tasks = [change.changing(program, {"x": 0.0, "y": y}, (), {"x": 0.0, "y": 2.0}) for y in (1.0, 3.0)]
+    assert tasks[0].model is tasks[1].model
+    assert tasks[0].parameters == tasks[1].parameters
+    other = change.changing(program, {"x": 0.0, "y": 1.0}, ("x",), {"x": 0.0, "y": 2.0})
+    assert other.model is not tasks[0].model
+
+
+def test_only_moves_along_the_level_are_looked_at(monkeypatch):
+    asked = []
+
+    def counted(program, x, ends):
+        asked.append(set(ends[0]))
+        return True
+
+    monkeypatch.setattr(settle, "_is_same", counted)
+    axes = [Move(n, (n,), "axis", (Wish("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
+    program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
+    certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
+    ways = change.left(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
+    assert len(ways) == 1, "y and z together are no move"
+    assert asked == []
+    flat = toy.program("xyz", {"f": lambda v: v["x"] ** 2}, moves=tuple(axes))
+    certificate = certify(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
+    assert len(change.left(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
+    assert asked == [{"z"}], "y stays whatever it changes"
 
 
 # Machines --------------------------------------------------------------------------------------------------------

@@ -92,6 +92,25 @@ def test_starts_that_cannot_be_better_are_left():
     assert all(point.value > least - 2 * BETTER for point in left)
 
 
+@pytest.mark.parametrize(
+    ("objectives", "least", "alone"),
+    [
+        (("|f|",), 0.0, True),
+        (("x",), 0.0, True),
+        (("|f|", "x"), 0.0, True),
+        (("|f|",), 0.1, False),
+        (("f",), 0.0, False),
+    ],
+)
+def test_nothing_more_is_solved_where_no_design_can_be_better(objectives, least, alone):
+    rows = {"f": lambda v: (v["x"] - 1) * (v["y"] - 1) + least if least else v["x"]}
+    limits = (("f", -1, least),) if least else ()
+    found = wide(toy.program("xy", rows, limits=limits, objectives=objectives, bounds={"x": (0, 3), "y": (0, 1)}))
+    assert found.passed
+    assert (len(found.candidates) == 1) == alone
+    assert found.best.candidate.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
+
+
 def test_each_start_is_told_with_how_many_there_are():
     told = []
     program = hills()
