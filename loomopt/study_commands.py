@@ -157,6 +157,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
         study_files.check_table(path)
     for path in how.figure or ():
         study_files.check_figure(path)
+    _apart(how)
     rows: dict[int, Row] = {}
 
     def kept(row: "Row") -> None:
@@ -179,6 +180,17 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
         found.plot(path)
         remark(f"Wrote {path}")
     return status(found.rows)
+
+
+def _apart(how: Run) -> None:
+    """Raise BadInput where a table or a figure would be written over the store."""
+    from loomopt.scene_errors import refusal
+
+    for path in (*(how.out or ()), *(how.figure or ())):
+        if how.store and path.resolve() == how.store.resolve():
+            raise refusal(
+                "it is the store's own file", str(path), "--store", remedy="Name another file for one of them"
+            )
 
 
 @contextlib.contextmanager

@@ -129,6 +129,7 @@ def test_a_combination_that_is_no_scene_is_a_failed_row_and_exit_4(cli):
         (*M0, "--out", "none/t.csv"),
         (*M0, "--figure", "f.csv"),
         (*M0, "--store", "none/s.db"),
+        (*M0, "--store", "t.csv", "--out", "./t.csv"),
         (*M0, "--target", "none"),
         (*M0, "--dask", "nowhere"),
         (),
