@@ -20,9 +20,8 @@ from loomopt.studies.rows import Row
 APPLICATION, VERSION = 0x6C6F6F6D, 1
 """What the file's head says: "loom", and the version of its tables."""
 COLUMNS = tuple(each.name for each in fields(Row))
-KINDS: dict[str, type | tuple[type, ...]] = {"status": str, "certified": bool, "seconds": (int, float)} | dict.fromkeys(
-    ("place", "design", "figures", "multipliers", "reached", "warm"), dict
-)
+OBJECTS = "place", "design", "figures", "multipliers", "reached", "warm"
+KINDS: dict[str, Any] = {"status": str, "certified": bool, "seconds": (int, float), **dict.fromkeys(OBJECTS, dict)}
 """What a column's JSON text must hold."""
 TABLES = (
     "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
