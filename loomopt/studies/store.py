@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from loomopt import files
 from loomopt.errors import BadInput
@@ -21,7 +20,7 @@ APPLICATION, VERSION = 0x6C6F6F6D, 1
 """What the file's head says: "loom", and the version of its tables."""
 COLUMNS = tuple(each.name for each in fields(Row))
 OBJECTS = "place", "design", "figures", "multipliers", "reached", "warm"
-KINDS: dict[str, Any] = {"status": str, "certified": bool, "seconds": (int, float), **dict.fromkeys(OBJECTS, dict)}
+KINDS: dict[str, type] = {"status": str, "certified": bool, **dict.fromkeys(OBJECTS, dict)}
 """What a column's JSON text must hold."""
 TABLES = (
     "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
@@ -112,5 +111,5 @@ class Store:
             self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values))
 
 
-def _read(cell: object) -> Any:
+def _read(cell: object) -> object:
     return json.loads(cell) if isinstance(cell, str) else cell
