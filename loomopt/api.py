@@ -191,7 +191,7 @@ def pareto(
     target: str | None = None,
     executor: "Executor | Callable[[], Executor] | None" = None,
     *,
-    maximise: Sequence[str] = (),
+    maximise: str | Sequence[str] = (),
     ranges: "Ranges | None" = None,
     points: int | None = None,
     workers: int | None = None,

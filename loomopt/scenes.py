@@ -199,7 +199,7 @@ class Scene(Shown):
         for name in asked:
             if name not in ranges:
                 single = [bound for bound in ranges if not self.bounds[bound].free]
-                held = ", ".join([*(group for group, of in groups.items() if of), *single])
+                held = ", ".join(dict.fromkeys([*(group for group, of in groups.items() if of), *single]))
                 allowed = held or "nothing: no bound has free = false"
                 remedy = "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)

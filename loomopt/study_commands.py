@@ -157,6 +157,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
         study_files.check_table(path)
     for path in how.figure or ():
         study_files.check_figure(path)
+    _apart(how)
     rows: dict[int, Row] = {}
 
     def kept(row: "Row") -> None:
@@ -165,7 +166,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
 
     count = None if how.workers is None else read_number("--workers", how.workers, int)
     try:
-        with _executor(how.dask) as executor, Progress() as progress:
+        with _executor(how.dask, count) as executor, Progress() as progress:
             found = conducted(study, executor, count, how.store, how.resume, kept)
     except KeyboardInterrupt:
         if rows:
@@ -181,12 +182,27 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     return status(found.rows)
 
 
+def _apart(how: Run) -> None:
+    """Raise BadInput where a table or a figure would be written over the store."""
+    from loomopt.scene_errors import refusal
+
+    for path in (*(how.out or ()), *(how.figure or ())):
+        if how.store and path.resolve() == how.store.resolve():
+            raise refusal(
+                "it is the store's own file", str(path), "--store", remedy="Name another file for one of them"
+            )
+
+
 @contextlib.contextmanager
-def _executor(dask: str | None) -> "Iterator[Executor | None]":
-    """Yield the executor of a Dask cluster, where one is named."""
+def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]":
+    """Yield the executor of a Dask cluster, where one is named. Raises BadInput beside a number of workers."""
     if dask is None:
         yield None
         return
+    if count is not None:
+        from loomopt.scene_errors import refusal
+
+        raise refusal("there are a cluster and a number of workers", "", "--workers", count, remedy="Give one of them")
     from loomopt.studies import executors
 
     with executors.dask(dask) as executor:
@@ -247,7 +263,7 @@ def effects(
             layout.show(*effects_table.parts(found))
 
     try:
-        with _executor(dask) as executor, Progress() as progress:
+        with _executor(dask, count) as executor, Progress() as progress:
             progress.say("solving with all effects on")
             found = effects_study.conducted(study, executor, count, kept)
     except KeyboardInterrupt:

@@ -49,7 +49,7 @@ BAD = [
     ("--target balance", ["balance", "stiffness, law, force, speed"]),
     ("--target speed --without inertia", ["effects.inertia", "target speed needs"]),
     ("--with gravity", ["gravity", "damping, dry_friction"]),
-    ("--free sley", ["sley", "cannot be freed"]),
+    ("--free sley", ["sley", "cannot be freed", "Allowed: rise, far_dwell, return, near_dwell."]),
 ]
 TABLES = {
     "falls.csv": "angle [deg],s [mm]\n0,0\n10,1\n20,3\n30,2.5\n40,5\n50,7\n60,9\n70,9.5\n80,10\n",

@@ -129,6 +129,7 @@ def test_a_combination_that_is_no_scene_is_a_failed_row_and_exit_4(cli):
         (*M0, "--out", "none/t.csv"),
         (*M0, "--figure", "f.csv"),
         (*M0, "--store", "none/s.db"),
+        (*M0, "--store", "t.csv", "--out", "./t.csv"),
         (*M0, "--target", "none"),
         (*M0, "--dask", "nowhere"),
         (),
@@ -140,3 +141,9 @@ def test_bad_input_is_one_message_and_nothing_is_written(cli, tmp_path, argument
     assert (status, out, err.count("\n")) == (2, "", 1), err
     assert err.startswith("loomopt: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cluster_and_workers_are_refused_before_the_cluster_is_sought(cli):
+    status, out, err = cli("beatup", *M0, "--workers", "2", "--dask", "tcp://127.0.0.1:1")
+    assert (status, out) == (2, "")
+    assert err == "loomopt: --workers: there are a cluster and a number of workers (given: 2). Give one of them.\n"

@@ -91,7 +91,9 @@ def with_axes(
     """
     found = []
     for name, sense in asked.items():
-        axis, rows = axes[name], axes[name].rows or (full(name),)
+        # A figure comes before a number that the designer calls the same, such as one of an effect's.
+        own = program.model.has_row(name) or program.model.has_quantity(name)
+        axis, rows = axes[name], axes[name].rows or (name if own else full(name),)
         _demand(program, name, rows)
         peak = axis.form == "peak" or (not axis.form and program.model.has_quantity(rows[0]))
         form = "peak" if peak else axis.form or "value"

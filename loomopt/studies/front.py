@@ -34,8 +34,8 @@ def trade(
     axes: Sequence[str],
     target: str | None = None,
     *,
-    maximise: Sequence[str] = (),
-    minimise: Sequence[str] = (),
+    maximise: str | Sequence[str] = (),
+    minimise: str | Sequence[str] = (),
     ranges: Ranges | None = None,
     points: int | None = None,
     accuracy: float = ACCURACY,
@@ -51,15 +51,20 @@ def trade(
     if target is not None:
         target_name(scene, target)
     first, second = _two(scene, axes)
+    maximise, minimise = ((given,) if isinstance(given, str) else given for given in (maximise, minimise))
     stray = [name for name in (*maximise, *minimise, *(ranges or {})) if name not in axes]
     if stray:
-        raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes))
+        remedy = "Name one of them, or trade it."
+        raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
     wanted = POINTS if points is None else points
-    if wanted < FEWEST:
-        raise BadInput("a front needs more points", key="points", value=str(points), allowed=f"{FEWEST} and more")
+    if not isinstance(wanted, int) or not FEWEST <= wanted <= texts.MOST_VALUES:
+        allowed = f"a whole number from {FEWEST} to {texts.MOST_VALUES}"
+        problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
+        raise BadInput(problem, key="points", value=str(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in (ranges or {}).items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise BadInput("a range goes from less to more", key=name, value=f"{low:g}:{high:g}")
+            remedy = "Write the smaller end first."
+            raise BadInput("a range goes from less to more", key=name, value=f"{low:g}:{high:g} in SI", remedy=remedy)
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
     found = Trade(
         _bounded(scene, ranges or {}), (first, second), senses, target, tuple((ranges or {}).items()), wanted, accuracy

@@ -154,7 +154,7 @@ class Solver:
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
-        status = "optimal" if certified else "infeasible" if held else "uncertified"
+        status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
             "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
@@ -173,12 +173,12 @@ class Solver:
         )
 
     def _held(self, search: Search, best: Judged, asking: Asking) -> str:
-        """Return why the point does not count: an axis is above its cap; "" where it does."""
+        """Return why the point does not count, though one may be there: an axis is above its cap; "" where it does."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, asking.caps, strict=True):
             size = axis.objective.scale
             if cap is not None and sampler.merit(axis.objective) / size > cap / size + FEASIBLE:
-                return f"{axis.axis.name} cannot be kept as asked"
+                return f"{axis.axis.name} comes out above what was asked"
         return ""
 
     def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:

@@ -7,7 +7,7 @@ write-ahead log both work on network file systems. One run at a time has the fil
 import contextlib
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +19,9 @@ from loomopt.studies.rows import Row
 APPLICATION, VERSION = 0x6C6F6F6D, 1
 """What the file's head says: "loom", and the version of its tables."""
 COLUMNS = tuple(each.name for each in fields(Row))
+OBJECTS = "place", "design", "figures", "multipliers", "reached", "warm"
+KINDS: dict[str, type] = {"status": str, "certified": bool, **dict.fromkeys(OBJECTS, dict)}
+"""What a column's JSON text must hold."""
 TABLES = (
     "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
     f"CREATE TABLE row (study TEXT NOT NULL REFERENCES study (key), {', '.join(COLUMNS)}, PRIMARY KEY (study, point))",
@@ -84,11 +87,21 @@ class Store:
             self._file.execute("INSERT OR IGNORE INTO study VALUES (?, ?)", (key, json.dumps(told)))
 
     def rows(self, key: str) -> list[Row]:
-        """Return the rows of a study that are there."""
+        """Return the rows of a study that are there. Raises BadInput for one that was damaged."""
         with self._told():
             names = ", ".join(COLUMNS)
             found = self._file.execute(f"SELECT {names} FROM row WHERE study = ? ORDER BY point", (key,)).fetchall()
-        return [Row.from_dict(dict(zip(COLUMNS, map(_read, row), strict=True))) for row in found]
+        return [self._row(cells) for cells in found]
+
+    def _row(self, cells: Sequence[object]) -> Row:
+        try:
+            known = {name: _read(cell) for name, cell in zip(COLUMNS, cells, strict=True)}
+        except ValueError:
+            known = {}
+        if not all(isinstance(known.get(name), kind) for name, kind in KINDS.items()):
+            problem = f"the row of point {cells[0]} is damaged"
+            raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
+        return Row.from_dict(known)
 
     def add(self, key: str, row: Row) -> None:
         """Write a finished row; it is there for good when this returns."""

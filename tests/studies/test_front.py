@@ -273,6 +273,28 @@ def test_a_range_that_no_point_lies_in_is_told(axis, low, high, reached):
     assert error.value.key == axis
 
 
+def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
+    """Of a counterweight at its largest radius J4 = J4⁰ + m4e r4e²: both fronts are one."""
+    trade = front.trade(lo.load("beatup"), ("peak_torque", "J4"), "balance", points=4)
+    own, other = ends(trade), mass[1]
+    for row, same in zip(own, other[:2], strict=True):
+        assert row.certified
+        assert read(row, "J4") == pytest.approx(0.62 + read(same, "m4e") * 0.08**2, abs=CLOSE)
+        assert read(row, "J4") == pytest.approx(row.figures["J4"], rel=CLOSE)
+        assert read(row, "peak_torque") == pytest.approx(read(same, "peak_torque"), rel=CLOSE)
+
+
+def test_what_the_least_change_from_today_buys():
+    """Today's machine has no counterweight: its radius counts as a change, its largest does not stand for none."""
+    trade = front.trade(lo.load("beatup"), ("peak_torque", "change"), points=3)
+    found = front.read(trade, runs.run(trade))
+    assert all(row.certified for row in found.rows)
+    assert len(found.values("change")) >= 3
+    for before, row in itertools.pairwise(found.rows):
+        assert row.figures["change"] == pytest.approx(read(row, "change"), abs=CLOSE)
+        assert read(row, "peak_torque") < read(before, "peak_torque")
+
+
 def test_two_axes_that_do_not_conflict():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"))
     found = front.read(trade, runs.run(trade))
@@ -313,9 +335,11 @@ def test_a_range_ends_the_front(ranges, axis, reached):
         (("peak_torque", "nonsense"), {}, "nonsense is no axis"),
         (("peak_torque", "m4e"), {"maximise": ("peak_torque",)}, "the least can be sought, not the most"),
         (("peak_torque", "peak_torque"), {}, "two axes that differ"),
-        (("peak_torque", "m4e"), {"maximise": ("l1",)}, "l1 is none of both axes"),
         (("peak_torque", "m4e"), {"ranges": {"m4e": (2.0, 1.0)}}, "from less to more"),
         (("peak_torque", "m4e"), {"points": 2}, "more points"),
+        (("peak_torque", "m4e"), {"points": 99_999_999_999}, "no such number of points.*3 to 20000"),
+        (("peak_torque", "m4e"), {"points": 3.5}, "no such number of points"),
+        (("peak_torque", "m4e"), {"maximise": "l1"}, "l1 is none of both axes"),
         (("peak_torque", "m4e"), {"target": "nothing"}, "no target nothing"),
         (("peak_torque", "bearing_force"), {}, "nothing in the scene gives bearing_force"),
     ],

@@ -69,3 +69,17 @@ def test_what_is_no_store_is_left_as_it_is(tmp_path, what):
         Store(path)
     assert len(str(told.value).splitlines()) == 1
     assert before is None or path.read_bytes() == before
+
+
+@pytest.mark.parametrize("cell", ["design = '{'", "status = '7'", "figures = '[]'", "warm = NULL", "place = x'ff'"])
+def test_a_damaged_row_is_told_by_its_point(tmp_path, cell):
+    with Store(tmp_path / "s.db") as store:
+        store.begin("one", {})
+        store.add("one", ROW)
+    file = sqlite3.connect(tmp_path / "s.db")
+    file.execute(f"UPDATE row SET {cell}")
+    file.commit()
+    file.close()
+    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match="the row of point 2 is damaged") as told:
+        store.rows("one")
+    assert len(str(told.value).splitlines()) == 1

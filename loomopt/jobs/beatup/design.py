@@ -5,6 +5,7 @@ import math
 from loomopt.jobs.base import Figures
 from loomopt.jobs.beatup.model import FRONT
 from loomopt.jobs.beatup.scene import VARIABLES, RetrofitTarget
+from loomopt.program.axes import opposite
 from loomopt.program.numbers import Bounds
 from loomopt.program.program import Goal, Numbers, Program
 from loomopt.program.sampling import Sampler
@@ -37,12 +38,13 @@ def _masses(program: Program) -> list[float]:
 def values(program: Program, design: Numbers) -> dict[str, float]:
     """Return the NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
 
-    Where m4e = 0 the radius says nothing, and r4e = 0 would hide how s = m4e r4e² can grow.
+    Where m4e = 0 the radius says nothing, unless it is asked for, and r4e = 0 would hide how s = m4e r4e² can grow.
     """
     found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
-    for v in program.variables:
-        if v.name == "r4e" and design["m4e"] == 0.0 and "change" not in {o.row for o in program.objectives}:
-            found["r4e"] = v.upper
+    asked = {row for objective in program.objectives for row in objective.rows}
+    asked |= {limit.row for limit in program.limits if limit.family != "variable"}
+    if design["m4e"] == 0.0 and asked.isdisjoint({"change", "r4e", opposite("r4e")}):
+        found |= {v.name: v.upper for v in program.variables if v.name == "r4e"}
     return {v.name: found[v.name] for v in program.variables}
 
 

@@ -1,8 +1,11 @@
 """Between the NLP's s = m4e r4e² and the counterweight a person reads."""
 
+from dataclasses import replace
+
 import pytest
 
 from loomopt.jobs import registry
+from loomopt.studies import front
 from loomopt.tolerances import NO_MASS
 
 BEATUP = registry.load("beatup")
@@ -46,6 +49,20 @@ def test_a_counterweight_without_mass_stands_at_its_largest_radius():
     none = LENGTHS | {"m4e": 0.0, "r4e": 0.0}
     assert JOB.values(PROGRAM, none)["r4e"] == 0.08
     assert JOB.values(JOB.program(BEATUP, "retrofit"), none)["r4e"] == 0.0
+    both, axes = JOB.traded(BEATUP, None, {"peak_torque": "least", "change": "least"})
+    alone = replace(both, objectives=both.objectives[:1])
+    limited = replace(alone, limits=(*alone.limits, *axes[1].limits("change", 0.1)))
+    assert [JOB.values(each, none)["r4e"] for each in (both, alone, limited)] == [0.0, 0.08, 0.0]
+
+
+@pytest.mark.parametrize(("first", "target"), [("peak_power", None), ("peak_torque", "balance")])
+def test_a_radius_that_is_traded_is_its_own_without_a_mass_too(first, target):
+    trade = front.trade(BEATUP, (first, "r4e"), target)
+    rows = [trade.solved(task, None) for task in trade.batch(())]
+    assert all(row.certified for row in rows)
+    assert rows[1].warm["axes"]["r4e"] == rows[1].design["r4e"] == 0.0
+    most = JOB.traded(BEATUP, None, {"r4e": "most", "peak_torque": "least"})[0]
+    assert JOB.values(most, LENGTHS | {"m4e": 0.0, "r4e": 0.05})["r4e"] == 0.05
 
 
 def test_a_negligible_counterweight_is_taken_for_none():
