@@ -88,7 +88,7 @@ def pareto(
         list[str] | None,
         typer.Option("--range", metavar="B=LO:HI UNIT", help='No further along an axis, such as "m4e=0:5 kg".'),
     ] = None,
-    points: Annotated[str | None, typer.Option(metavar="N", help="So many points; 40 without it.")] = None,
+    points: Annotated[str | None, typer.Option(metavar="N", help="So many points, 40 without it, beside those that narrow changes down.")] = None,
     target: Annotated[str | None, typer.Option(help="Whose demands hold; the scene's limits alone without it.")] = None,
     sets: Set = None,
     free: Free = None,
