@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM from the first moment on: exit status 130 and one line, whatever is being imported; and closed streams."""
+"""Ctrl-C and SIGTERM from the first moment on: status 130 and one line, whatever is being imported; closed streams."""
 
 import os
 import signal
