@@ -8,6 +8,7 @@ from loomopt import designs, results
 from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
 from loomopt.results import Answer, Evaluation
+from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import ACCURACY, GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
@@ -70,6 +71,8 @@ def solve(
     on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     own = _scene(scene)
+    if near is not None and not isinstance(near, solution.Solution):
+        raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
     found = engine.solve(
         own,
         target,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from loomopt import arguments
 from loomopt.lazy import lazy
 from loomopt.results import Answer, solved
 from loomopt.scene_errors import refusal
@@ -19,6 +20,8 @@ from loomopt.studies.store import Store
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+EXECUTORS = "an executor of concurrent.futures, or a function that makes one"
 
 
 @dataclass(frozen=True, repr=False)
@@ -113,11 +116,13 @@ def conducted(
     whether rows that are there are taken. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     executor = who(executor, count)
+    if on_row is not None:
+        arguments.called(on_row, "on_row", "a function of a row", "Give a function, or leave it out")
     if store is None:
         if resume:
             raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
         return DesignStudy(study, runs.run(study, executor, None, on_row))
-    with Store(Path(store)) as opened:
+    with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
         known = len(opened.rows(study.key))
         if known and not resume:
             problem = f"it holds {counted(study, known, 'of the')} of this study already"
@@ -132,6 +137,8 @@ def who(executor: Executor | workers.Making | None, count: int | None) -> Execut
     if executor is not None and count is not None:
         remedy = "Give one of them"
         raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)
+    if not isinstance(executor, Executor | None):
+        arguments.called(executor, "executor", EXECUTORS, "Give one of them, or workers=2")
     return executors.workers(count) if count is not None else executor
 
 

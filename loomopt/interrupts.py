@@ -1,4 +1,4 @@
-"""Ctrl-C: at once where nothing can be left half-done, else as KeyboardInterrupt; never a traceback."""
+"""Ctrl-C and SIGTERM: at once where nothing can be left half-done, else as KeyboardInterrupt; never a traceback."""
 
 import contextlib
 import os
@@ -12,12 +12,15 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 """Exit status."""
+SIGNALS = signal.SIGINT, signal.SIGTERM
+"""What stops a run: Ctrl-C, and what a system sends that wants a process to end."""
 STOPPED = "loomopt: stopped; nothing was left half-written."
 
 
 def leave() -> NoReturn:
     """End the process, whatever it is at."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for each in SIGNALS:
+        signal.signal(each, signal.SIG_IGN)
     with contextlib.suppress(OSError):
         os.write(2, f"{STOPPED}\n".encode())
     os._exit(INTERRUPTED)
@@ -54,6 +57,7 @@ def stoppable(run: Callable[[], int]) -> int:
 
 
 def _handle(handler: Callable[[int, "FrameType | None"], None]) -> None:
-    """Set what Ctrl-C does, but where whoever started the process has it ignored."""
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, handler)
+    """Set what Ctrl-C and SIGTERM do, but where whoever started the process has them ignored."""
+    for each in SIGNALS:
+        if signal.getsignal(each) is not signal.SIG_IGN:
+            signal.signal(each, handler)

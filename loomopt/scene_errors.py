@@ -1,7 +1,7 @@
 """Messages about a scene: one line each, with file, key, value, what is allowed and what to do."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from pydantic import BaseModel, ValidationError
 
@@ -20,7 +20,13 @@ _PROBLEMS = {
     "int_type": "it is not a whole number",
     "int_parsing": "it is not a whole number",
     "int_from_float": "it is not a whole number",
+    "greater_than": "it is out of range",
+    "greater_than_equal": "it is out of range",
+    "less_than": "it is out of range",
+    "less_than_equal": "it is out of range",
 }
+_BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+"""How pydantic names the bounds of a field → in words."""
 
 
 def shown(value: object) -> str:
@@ -83,4 +89,14 @@ def invalid(error: ValidationError, model: type[BaseModel], origin: str, table: 
         return misread(cause, origin, key, value)
     allowed = str(first.get("ctx", {}).get("expected", "")).replace("'", '"')
     problem = "it is none of the known choices" if allowed else _PROBLEMS.get(first["type"], first["msg"])
-    return refusal(problem, origin, key, value, allowed, "Correct the value")
+    return refusal(problem, origin, key, value, allowed or _bounds(model, names), "Correct the value")
+
+
+def _bounds(model: type[BaseModel], names: Sequence[str]) -> str:
+    """Return within what a field of a table may lie, where it has bounds of its own."""
+    field = model.model_fields.get(names[0]) if len(names) == 1 else None
+    if field is None:
+        return ""
+    known = ((word, getattr(each, name, None)) for name, word in _BOUNDS.items() for each in field.metadata)
+    found = [f"{word} {bound}" for word, bound in known if bound is not None]
+    return ", ".join([*(["a whole number"] if field.annotation is int else []), *found])

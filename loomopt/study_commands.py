@@ -88,7 +88,10 @@ def pareto(
         list[str] | None,
         typer.Option("--range", metavar="B=LO:HI UNIT", help='No further along an axis, such as "m4e=0:5 kg".'),
     ] = None,
-    points: Annotated[str | None, typer.Option(metavar="N", help="So many points; 40 without it.")] = None,
+    points: Annotated[
+        str | None,
+        typer.Option(metavar="N", help="So many points, 40 without it, beside those that narrow changes down."),
+    ] = None,
     target: Annotated[str | None, typer.Option(help="Whose demands hold; the scene's limits alone without it.")] = None,
     sets: Set = None,
     free: Free = None,
@@ -170,16 +173,27 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
             found = conducted(study, executor, count, how.store, how.resume, kept)
     except KeyboardInterrupt:
         if rows:
-            _print(DesignStudy(study, tuple(rows[point] for point in sorted(rows))), how)
+            done = DesignStudy(study, tuple(rows[point] for point in sorted(rows)))
+            _print(done, how)
+            _write(done, how, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
         raise
     _print(found, how)
+    _write(found, how)
+    return status(found.rows)
+
+
+def _write(found: "DesignStudy", how: Run, more: str = "") -> None:
+    """Write tables and figures; more: what is said of them beside their name."""
+    from loomopt.views import study_files
+
     for path in how.out or ():
         study_files.table(path, found.table(si=how.si))
-        remark(f"Wrote {path}")
+        remark(f"Wrote {path}{more}")
+    drawn = any(row.certified for row in found.rows)
     for path in how.figure or ():
-        found.plot(path)
-        remark(f"Wrote {path}")
-    return status(found.rows)
+        if drawn:
+            found.plot(path)
+        remark(f"Wrote {path}{more}" if drawn else f"{path} is not written: no row is certified")
 
 
 def _apart(how: Run) -> None:

@@ -27,8 +27,9 @@ REACHED = {None: "", True: "yes", False: "no"}
 def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     """Return one row per design variable and figure: today, design, limits and unit, in the scene's display units.
 
-    binds: the side, min or max, on which a solved design's limit binds; reached: yes or no
-    where the target asks what may be out of reach. Of an evaluated design, today's machine is not among them.
+    Where no design is admissible, the nearest one's column is "relaxed". binds: the side, min or max, on which a solved
+    design's limit binds; reached: yes or no where the target asks what may be out of reach. Of an evaluated design,
+    today's machine is not among them.
     """
     from loomopt.table_frame import TableFrame
 
@@ -36,12 +37,13 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     left_out = {"reached"} if not solution.reached else set[str]()
     if not isinstance(solution, Solution):
         left_out |= {"binds", "today"}
+    relaxed = isinstance(solution, Solution) and solution.relaxation
     frame = TableFrame([{name: cell for name, cell in row.items() if name not in left_out} for row in found])
     more = {}
     if isinstance(solution, Solution):
         more = {"target": solution.sought, "accuracy": solution.solver["accuracy"]}
     frame.attrs.update(provenance(scene, **more))
-    return frame.set_index("name")
+    return frame.rename(columns={"design": "relaxed"} if relaxed else {}).set_index("name")
 
 
 def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -> list[dict[str, Any]]:
@@ -132,12 +134,13 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 
     In the units that [display] chooses, in inches and pounds where these are the scene's, else in SI.
     """
+    from loomopt.program import drive
     from loomopt.program.curves import split
 
     found, names = frame.copy(), {}
     for column in frame.columns:
         name, si = split(column)
-        unit = scene.filed_in(si)
+        unit = scene.filed_in(si, drive.KINDS.get(name, ""))
         if unit != si:
             found[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
     return found.rename(columns=names)

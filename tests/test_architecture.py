@@ -26,7 +26,7 @@ ROOMS = (
     "mechanisms",
     "motion",
     "effects",
-    "scene_errors owned scene_schema",
+    "scene_errors owned scene_schema arguments",
     "scene_document scene_paths scene_tables scene_display packaged entry_points",
     "scenes balance cycle",
     "designs answers",

@@ -304,3 +304,9 @@ def test_a_long_message_is_shortened():
     error = caught(scene, changed("mechanism", "l1", "x" * 100_000))
     assert len(str(error)) < 500
     assert "(100000 characters)" in str(error)
+
+
+@pytest.mark.parametrize(("turns", "said"), [(0, "it is out of range"), (20_000, "it is out of range"), (1.5, "whole")])
+def test_a_number_beyond_a_tables_own_bounds_says_what_is_allowed(turns, said):
+    with pytest.raises(BadInput, match=rf"turns: .*{said}.*Allowed: a whole number, at least 1, at most 10000\."):
+        load("shedding").change({"effects.separation.turns": turns}, ["separation"], [])

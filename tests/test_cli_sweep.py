@@ -89,6 +89,34 @@ def test_ctrl_c_prints_what_is_finished(cli, monkeypatch):
     assert err == "loomopt: stopped; nothing was left half-written.\n"
 
 
+def test_what_is_finished_by_ctrl_c_is_written_too(cli, tmp_path, monkeypatch):
+    solved = Sweep.solved
+
+    def stopping(self, task, parent):
+        if task.point == 1:
+            raise KeyboardInterrupt
+        return solved(self, task, parent)
+
+    monkeypatch.setattr(Sweep, "solved", stopping)
+    status, out, err = cli("beatup", *M0, "--out", "t.csv", "--figure", "f.png")
+    assert status == 130
+    assert out.startswith("beatup, balance: 2 of 3 points")
+    assert err.splitlines() == [
+        "Wrote t.csv, 2 of the 3 points, as far as they were finished",
+        "Wrote f.png, 2 of the 3 points, as far as they were finished",
+        "loomopt: stopped; nothing was left half-written.",
+    ]
+    assert pd.read_csv(tmp_path / "t.csv", comment="#")["point"].tolist() == [0, 2]
+    assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_an_answer_the_table_is_written_and_no_figure(cli, tmp_path):
+    over = ("--over", "operation.M0=500:600:100 N*m", "--target", "torque")
+    status, _, err = cli("beatup", *over, "--out", "t.csv", "--figure", "f.png")
+    assert (status, err.splitlines()) == (3, ["Wrote t.csv", "f.png is not written: no row is certified"])
+    assert [each.name for each in tmp_path.iterdir()] == ["t.csv"]
+
+
 @pytest.mark.parametrize(
     ("over", "more", "status", "statuses"),
     [

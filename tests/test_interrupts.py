@@ -1,4 +1,4 @@
-"""Ctrl-C from the first moment on: exit status 130 and one line, whatever is being imported; and closed streams."""
+"""Ctrl-C and SIGTERM from the first moment on: status 130 and one line, whatever is being imported; closed streams."""
 
 import os
 import signal
@@ -38,11 +38,27 @@ def run():
 
 raise SystemExit(interrupts.stoppable(run))
 """
+ENDED = """
+import os, signal, sys
+from loomopt import cli, shell
+
+def say(self, text):
+    if text.startswith("2 of"):
+        os.kill(os.getpid(), signal.SIGTERM)
+        len(text)
+
+if __name__ == "__main__":
+    shell.Progress.say = say
+    cli.main()
+"""
+"""A study that is asked to end once two rows are there."""
 COMMAND = [sys.executable, "-m", "loomopt"]
 
 
 def called(*command, **streams):
-    return subprocess.run(command, capture_output=not streams, text=True, timeout=120, **streams)
+    return subprocess.run(
+        command, capture_output=not {"stdout", "stderr"} & set(streams), text=True, timeout=120, **streams
+    )
 
 
 def is_stopped(done):
@@ -67,6 +83,23 @@ def test_ctrl_c_during_an_import_stops_cleanly(module):
 )  # fmt: skip
 def test_ctrl_c_stops_whatever_a_library_makes_of_it(what):
     assert is_stopped(called(sys.executable, "-c", SWALLOWED.format(what=what)))
+
+
+def test_sigterm_stops_as_ctrl_c_does_and_workers_leave_nothing_behind(tmp_path):
+    script = tmp_path / "study.py"
+    script.write_text(ENDED)
+    over = ("--over", "operation.M0=600:900:50 N*m", "--workers", "2", "--out", "t.csv")
+    done = called(sys.executable, str(script), "sweep", "beatup", *over, cwd=tmp_path)
+    assert done.returncode == 130
+    assert done.stdout.startswith("beatup, balance: 2 of 7 points")
+    wrote, stopped = done.stderr.splitlines()
+    assert wrote == "Wrote t.csv, 2 of the 7 points, as far as they were finished"
+    assert stopped == "loomopt: stopped; nothing was left half-written."
+    assert (tmp_path / "t.csv").exists()
+
+
+def test_sigterm_during_an_import_stops_cleanly():
+    assert is_stopped(called(sys.executable, "-c", HIT.replace("SIGINT", "SIGTERM"), "numpy", "solve", "beatup"))
 
 
 def test_an_error_without_ctrl_c_is_an_error():

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import entry_points, packaged
+from loomopt import arguments, entry_points, packaged
 from loomopt.effects.kinds import Effect, ranked
 from loomopt.errors import BadInput
 from loomopt.jobs.base import Job
@@ -197,7 +197,7 @@ def template(name: str) -> str:
 
 def load(name_or_path: str | os.PathLike[str]) -> Scene:
     """Return the scene of a packaged name or of a TOML file. Raises BadInput."""
-    given = os.fspath(name_or_path)
+    given = arguments.path(name_or_path, "scene", "a name that `loomopt list` shows, or a path", "Name a scene")
     if packaged.is_path(name_or_path):
         path = Path(given)
         return _read(path, path.name if path.stem == given else given)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from loomopt import arguments
 from loomopt.effects.kinds import EVALUATED
 from loomopt.errors import BadInput
 from loomopt.scene_errors import refusal
@@ -34,6 +35,8 @@ def check_everywhere(asked: Everywhere | None) -> None:
     """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
     if asked is None:
         return
+    arguments.number(asked.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
+    arguments.number(asked.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
     if not LEAST_GAP <= asked.gap <= MOST_GAP:
         raise BadInput(
             "the gap is out of range",
@@ -54,6 +57,8 @@ def check_everywhere(asked: Everywhere | None) -> None:
 
 def target_name(scene: Scene, target: str | None) -> str:
     """Return the target's name, the job's default without one."""
+    if target is not None:
+        arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
     name = target or scene.schema.default_target
     if name not in scene.schema.targets:
         raise BadInput(
@@ -76,8 +81,15 @@ def check_sought(scene: Scene, what: str = "solve") -> None:
             raise refusal(problem, scene.origin, f"effects.{effect.name}", remedy=remedy)
 
 
-def check_numbers(accuracy: float, starts: int | None) -> None:
+def check_numbers(accuracy: float, starts: int | None, seed: int = 0) -> None:
     """Raise BadInput for settings outside what can be kept."""
+    accuracy = arguments.number(
+        accuracy, "accuracy", f"{TIGHTEST:g} to {COARSEST:g}", "Give 1e-8 as a number, or leave it out"
+    )
+    if starts is not None:
+        arguments.whole(starts, "starts", f"1 to {MOST_STARTS}", "Give 20, or leave it out")
+    if arguments.whole(seed, "seed", "0 or more", "Give 0, or leave it out") < 0:
+        raise refusal("it is less than 0", "", "seed", seed, "0 or more", "Give 0, or leave it out")
     if not TIGHTEST <= accuracy <= COARSEST:
         raise BadInput(
             "the accuracy is out of range",

@@ -84,7 +84,7 @@ def solve(
     job, target = registry.of(scene), target_name(scene, target)
     job.demand(scene, target)
     check_sought(scene)
-    check_numbers(accuracy, starts)
+    check_numbers(accuracy, starts, seed)
     check_everywhere(everywhere)
     settings = Settings(accuracy, callback=_callback(on_iteration), on_step=on_step).at(f"building the {target}")
     imported = _import_solver()

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from loomopt import designs
+from loomopt import arguments, designs
 from loomopt.cycle import Where
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
@@ -102,9 +102,8 @@ def prove(
     slack: what is left open, relative to each quantity's largest magnitude over the cycle; judged_by: a program whose
     limits they are, the target's own without one. Raises BadInput.
     """
-    if not LEAST_SLACK <= slack <= MOST_SLACK:
-        allowed = f"{LEAST_SLACK:g} to {MOST_SLACK:g}"
-        remedy = "Give 1e-8, or leave it out."
+    allowed, remedy = f"{LEAST_SLACK:g} to {MOST_SLACK:g}", "Give 1e-8, or leave it out."
+    if not LEAST_SLACK <= arguments.number(slack, "slack", allowed, remedy) <= MOST_SLACK:
         raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
     job, name = registry.of(scene), target_name(scene, target)
     check_sought(scene, "prove")

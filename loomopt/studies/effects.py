@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import designs
+from loomopt import arguments, designs
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.provenance import versions
@@ -18,7 +18,7 @@ from loomopt.scene_errors import refusal
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, OMITTED, target_name
+from loomopt.solving.asked import ACCURACY, OMITTED, check_numbers, target_name
 from loomopt.studies import effects_known
 from loomopt.studies.effects_worth import Judge, Worth
 from loomopt.studies.plan import Task
@@ -120,14 +120,16 @@ def planned(
 ) -> Effects:
     """Return the plan of the study. Raises BadInput for an unknown target or one that the effects cannot serve."""
     name = target_name(scene, target)
-    if not 0.0 < tolerance < math.inf:
-        allowed, remedy = "a share, more than 0", "Write 0.01 for 1 %, or leave it out"
+    check_numbers(accuracy, None, seed)
+    allowed, remedy = "a share, more than 0", "Write 0.01 for 1 %, or leave it out"
+    if not 0.0 < arguments.number(tolerance, "tolerance", allowed, remedy) < math.inf:
         raise refusal("the tolerance is out of range", "", "tolerance", tolerance, allowed, remedy)
     given = effects_known.known(scene)
     together = effects_known.combined(given, scene)
     names = tuple(effect.name for effect in together.effects)
     unknown = effects_known.unknown(scene, given)
-    study = Effects(scene, name, tolerance, names, together.out, unknown, accuracy, seed)
+    numbers = float(tolerance), float(accuracy), int(seed)
+    study = Effects(scene, name, numbers[0], names, together.out, unknown, *numbers[1:])
     plain = frozenset(e.name for e in together.effects if isinstance(e, effects_known.YIELDING))
     served = study.without(plain)
     registry.of(served).demand(served, name)

@@ -11,6 +11,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
+from loomopt import arguments
 from loomopt.errors import BadInput
 
 P = ParamSpec("P")
@@ -27,8 +28,8 @@ RETRIES = 3
 
 def workers(count: int) -> Callable[[], Executor]:
     """Return what makes an executor of so many processes on this machine. Raises BadInput for no such number."""
-    if not 1 <= count <= MOST_WORKERS:
-        remedy = "Write as many as the machine has cores"
+    remedy = "Write as many as the machine has cores"
+    if not 1 <= arguments.whole(count, "workers", f"1 to {MOST_WORKERS}", remedy) <= MOST_WORKERS:
         raise BadInput(
             "there can be no such number of workers",
             key="workers",

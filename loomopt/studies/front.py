@@ -7,10 +7,11 @@ non-convex parts are reached too [Haimes, Lasdon, Wismer, IEEE Trans. SMC 1 (197
 import math
 from collections.abc import Mapping, Sequence
 
+from loomopt import arguments
 from loomopt.errors import BadInput
 from loomopt.quantities import QuantityError
 from loomopt.quantities import read as read_quantity
-from loomopt.scene_errors import misread
+from loomopt.scene_errors import misread, refusal
 from loomopt.scenes import Scene
 from loomopt.schema import Sense
 from loomopt.solving.asked import ACCURACY, check_numbers, check_sought, target_name
@@ -24,6 +25,8 @@ from loomopt.units import SI_UNIT
 
 FEWEST = 3
 """Points of a front."""
+ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
+"""How a range is given."""
 Ranges = Mapping[str, tuple[float, float]]
 Given = Mapping[str, str | Sequence[float]]
 """Axis → "LO:HI UNIT", or both ends, SI."""
@@ -51,23 +54,35 @@ def trade(
     if target is not None:
         target_name(scene, target)
     first, second = _two(scene, axes)
-    maximise, minimise = ((given,) if isinstance(given, str) else given for given in (maximise, minimise))
+    maximise, minimise = _named(maximise, "maximise", axes), _named(minimise, "minimise", axes)
     stray = [name for name in (*maximise, *minimise, *(ranges or {})) if name not in axes]
     if stray:
         remedy = "Name one of them, or trade it."
         raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
-    wanted = POINTS if points is None else points
-    if not isinstance(wanted, int) or not FEWEST <= wanted <= texts.MOST_VALUES:
-        allowed = f"a whole number from {FEWEST} to {texts.MOST_VALUES}"
+    allowed = f"a whole number from {FEWEST} to {texts.MOST_VALUES}"
+    wanted = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
+    if not FEWEST <= wanted <= texts.MOST_VALUES:
         problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
         raise BadInput(problem, key="points", value=str(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in (ranges or {}).items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            remedy = "Write the smaller end first."
-            raise BadInput("a range goes from less to more", key=name, value=f"{low:g}:{high:g} in SI", remedy=remedy)
+            value, allowed = f"{low:g}:{high:g} in SI", "the smaller end, then the larger one"
+            raise BadInput(
+                "a range goes from less to more",
+                key=name,
+                value=value,
+                allowed=allowed,
+                remedy="Write the smaller end first",
+            )
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
     found = Trade(
-        _bounded(scene, ranges or {}), (first, second), senses, target, tuple((ranges or {}).items()), wanted, accuracy
+        _bounded(scene, ranges or {}),
+        (first, second),
+        senses,
+        target,
+        tuple((ranges or {}).items()),
+        wanted,
+        float(accuracy),
     )
     _ = found.solver
     return found
@@ -83,15 +98,18 @@ def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[
 
 def si(scene: Scene, given: Given) -> dict[str, tuple[float, float]]:
     """Return ranges that are given as text with units, or as SI numbers, in SI, rad. Raises BadInput."""
-    return {name: _ends(scene, name, ends) for name, ends in given.items()}
+    table = arguments.table(given, "ranges", f"axis → {ENDS}", 'Write {"m4e": "0:5 kg"}')
+    return {name: _ends(scene, name, ends) for name, ends in table.items()}
 
 
 def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float, float]:
     """Return both ends of a range, SI. Raises BadInput."""
     if not isinstance(given, str):
-        if len(given) != 2:
-            raise BadInput("a range has two ends", key=name, allowed="from, to, in SI; or LO:HI UNIT as text")
-        return float(given[0]), float(given[1])
+        remedy = 'Write "0:5 kg", or (0.0, 5.0)'
+        two = arguments.listed(given, name, ENDS, remedy)
+        if len(two) != 2:
+            raise refusal("a range has two ends", "", name, given, ENDS, remedy)
+        return arguments.number(two[0], name, ENDS, remedy), arguments.number(two[1], name, ENDS, remedy)
     axis = scene.schema.axes.get(name)
     kind = (axis.kind if axis else "") or Words(scene).kind(name)
     low, high = (_read(text, kind, name) for text in texts.ends(given, name))
@@ -108,10 +126,19 @@ def _read(text: str, kind: str, name: str) -> float:
 
 def _two(scene: Scene, axes: Sequence[str]) -> tuple[str, str]:
     """Return two axes that differ. Raises BadInput."""
-    if len(set(axes)) != 2 or len(axes) != 2:
-        problem, allowed = "a front has two axes that differ", ", ".join(scene.schema.axes)
-        raise BadInput(problem, file=scene.origin, key=", ".join(axes), allowed=allowed)
-    return axes[0], axes[1]
+    allowed, remedy = ", ".join(scene.schema.axes), 'Write ("A", "B"): the axis that is sought, and the one that pays'
+    named = arguments.texts(axes, "axes", allowed, remedy)
+    if len(set(named)) != 2 or len(named) != 2:
+        given = ", ".join(named)
+        raise refusal("a front has two axes that differ", scene.origin, "axes", given, allowed, remedy)
+    return named[0], named[1]
+
+
+def _named(given: str | Sequence[str], key: str, axes: Sequence[str]) -> tuple[str, ...]:
+    """Return the axes that an argument names, one or several. Raises BadInput."""
+    if isinstance(given, str):
+        return (str(given),)
+    return arguments.texts(given, key, ", ".join(axes), "Name one of the axes, or both in a list")
 
 
 def _bounded(scene: Scene, ranges: Ranges) -> Scene:

@@ -11,7 +11,8 @@ MOST_VALUES = 20_000
 """Points of a study."""
 _RANGE = re.compile(r"([^:\s]+) *: *([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
 _ENDS = re.compile(r"([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
-_ALLOWED = "LO:HI:STEP UNIT, such as 600:900:25 N*m"
+FORM, EXAMPLE = "LO:HI:STEP UNIT", "600:900:25 N*m"
+_ALLOWED = f"{FORM}, such as {EXAMPLE}"
 
 
 def values(text: str, key: str) -> list[str]:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import designs
+from loomopt import arguments, designs
 from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.nlp.point import Point
@@ -228,11 +228,13 @@ def _finite(value: float | None) -> float | None:
 def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0) -> Sweep:
     """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
     name = target_name(scene, target)
-    check_numbers(accuracy, None)
+    check_numbers(accuracy, None, seed)
+    named = 'Name a number and its values: {"operation.speed": "300:600:50 rpm"}'
+    over = arguments.table(over, "over", "key of the scene → its values", named)
     if not over:
         remedy = 'Name a number and its values: --over "operation.speed=300:600:50 rpm"'
         raise refusal("there is nothing to sweep over", scene.origin, "over", remedy=remedy)
-    listed = {key: ranges.values(given, key) if isinstance(given, str) else list(given) for key, given in over.items()}
+    listed = {key: _values(given, key) for key, given in over.items()}
     for key, texts in listed.items():
         if not texts:
             raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give one at least")
@@ -245,7 +247,15 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     job = registry.of(base)
     job.demand(base, name)
     check_sought(base)
-    return Sweep(base, name, axes, accuracy, seed, bool(job.program(base, name).single))
+    return Sweep(base, name, axes, float(accuracy), int(seed), bool(job.program(base, name).single))
+
+
+def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | float]:
+    """Return the values of a number that is swept, as a scene would give them. Raises BadInput."""
+    if isinstance(given, str):
+        return ranges.values(given, key)
+    remedy = f'Write "{ranges.EXAMPLE}", or the values in a list'
+    return arguments.listed(given, key, f"{ranges.FORM}, or a list of values", remedy)
 
 
 def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]) -> Axis:

@@ -10,6 +10,8 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from loomopt.scene_errors import refusal
+
 if TYPE_CHECKING:
     from loomopt.studies.plan import Study, Task
     from loomopt.studies.rows import Row
@@ -138,7 +140,11 @@ class Crew:
     def _hand_out(self, waiting: "deque[Work]", alone: bool) -> "list[Work]":
         """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
         if self.executor is None and self.make:
-            self.executor = self.make()
+            made: object = self.make()
+            if not isinstance(made, Executor):
+                remedy = "Give a function that makes one, such as lambda: ThreadPoolExecutor(2)"
+                raise refusal("what it makes is no executor", "", "executor", made, "any of concurrent.futures", remedy)
+            self.executor = made
         assert self.executor
         most = 1 if alone else getattr(self.executor, "in_flight", IN_FLIGHT)
         while waiting and len(self.running) < most:

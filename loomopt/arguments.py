@@ -1,0 +1,68 @@
+"""What a Python caller gives a function: taken where it is of the kind asked for, else one message that says so."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any, TypeGuard
+
+from loomopt.scene_errors import refusal
+
+
+def number(given: object, key: str, allowed: str, remedy: str) -> float:
+    """Return a number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
+    if isinstance(given, bool) or not isinstance(given, Real):
+        raise refusal("it is not a number", "", key, given, allowed, remedy)
+    return float(given)
+
+
+def whole(given: object, key: str, allowed: str, remedy: str) -> int:
+    """Return a whole number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
+    if isinstance(given, bool) or not isinstance(given, Integral):
+        raise refusal("it is not a whole number", "", key, given, allowed, remedy)
+    return int(given)
+
+
+def text(given: object, key: str, allowed: str, remedy: str) -> str:
+    """Return text, of Python or of NumPy. Raises BadInput for anything else."""
+    if not isinstance(given, str):
+        raise refusal("it is not text", "", key, given, allowed, remedy)
+    return str(given)
+
+
+def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
+    """Return the names of a sequence, in its order. Raises BadInput for anything else: a set has no order."""
+    if isinstance(given, str) or not _ordered(given):
+        raise refusal("it is no list of names", "", key, given, allowed, remedy)
+    return tuple(text(each, key, allowed, remedy) for each in given)
+
+
+def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:
+    """Return the members of a sequence. Raises BadInput for anything else: a set has no order."""
+    if isinstance(given, str | bytes | Mapping) or not _ordered(given):
+        raise refusal("it is no list", "", key, given, allowed, remedy)
+    return list(given)
+
+
+def table(given: object, key: str, allowed: str, remedy: str) -> dict[str, Any]:
+    """Return what names are mapped to. Raises BadInput for anything else."""
+    if not isinstance(given, Mapping):
+        raise refusal("it is not a mapping", "", key, given, allowed, remedy)
+    return {text(name, key, allowed, remedy): value for name, value in given.items()}
+
+
+def path(given: object, key: str, allowed: str, remedy: str) -> str:
+    """Return the path or the name that is given. Raises BadInput for anything else."""
+    if not isinstance(given, str | os.PathLike):
+        raise refusal("it is no path", "", key, given, allowed, remedy)
+    return text(os.fspath(given), key, allowed, remedy)
+
+
+def called(given: object, key: str, allowed: str, remedy: str) -> Callable[..., Any]:
+    """Return what can be called. Raises BadInput for anything else."""
+    if not callable(given):
+        raise refusal("it cannot be called", "", key, given, allowed, remedy)
+    return given
+
+
+def _ordered(given: object) -> TypeGuard[Sequence[Any]]:
+    return hasattr(given, "__getitem__") and hasattr(given, "__len__") and not isinstance(given, Mapping)
