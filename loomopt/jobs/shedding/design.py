@@ -24,7 +24,7 @@ from loomopt.mechanisms.cam_motion import Spline, named_knots
 from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program, Variable
-from loomopt.program.sampling import Extreme, Sampler, sampled
+from loomopt.program.sampling import Extreme, Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
@@ -110,12 +110,6 @@ def survived(sampled: Sampler, least: float) -> float:
     """Return the speed, rad/s, up to which the cam force stays at least `least`, N, as closely as a solve keeps it."""
     slack = ACCURACY * abs(sampled.static["spring_force_max"])
     return speed_reached(sampled.model, sampled.values, "lift", -least, slack)
-
-
-def lasting(model: JobModel, values: Numbers) -> dict[str, float]:
-    """Return the speed, rad/s, up to which contact holds, which follows from spring and law; nothing where it does."""
-    speed = survived(sampled(model, values), values["N_min"])
-    return {CONTACT_SPEED: speed} if math.isfinite(speed) else {}
 
 
 def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:

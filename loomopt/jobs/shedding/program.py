@@ -8,7 +8,7 @@ from dataclasses import replace
 from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CONTACT_SPEED, CYCLE, Sizes, contact, lasting, survived
+from loomopt.jobs.shedding.design import CONTACT_SPEED, CYCLE, Sizes, contact, survived
 from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, LIFT, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
@@ -18,16 +18,15 @@ from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
 from loomopt.program.sampling import sampled
+from loomopt.program.speeds import followed
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"
-SLOWEST = 1e-3
-"""A free speed's least over the one that today's spring survives."""
 SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
@@ -48,9 +47,8 @@ def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) 
     """Return the frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     dwells = (True, True) if free else dwelt(scene.mechanism)
-    words = scene_numbers.words(scene)
-    known = {*numbers(scene), *((CONTACT_SPEED,) if FASTEST in raced else ())}
-    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(known), raced)
+    words, more = scene_numbers.words(scene), (CONTACT_SPEED,) if FASTEST in raced else ()
+    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset((*numbers(scene), *more)), raced)
 
 
 def demand(scene: Scene, target: str) -> None:
@@ -73,11 +71,6 @@ def _demand_moving(scene: Scene, instead: str) -> None:
         keys = "effects.inertia.M, mechanism.travel, effects.warp_tension.shape"
         allowed = "a moving mass, a travel, and a warp tension that is known in the moves (linear, step)"
         raise refusal(problem, scene.origin, keys, allowed=allowed, remedy=f"Correct them, or {instead}.")
-
-
-def _survived(scene: Scene) -> float:
-    """Return the speed, rad/s, up to which today's spring keeps contact."""
-    return survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
 
 
 def program(scene: Scene, target: str) -> Program:
@@ -133,7 +126,7 @@ class _Task:
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
         if self.sped or self.lasting:
-            fastest = _survived(scene)
+            fastest = survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
             self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
     def program(self) -> Program:
@@ -153,13 +146,13 @@ class _Task:
         told = spring or bool(traded) or free == {"speed"}
         linear = not self.checks and told and (spring or drive.POWER not in self.scene.limits)
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
-        today = (
-            named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
+        own = accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals) if self.law else ()
+        contact = goals(replace(n, name="contact_min") for n in limits if n.name == "N_min" and n.row == LIFT)
+        reached = functools.partial(survived, least=self.known["N_min"])
+        follow = functools.partial(followed, CONTACT_SPEED, reached) if self.lasting else nothing_follows
+        return Program(
+            *task, today=named_knots(own), single=ONE_OPTIMUM if linear else "", goals=contact, follow=follow
         )
-        wanted = [each for each in limits if each.name == "N_min" and each.row == LIFT]
-        contact = goals(replace(each, name="contact_min") for each in wanted)
-        found = Program(*task, today=today, single=ONE_OPTIMUM if linear else "", goals=contact)
-        return replace(found, follow=lasting) if self.lasting else found
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
@@ -172,10 +165,8 @@ class _Task:
             given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
             ends |= {name: (known[name],) * 2 for name in ends if name in given}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.tied else {"K1": (known["K1"],) * 2})
-        if self.sped:
-            ends["speed"] = self.limited.get("speed", (SLOWEST * self.fastest, math.inf))
-        if self.lasting:
-            ends[CONTACT_SPEED] = SLOWEST * self.fastest, math.inf
+        raced = [name for name, free in (("speed", self.sped), (CONTACT_SPEED, self.lasting)) if free]
+        ends |= {name: self.limited.get(name, (1e-3 * self.fastest, math.inf)) for name in raced}
         for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))
         labels = scene_numbers.labels(scene)
@@ -203,8 +194,7 @@ class _Task:
         if name == "K1":
             least = min(max(ends[0], 0.1 * self.sizes.needed), ends[1])
             return least, min(ends[1], 10.0 * self.sizes.needed)
-        known = self.fastest if name == CONTACT_SPEED else self.known[name]
-        return ends[0], min(ends[1], 3.0 * known) if math.isinf(ends[1]) else ends[1]
+        return ends[0], min(ends[1], 3.0 * self.known.get(name, self.fastest)) if math.isinf(ends[1]) else ends[1]
 
     def _objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order; what checks would have least comes after the spring."""
@@ -216,8 +206,7 @@ class _Task:
 
     def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
-        found = []
-        room = START_ROOM
+        found, room = [], START_ROOM
         for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
             start = inside(variables, self.known)
             for v in variables:
@@ -239,9 +228,8 @@ class _Task:
         found = [move for move in found if set(move.along) <= rooms]
         if preload.lower == preload.upper:
             return tuple(found)
-        wish = (Wish("today", scene_numbers.LEAST_CHANGE),)
         today, bounds = {"X0": self.known["X0"]}, {"X0": self.limited["X0"]}
-        return (Move("preload", ("X0",), "axis", wish, today, bounds), *found)
+        return (Move("preload", ("X0",), "axis", (Wish("today", scene_numbers.LEAST_CHANGE),), today, bounds), *found)
 
     def _bounds(self, variables: Sequence[Variable]) -> list[Limit]:
         """Return the bounds of variables as limits; a requirement gives way on one side only."""
@@ -257,10 +245,7 @@ class _Task:
         return found
 
     def _contact(self) -> list[Limit]:
-        """Return the limit that is the job: contact all round, or where the warp's pull is known.
-
-        Where the speed up to which contact holds is traded, contact is asked up to that speed in place of the scene's.
-        """
+        """Return the limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
         row = FASTEST if self.lasting and not self.sped else LIFT
         found = Limit("N_min", -1, row, least, size, "cycle", relaxable=least > 0.0)
