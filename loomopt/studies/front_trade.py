@@ -29,7 +29,7 @@ from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 from loomopt.tolerances import SAME_OBJECTIVE
 
-PLAN = 3
+PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
 SEARCHED = 3
