@@ -1,7 +1,7 @@
 """The speed up to which a quantity keeps its bound, where loads are quadratic in the speed at every crank angle."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,14 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     speed = _reached(at_rest, own, name, most, slack)
     tied = slack > 0.0 and speed < own <= _reached(at_rest, own, name, most + slack, slack)
     return own if tied else speed
+
+
+def followed(
+    name: str, reached: Callable[[Sampler], float], model: JobModel, values: Mapping[str, float]
+) -> dict[str, float]:
+    """Return, by name, the speed, rad/s, that follows from all else; nothing where there is no such speed."""
+    speed = reached(sampled(model, values))
+    return {name: speed} if math.isfinite(speed) else {}
 
 
 def _reached(at_rest: Sampler, unit: float, name: str, most: float, slack: float) -> float:

@@ -128,6 +128,13 @@ def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple
             found = second_order.judged(local, place, system, other)
             if (found.minimum, found.unique) > (curvature.minimum, curvature.unique):
                 return other, found
+    if curvature.higher == "open" and len(system.held):
+        # Earlier levels' slopes vanish together, so what they hold may share a price that limits carry alone.
+        other = kkt.solved(local.slopes, system.without_held())
+        if other.residual <= STATIONARY:
+            found = second_order.judged(local, place, system, other)
+            if found.minimum and found.higher == "holds":
+                return other, found
     return first, curvature
 
 

@@ -45,6 +45,10 @@ class System:
         kept = tuple(k for k in self.inequalities if k != row)
         return System(self.groups, kept, self.equalities, self.held)
 
+    def without_held(self) -> "System":
+        """Return the system without what earlier objectives hold."""
+        return System(self.groups, self.inequalities, self.equalities, self.held[:0])
+
 
 @dataclass(frozen=True)
 class Multipliers:

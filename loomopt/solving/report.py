@@ -47,6 +47,9 @@ def _findings(
     for limit in program.limits:
         if limit.hidden or (limit.family == "variable" and limit.name not in values):
             continue
+        if limit.family == "cycle" and not sampler.model.has_quantity(limit.row):
+            # A row of the program alone: what it limits is told by the figure that it is read for.
+            continue
         if limit.family == "cycle":
             peak = sampler.peak(limit.row, limit.where)
             values[limit.name] = limit.sign * (peak - limit.complement)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from loomopt.studies.rows import Row
+from loomopt.tolerances import ACCURACY
 
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""
@@ -243,10 +244,18 @@ def _sheer(left: Spot, right: Spot) -> bool:
 
 
 def scaled(
-    rows: Mapping[int, Row], names: tuple[str, str], signs: tuple[int, int], sizes: tuple[float, float]
+    rows: Mapping[int, Row],
+    names: tuple[str, str],
+    signs: tuple[int, int],
+    sizes: tuple[float, float],
+    accuracy: float = ACCURACY,
 ) -> Scale:
-    """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI."""
+    """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI.
+
+    Of ends that agree to ten times the accuracy that was asked the distance is 0.
+    """
     ends = [[signs[k] * value(rows[row], names[k]) for k in (0, 1)] for row in (0, 1)]
     widths = [abs(one - other) for one, other in zip(*ends, strict=True)]
-    wide = tuple(width if width > ALIKE * size else 0.0 for width, size in zip(widths, sizes, strict=True))
+    least = max(ALIKE, 10 * accuracy)
+    wide = tuple(width if width > least * size else 0.0 for width, size in zip(widths, sizes, strict=True))
     return Scale(names, signs, (ends[0][0], ends[1][1]), (wide[0], wide[1]))

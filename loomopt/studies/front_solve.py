@@ -111,6 +111,8 @@ class Solver:
             best = search.ranked[0].point
             after = tried(found, best.x)
             after = judged(after) if after.reached else after
+            if wide and after.passed:
+                after = self._spread(after)
             search = after if after.passed else searched(found, None, 0, (), None)
         return self._told(change.with_least_change(search), asking)
 
@@ -130,11 +132,15 @@ class Solver:
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
         search = judged(search) if search.reached else search
-        if wide and search.passed and not program.single:
-            search = judged(spread(search, 0, None))
+        if wide and search.passed:
+            search = self._spread(search)
         if not (search.passed or wide is None):
             search = searched(search, None, 0, (), None)
         return search
+
+    def _spread(self, search: Search) -> Search:
+        """Return a search whose best passed after a look at other basins, where there may be any."""
+        return search if search.program.single else judged(spread(search, 0, None))
 
     def _priced(self, search: Search, asking: Asking) -> bool:
         """Say whether the limit on the other axis has a price at the level of the first."""

@@ -29,7 +29,7 @@ from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 from loomopt.tolerances import SAME_OBJECTIVE
 
-PLAN = 3
+PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
 SEARCHED = 3
@@ -164,10 +164,15 @@ class Trade:
         length = len(each.near) + WIDE * wide
         return Task(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
 
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Natural sizes of both axes, SI."""
+        first, second = (axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes)
+        return first, second
+
     def scale(self, rows: Sequence[Row]) -> Scale:
         """Return the scale of finished rows."""
-        first, second = (axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes)
-        return front_plan.scaled({row.point: row for row in rows}, self.axes, self.signs, (first, second))
+        return front_plan.scaled({row.point: row for row in rows}, self.axes, self.signs, self.sizes, self.accuracy)
 
     def _refuse(self, rows: Mapping[int, Row]) -> None:
         """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
@@ -293,10 +298,9 @@ class Trade:
         cap = self.solver.axes[1].value(found.warm["axes"][self.axes[1]])
         asking = Asking(0, (self._cap(0), cap))
         again = self.solver.solve(asking, [found.warm], None)
-        sizes = [axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes]
         known = again.warm.get("axes", {}) if again.certified else {}
         apart = [abs(known.get(name, math.inf) - found.warm["axes"][name]) for name in self.axes]
-        same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, sizes, strict=True))
+        same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, self.sizes, strict=True))
         return Met(again, asking, {}) if same else Met(found, Asking(1, (self._cap(0), None)), {})
 
 

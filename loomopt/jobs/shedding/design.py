@@ -47,6 +47,7 @@ GAVE_WAY = 1e-7
 LEAST_STRETCH = 1e-3
 """Share of the largest elongation below which a spring is as good as slack."""
 MEGA = 1e6
+CONTACT_SPEED = "contact_speed"
 SAME = 1e-12
 """Share of the largest |N| by which two least values are one: rise and return mirror each other."""
 MOVES = " The moves, where not every force is known, are not judged."
@@ -64,7 +65,7 @@ def design(program: Program, x: Numbers) -> dict[str, float]:
     knots = set(law.names) if isinstance(law, Spline) else set()
     fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0}
     chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
-    free = [name for name in chosen if name not in {*VARIABLES, *knots}]
+    free = [name for name in chosen if name not in {*VARIABLES, *knots, CONTACT_SPEED}]
     found = {name: values[name] for name in (*VARIABLES, *free)}
     if set(SEGMENTS) & set(found):
         found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
@@ -97,11 +98,11 @@ def contact(scene: Scene, sampled: Sampler) -> dict[str, float | None]:
     physics = sampled.model
     found: dict[str, float | None] = {"contact_max": sampled.peak("cam_force")}
     found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
-    found["contact_speed"] = None
+    found[CONTACT_SPEED] = None
     unknown = drive.motor(physics.effects) or physics.known_in
     if not unknown and any(load.moved for load in physics.loads if isinstance(load, Load)):
         speed = survived(sampled, scene.operation["N_min"])
-        found["contact_speed"] = speed if math.isfinite(speed) else None
+        found[CONTACT_SPEED] = speed if math.isfinite(speed) else None
     return found
 
 
@@ -152,7 +153,7 @@ def _today(scene: Scene, found: Figures) -> str:
     if least >= wanted - CLOSE * max(most, 1.0):
         return f"{spring} holds: the cam force is never less than {force}."
     lost = f"the cam force would be {force} at {scene.show(found['contact_angle'] or 0.0, 'angle')}"
-    speed = found["contact_speed"]
+    speed = found[CONTACT_SPEED]
     if speed:
         lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."

@@ -243,7 +243,7 @@ QUANTITIES: dict[str, Quantity] = {
     "law_acceleration": Quantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
     "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }
-AT_REST, FASTEST = "contact at rest", "contact at contact_speed"
+LIFT, AT_REST, FASTEST = "lift", "contact at rest", "contact at contact_speed"
 RACED: dict[str, Quantity] = {
     AT_REST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(0).force),
     FASTEST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(at.values["contact_speed"]).force),

@@ -8,8 +8,8 @@ from dataclasses import replace
 from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
-from loomopt.jobs.shedding.design import CYCLE, Sizes, contact, survived
-from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, law_rows
+from loomopt.jobs.shedding.design import CONTACT_SPEED, CYCLE, Sizes, contact, survived
+from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, LIFT, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
@@ -18,22 +18,22 @@ from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals
+from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
 from loomopt.program.sampling import sampled
+from loomopt.program.speeds import followed
 from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
-CONTACT_SPEED = "contact_speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"
 SLOWER = 0.9
 """A start's speed over the one that today's spring survives."""
 SPARE = 1.1
 """A start's stiffness over the least that keeps contact at today's law and preload."""
-FASTER = frozenset(("speed", CONTACT_SPEED))
-"""What is traded with the speed free."""
-LINEAR = FASTER | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
+SPEEDS = frozenset(("speed", CONTACT_SPEED))
+"""The cam shaft's speed, and the one up to which contact holds: each is free where it is traded."""
+LINEAR = SPEEDS | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
 """What is linear, or a quotient of what is, in K1, K1 X0 and the speed's square."""
 
 
@@ -47,8 +47,8 @@ def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) 
     """Return the frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
     dwells = (True, True) if free else dwelt(scene.mechanism)
-    words = scene_numbers.words(scene)
-    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset(numbers(scene)), raced)
+    words, more = scene_numbers.words(scene), (CONTACT_SPEED,) if FASTEST in raced else ()
+    return shedding.model(law or chosen(scene), dwells, scene.active, words, frozenset((*numbers(scene), *more)), raced)
 
 
 def demand(scene: Scene, target: str) -> None:
@@ -73,11 +73,6 @@ def _demand_moving(scene: Scene, instead: str) -> None:
         raise refusal(problem, scene.origin, keys, allowed=allowed, remedy=f"Correct them, or {instead}.")
 
 
-def _survived(scene: Scene) -> float:
-    """Return the speed, rad/s, up to which today's spring keeps contact."""
-    return survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
-
-
 def program(scene: Scene, target: str) -> Program:
     """Return the program of a target: all that a solve needs to know of the scene."""
     return _Task(scene, target).program()
@@ -94,7 +89,7 @@ def _axis_size(task: "_Task", program: Program, name: str) -> float:
     """Return the natural size, SI, of what of an axis is sought the least of."""
     if name in CYCLE:
         return task.sizes.figure(name, CYCLE[name], 0.0)
-    return scene_numbers.size(program, task.sampler, "speed" if name == CONTACT_SPEED else name)
+    return scene_numbers.size(program, task.sampler, name)
 
 
 class _Task:
@@ -109,7 +104,7 @@ class _Task:
             start = cam_spline.cycloid_like(own.intervals)
             self.known |= named_knots(start)
         self.limited = scene_numbers.bounds(scene, self.known)
-        self.sped = target == "speed" or bool(self.traded & FASTER)
+        self.sped, self.lasting = target == "speed" or "speed" in self.traded, CONTACT_SPEED in self.traded
         self.survives = [(n, each.min) for n, each in scene.limits.items() if n == CONTACT_SPEED and each.min]
         self.raced: tuple[str, ...] = (AT_REST, FASTEST) if self.survives else ()
         if self.survives:
@@ -117,6 +112,9 @@ class _Task:
             # At its own speed the frame is judged anyway: the same row twice would have no price.
             if self.sped or ("speed" not in self.limited and self.known["speed"] == self.survives[0][1]):
                 self.raced = (AT_REST,)
+        if self.lasting:
+            _demand_moving(scene, "trade another axis")
+            self.raced = (AT_REST, FASTEST)
         self.physics = model(scene, self.law, self.raced)
         self.sampler = sampled(self.physics, self.known)
         most = self.limited["K1"][1] if "K1" in scene.bounds else math.inf
@@ -127,13 +125,13 @@ class _Task:
         self.tied = any("K1" in c.reads and any(d.sign == 0 for d in c.demands) for c in self.checks)
         """Whether a check's own numbers give K1."""
         self.fastest = 0.0
-        if self.sped:
-            fastest = _survived(scene)
+        if self.sped or self.lasting:
+            fastest = survived(sampled(model(scene), numbers(scene)), scene.operation["N_min"])
             self.fastest = fastest if 0.0 < fastest < math.inf else self.known["speed"]
 
     def program(self) -> Program:
         bounded = self._variables()
-        asked = {"speed" if self.sped else CONTACT_SPEED: self.survives} if self.survives else {}
+        asked = {"speed" if self.sped and not self.lasting else CONTACT_SPEED: self.survives} if self.survives else {}
         variables, more = floored(bounded, asked)
         taken = {variable.name for variable in variables}
         parameters = {name: value for name, value in self.known.items() if name not in taken}
@@ -144,15 +142,17 @@ class _Task:
         # law any stiffer spring keeps contact too, and the laws that do for one stiffness are convex.
         free = {v.name for v in variables if v.lower < v.upper} - set(self.law.names if self.law else ())
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
-        traded = self.traded and self.traded <= LINEAR and free <= {"K1", "X0", "speed"}
+        traded = self.traded and self.traded <= LINEAR and free <= {"K1", "X0", *SPEEDS}
         told = spring or bool(traded) or free == {"speed"}
         linear = not self.checks and told and (spring or drive.POWER not in self.scene.limits)
         task = self.physics, tuple(variables), parameters, tuple(limits), self._objectives(), starts, moves
-        today = (
-            named_knots(accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals)) if self.law else {}
+        own = accelerations(chosen(self.scene), numbers(self.scene), self.law.intervals) if self.law else ()
+        contact = goals(replace(n, name="contact_min") for n in limits if n.name == "N_min" and n.row == LIFT)
+        reached = functools.partial(survived, least=self.known["N_min"])
+        follow = functools.partial(followed, CONTACT_SPEED, reached) if self.lasting else nothing_follows
+        return Program(
+            *task, today=named_knots(own), single=ONE_OPTIMUM if linear else "", goals=contact, follow=follow
         )
-        contact = goals(replace(each, name="contact_min") for each in limits if each.name == "N_min")
-        return Program(*task, today=today, single=ONE_OPTIMUM if linear else "", goals=contact)
 
     def _variables(self) -> list[Variable]:
         """Return what the target may choose, and what it keeps as variables without room, which gives it a price."""
@@ -165,8 +165,8 @@ class _Task:
             given = {owned(check, key) for check in self.checks for key in check.own.model_fields}
             ends |= {name: (known[name],) * 2 for name in ends if name in given}
             ends |= {"X0": (known["X0"],) * 2} | ({} if self.tied else {"K1": (known["K1"],) * 2})
-        if self.sped:
-            ends["speed"] = self.limited.get("speed", (1e-3 * self.fastest, math.inf))
+        raced = [name for name, free in (("speed", self.sped), (CONTACT_SPEED, self.lasting)) if free]
+        ends |= {name: self.limited.get(name, (1e-3 * self.fastest, math.inf)) for name in raced}
         for name in self.kept:
             ends.setdefault(name, (known[name], known[name]))
         labels = scene_numbers.labels(scene)
@@ -184,7 +184,7 @@ class _Task:
             return self.sizes.stiffness
         if name in SEGMENTS:
             return 1.0
-        if name == "speed" and self.fastest:
+        if name == CONTACT_SPEED or (name == "speed" and self.fastest):
             return self.fastest
         finite = [abs(end) for end in (*ends, self.known[name]) if math.isfinite(end)]
         return max(finite) or 1.0
@@ -194,7 +194,7 @@ class _Task:
         if name == "K1":
             least = min(max(ends[0], 0.1 * self.sizes.needed), ends[1])
             return least, min(ends[1], 10.0 * self.sizes.needed)
-        return ends[0], min(ends[1], 3.0 * self.known[name]) if math.isinf(ends[1]) else ends[1]
+        return ends[0], min(ends[1], 3.0 * self.known.get(name, self.fastest)) if math.isinf(ends[1]) else ends[1]
 
     def _objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order; what checks would have least comes after the spring."""
@@ -206,13 +206,12 @@ class _Task:
 
     def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
-        found = []
-        room = START_ROOM
+        found, room = [], START_ROOM
         for preload in (1.0 - room, room) if self.target == "force" else (1.0 - room,):
             start = inside(variables, self.known)
             for v in variables:
-                if v.name == "speed" and self.fastest:
-                    start["speed"] = min(max(SLOWER * self.fastest, v.lower), v.upper)
+                if v.name in SPEEDS and self.fastest:
+                    start[v.name] = min(max(SLOWER * self.fastest, v.lower), v.upper)
                 if v.name == "X0":
                     start[v.name] = v.lower + preload * (v.upper - v.lower)
             stiff = SPARE * self.sizes.stiffness_for(self.known["N_min"], start["X0"])
@@ -229,9 +228,8 @@ class _Task:
         found = [move for move in found if set(move.along) <= rooms]
         if preload.lower == preload.upper:
             return tuple(found)
-        wish = (Wish("today", scene_numbers.LEAST_CHANGE),)
         today, bounds = {"X0": self.known["X0"]}, {"X0": self.limited["X0"]}
-        return (Move("preload", ("X0",), "axis", wish, today, bounds), *found)
+        return (Move("preload", ("X0",), "axis", (Wish("today", scene_numbers.LEAST_CHANGE),), today, bounds), *found)
 
     def _bounds(self, variables: Sequence[Variable]) -> list[Limit]:
         """Return the bounds of variables as limits; a requirement gives way on one side only."""
@@ -242,15 +240,16 @@ class _Task:
                 bounded = v.called in self.scene.bounds or sign
                 found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
                 continue
-            own = v.name != "speed" or "speed" in self.limited
+            own = v.name not in SPEEDS or v.name in self.limited
             found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
         return found
 
     def _contact(self) -> list[Limit]:
-        """Return the limit that is the job: contact all round, or where the warp's pull is known."""
+        """Return the limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
-        found = Limit("N_min", -1, "lift", least, size, "cycle", relaxable=least > 0.0)
-        raced = [replace(found, row=row, hidden=True) for row in self.raced]
+        row = FASTEST if self.lasting and not self.sped else LIFT
+        found = Limit("N_min", -1, row, least, size, "cycle", relaxable=least > 0.0)
+        raced = [replace(found, row=other, hidden=True) for other in self.raced if other != row]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
             return [found, replace(found, name="contact", value=0.0, relaxable=False, hidden=True), *raced]

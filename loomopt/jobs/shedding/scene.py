@@ -127,7 +127,7 @@ AXES = {
     axis.name: axis
     for axis in (
         Axis("speed", "angular speed"),
-        Axis("contact_speed", "angular speed", ("speed",), senses=("most",)),
+        Axis("contact_speed", "angular speed", senses=("most",)),
         Axis("travel", "length"),
         Axis("contact_min", "force", ("lift",), "peak", ("most",), -1),
         Axis("contact_max", "force", ("cam_force",), "peak", ("least",)),
