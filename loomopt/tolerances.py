@@ -265,6 +265,10 @@ PROBES = 1e-2, 3e-3
 FALLEN, FALL_MARGIN = 1e-12, 10.0
 """Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
 
+FALL_GROWTH = 18.0
+"""How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
+to be doubted: of third order it grows 37 times, of higher more, an error by chance (tests/solving/test_valley.py)."""
+
 UNCHANGED = 1e-10
 """Change of an objective along a move that costs nothing: a hundredth of the usual accuracy (silent levels)."""
 

@@ -1,6 +1,7 @@
 """What Python gives the public functions: of the wrong kind it is one message, and NumPy's numbers do as well."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from loomopt import arguments
 
 OVER = {"operation.M0": ["600 N*m"]}
 AXES = ("peak_torque", "m4e")
-WRONG = {
+WRONG: dict[str, list[tuple[dict[str, Any], str]]] = {
     "sweep": [
         ({"over": {"operation.M0": 600}}, r"operation\.M0: it is no list \(given: 600\).*600:900:25 N\*m"),
         ({"over": {"operation.M0": {"600 N*m"}}}, "it is no list .given: set"),
@@ -63,7 +64,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "said"), [(name, *case) for name, cases in WRONG.items() for case in cases]
+    ("name", "given", "said"), [(name, given, said) for name in WRONG for given, said in WRONG[name]]
 )  # fmt: skip
 def test_an_argument_of_the_wrong_kind_is_one_message(name, given, said):
     with pytest.raises(lo.BadInput, match=said) as caught:
@@ -78,13 +79,14 @@ def test_what_is_no_scene_is_one_message(scene):
 
 
 def test_numbers_of_numpy_and_other_sequences_do_as_well():
+    given: dict[str, Any] = {"axes": np.array(AXES), "points": np.int64(3), "ranges": {"m4e": np.array([0.0, 2.0])}}
     plain = lo.pareto("beatup-light", AXES, points=3, ranges={"m4e": (0.0, 2.0)})
-    numpy = lo.pareto("beatup-light", np.array(AXES), points=np.int64(3), ranges={"m4e": np.array([0.0, 2.0])})
+    numpy = lo.pareto("beatup-light", **given)
     assert numpy.digest == plain.digest
     assert numpy.study.key == plain.study.key
-    sweep = lo.sweep(
-        "beatup-light", {"operation.M0": np.array(["600 N*m"])}, seed=np.int64(0), accuracy=np.float64(1e-8)
-    )
+    over: dict[str, Any] = {"operation.M0": np.array(["600 N*m"])}
+    numbers: dict[str, Any] = {"seed": np.int64(0), "accuracy": np.float64(1e-8)}
+    sweep = lo.sweep("beatup-light", over, **numbers)
     assert sweep.digest == lo.sweep("beatup-light", OVER, executor=lambda: ThreadPoolExecutor(1)).digest
 
 

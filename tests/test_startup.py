@@ -13,7 +13,7 @@ WORDS = {"annotated_types", "loomopt", "pydantic", "pydantic_core", "typer", "ty
 HELPERS = {"annotated_doc", "click", "shellingham", "typing_inspection"}
 """What Typer and pydantic bring themselves, by version."""
 SOLVER = {"casadi", "mpmath", "gmpy2"}
-MODULES, OWN = 530, 134
+MODULES, OWN = 530, 137
 """Most modules that any command imports, and most of this package's."""
 STEADY = {f"loomopt.{name}" for name in ("effects.steady", "program.settled", "program.states")}
 """What only a scene with a state needs."""

@@ -23,7 +23,7 @@ from loomopt.program.sampling import Sampler
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import Row, moved
 from loomopt.solving.valley import Closed, inverted
-from loomopt.tolerances import FALL_MARGIN, FEASIBLE, POLISH_DONE, POLISH_MET, PROBES
+from loomopt.tolerances import FALL_GROWTH, FALL_MARGIN, FEASIBLE, POLISH_DONE, POLISH_MET, PROBES
 
 Design = dict[str, float]
 Verdict = Literal["holds", "falls", "open"]
@@ -55,9 +55,11 @@ class FeasibleCurve:
         """Say whether the Lagrangian falls along a direction (k,) at every probe, more than a slope explains.
 
         "open" where the rows cannot be kept, or where every design that is better breaks another limit: it falls, but
-        only within the first probe; or by less than an earlier level's valley is known to.
+        only within the first probe; or by less than an earlier level's valley is known to. That such a fall does not
+        grow with the step, as one of third order would, shows it to be that valley's error.
         """
         better: list[Design] = []
+        falls, sure = list[float](), list[bool]()
         for step in PROBES:
             designs = self._lowest(lagrangian, step, way)
             if not designs:
@@ -66,10 +68,12 @@ class FeasibleCurve:
             if not lower:
                 return "holds"
             surely = [x for x in lower if lagrangian.is_lower(x, step, slope, self._unsure)]
-            if not surely:
-                return "open"
+            falls.append(max(map(lagrangian.fall, lower)))
+            sure.append(bool(surely))
             better += surely
-        return "falls" if any(map(self._is_kept, better)) else "open"
+        if all(sure):
+            return "falls" if any(map(self._is_kept, better)) else "open"
+        return "holds" if not any(sure) and falls[0] < FALL_GROWTH * falls[-1] else "open"
 
     def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
         """Return the Lagrangian's slopes along lines (k, c) at coordinates in the basis."""

@@ -1,6 +1,7 @@
 """The Lagrangian of one level as a program's own values have it: true extremes, no derivatives."""
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -33,8 +34,12 @@ class Lagrangian:
 
         unsure: what it may differ by there, beside rounding.
         """
+        return self.fall(there) > FALL_MARGIN * slope * step + FALLEN + unsure
+
+    def fall(self, there: Mapping[str, float]) -> float:
+        """Return by how much it is lower at a design (SI); −∞ where either value is unknown."""
         base, value = self._base, self.value(there)
-        return base is not None and value is not None and value - base < -(FALL_MARGIN * slope * step + FALLEN + unsure)
+        return -math.inf if base is None or value is None else base - value
 
     @functools.cached_property
     def _base(self) -> float | None:

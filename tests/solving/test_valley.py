@@ -9,11 +9,14 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
 from loomopt.solving.exact import Exact
+from loomopt.solving.feasible_curve import FeasibleCurve
 from loomopt.solving.forward import Forward
+from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Local
 from loomopt.studies import front
 from loomopt.studies.front_solve import Asking
+from loomopt.tolerances import PROBES
 
 both = pytest.mark.parametrize("derivatives", [Forward, Exact])
 
@@ -158,6 +161,29 @@ def test_a_valley_bends_with_the_rows_that_bind(derivatives, pull, minimum):
     program = toy.program("abcr", rows, limits=(("q", 0, 0.0), ("r", 1, 1.0)), objectives=("f", "g"))
     found = second(program, derivatives, a=0.0, b=1.0, c=0.0, r=1.0)
     assert found.minimum == minimum
+
+
+@pytest.mark.parametrize(
+    ("falls", "verdict"),
+    [
+        ((7e-12, 3e-11), "holds"),
+        ((9e-10, 2e-11), "open"),
+        ((3e-8, 3e-11), "open"),
+        ((3e-8, 3e-9), "falls"),
+        ((7e-12, 0.0), "holds"),
+    ],
+    ids=["by chance", "of third order", "known once", "known", "at one step alone"],
+)
+def test_a_fall_within_a_valleys_error_is_doubted_only_if_it_grows_as_a_fall_does(monkeypatch, falls, verdict):
+    """Falls at steps of 1e-2 and 3e-3, of designs along a valley that is known to 1e-9."""
+    fall = dict(zip(PROBES, falls, strict=True))
+    curve = object.__new__(FeasibleCurve)
+    monkeypatch.setattr(FeasibleCurve, "_lowest", lambda self, lagrangian, step, way: [{"x": step}])
+    monkeypatch.setattr(FeasibleCurve, "_unsure", 1e-9)
+    monkeypatch.setattr(FeasibleCurve, "_is_kept", lambda self, x: True)
+    lagrangian = Lagrangian(valley(1.0, 0.0), {"x": 0.0}, 0, {}, {})
+    monkeypatch.setattr(Lagrangian, "value", lambda self, there: -fall.get(there["x"], 0.0))
+    assert curve.judged(lagrangian, np.zeros(1), 0.0) == verdict
 
 
 def test_an_error_that_reaches_the_threshold_is_no_saddle():
