@@ -62,26 +62,23 @@ def units(
     return _completed({**first, **read(document.get("display", {}), "")})
 
 
-def unit_for(si: str, known: Mapping[str, str], kind: str = "") -> str:
+def unit_for(si: str, known: Mapping[str, str]) -> str:
     """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
 
-    kind: its own, where more than the unit is known. What swings stays in rad/s, whatever unit the shaft's speed has.
+    What swings stays in rad/s, whatever unit the shaft's speed has.
     """
-    if kind:
-        return known[kind]
-    fitting = next((kind for kind, unit in SI_UNIT.items() if unit == si and kind != "angular speed"), None)
-    return known[fitting] if fitting else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
+    kind = next((kind for kind, unit in SI_UNIT.items() if unit == si and kind != "angular speed"), None)
+    return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
 
 
-def filed_in(si: str, known: Mapping[str, str], chosen: bool, kind: str = "") -> str:
+def filed_in(si: str, known: Mapping[str, str], chosen: bool) -> str:
     """Return the unit in which a file of curves has what has an SI unit; known: unit of every kind of quantity.
 
     chosen: whether the scene's [display] chooses units. Without it lengths and forces are the SI's unless the scene's
-    are no decimal multiples of them (inches, pounds), angles and speeds of shafts in rad. kind: as in `unit_for`.
+    are no decimal multiples of them (inches, pounds), and angles are in rad.
     """
-    unit = unit_for(si, known, kind)
-    turns = fits(unit, "angle") or fits(unit, "angular speed")
-    return unit if chosen or not (_is_decimal(unit) or turns) else si
+    unit = unit_for(si, known)
+    return unit if chosen or not (_is_decimal(unit) or fits(unit, "angle")) else si
 
 
 def _written(

@@ -113,13 +113,13 @@ class Scene(Shown):
         """Return the unit in which a person sees quantities of a kind."""
         return self.units[kind]
 
-    def unit_for(self, si: str, kind: str = "") -> str:
-        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad; kind: where known."""
-        return scene_display.unit_for(si, self.units, kind)
+    def unit_for(self, si: str) -> str:
+        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        return scene_display.unit_for(si, self.units)
 
-    def filed_in(self, si: str, kind: str = "") -> str:
-        """Return the unit in which a file of curves has what has an SI unit; kind: where known."""
-        return scene_display.filed_in(si, self.units, bool(self.document.get("display")), kind)
+    def filed_in(self, si: str) -> str:
+        """Return the unit in which a file of curves has what has an SI unit."""
+        return scene_display.filed_in(si, self.units, bool(self.document.get("display")))
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
         """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""

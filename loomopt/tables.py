@@ -134,13 +134,12 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 
     In the units that [display] chooses, in inches and pounds where these are the scene's, else in SI.
     """
-    from loomopt.program import drive
     from loomopt.program.curves import split
 
     found, names = frame.copy(), {}
     for column in frame.columns:
         name, si = split(column)
-        unit = scene.filed_in(si, drive.KINDS.get(name, ""))
+        unit = scene.filed_in(si)
         if unit != si:
             found[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
     return found.rename(columns=names)

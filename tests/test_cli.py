@@ -287,8 +287,3 @@ def test_a_crank_of_changing_speed_is_evaluated_and_simulated(cli, tmp_path):
     assert cli("simulate", "beatup", "--with", "speed_fluctuation", "--out", str(file))[0] == 0
     head = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
     assert head.endswith("omega [rad/s],motor_torque [N*m]")
-    out = cli("simulate", "beatup", "--with", "speed_fluctuation")[1]
-    lines = [line.split() for line in out.splitlines()]
-    at = next(k for k, words in enumerate(lines) if "omega" in words)
-    from_the_right = dict(zip(reversed(lines[at]), reversed(lines[at + 1]), strict=False))
-    assert (from_the_right["omega"], from_the_right["motor_torque"]) == ("[rpm]", "[N*m]")

@@ -133,18 +133,6 @@ def test_the_same_scene_gives_the_same_digits(answer):
     assert tables.csv(lo.simulate(SCENE)) == tables.csv(lo.simulate(lo.load("beatup")))
 
 
-def test_the_shaft_of_a_speed_fluctuation_has_the_unit_of_shafts_where_units_are_chosen(tmp_path):
-    """What swings stays in rad/s; without [display] a file of curves is in SI."""
-    scene = SCENE.change({}, ["speed_fluctuation"], [])
-    chosen = scene.set("display.torque", "kN*m")
-    assert "omega [rad/s]" in tables.filed(lo.simulate(scene), scene)
-    filed, plain = tables.filed(lo.simulate(chosen), chosen), lo.simulate(chosen)
-    assert (filed["omega [rpm]"] * factor("rpm")).to_numpy() == pytest.approx(
-        plain["omega [rad/s]"].to_numpy(), rel=1e-14
-    )
-    assert "psi_t [rad/s]" in filed
-
-
 def test_the_nearest_design_of_an_infeasible_answer_is_called_relaxed():
     """As in the terminal."""
     found = lo.solve(SCENE.set("operation.M0", "500 N*m"), "torque")

@@ -7,7 +7,7 @@ from loomopt.effects.kinds import Check, Load, Speed, State
 from loomopt.frozen import Frozen
 from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name
 from loomopt.program.curves import split as split
-from loomopt.program.drive import KINDS, MOTOR, SPEED
+from loomopt.program.drive import MOTOR, SPEED
 from loomopt.program.drive import POWER as PEAK_POWER
 from loomopt.scene_tables import Limit
 from loomopt.scenes import Scene
@@ -74,7 +74,7 @@ class Panel(NamedTuple):
 
 def in_units(scene: Scene, panel: Panel) -> Panel:
     """Return a panel shown in the unit in which the scene's reader sees its kind of quantity."""
-    kind = KINDS.get(split(panel.columns[0])[0]) or _KIND.get(panel.si)
+    kind = _KIND.get(panel.si)
     return panel._replace(unit=scene.shown_in(kind) if kind else panel.si)
 
 

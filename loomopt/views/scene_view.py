@@ -10,7 +10,6 @@ from loomopt.cycle import Floats
 from loomopt.designs import Design, flat
 from loomopt.jobs import registry
 from loomopt.owned import label, owned
-from loomopt.program import drive
 from loomopt.scene_display import KINDS
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
@@ -147,7 +146,7 @@ def _width(curve: tuple[str, list[str]]) -> int:
 def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     """Return a curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
     symbol, _, si = name.removesuffix("]").partition(" [")
-    unit = scene.unit_for(si, drive.KINDS.get(symbol, ""))
+    unit = scene.unit_for(si)
     numbers = np.asarray(values, dtype=float) * (1.0 if unit == si else factor(si) / factor(unit))
     known = numbers[np.isfinite(numbers)]
     largest = float(np.max(np.abs(known), initial=0.0))

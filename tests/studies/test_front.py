@@ -338,7 +338,7 @@ def test_a_range_ends_the_front(ranges, axis, reached):
         (("peak_torque", "m4e"), {"ranges": {"m4e": (2.0, 1.0)}}, "from less to more"),
         (("peak_torque", "m4e"), {"points": 2}, "more points"),
         (("peak_torque", "m4e"), {"points": 99_999_999_999}, "no such number of points.*3 to 20000"),
-        (("peak_torque", "m4e"), {"points": 3.5}, "no such number of points"),
+        (("peak_torque", "m4e"), {"points": 3.5}, "it is not a whole number"),
         (("peak_torque", "m4e"), {"maximise": "l1"}, "l1 is none of both axes"),
         (("peak_torque", "m4e"), {"target": "nothing"}, "no target nothing"),
         (("peak_torque", "bearing_force"), {}, "nothing in the scene gives bearing_force"),
