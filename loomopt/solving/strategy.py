@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, sampler_at
 from loomopt.solving.elastic import least
-from loomopt.solving.search import OnStart, Search, at, judged, tried
+from loomopt.solving.search import Candidate, OnStart, Search, at, judged, tried
 from loomopt.solving.sizes import BETTER, FLIPS, SCREENED_STARTS
-from loomopt.tolerances import MORE_STARTS
+from loomopt.tolerances import MORE_STARTS, SAME_OBJECTIVE
 
 if TYPE_CHECKING:
     from loomopt.solving.screening import Screening
+
+ELSEWHERE = 1e-3
+"""Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
 
 
 def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
@@ -72,7 +75,7 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     for start in drawn:
         search = steps.explored(search, start)
     for _ in range(FLIPS):
-        if screening is None or not search.reached or _unbeatable(search):
+        if screening is None or not search.reached or unbeatable(search):
             break
         before = search.ranked[0]
         flipped = _completed(search, screening.flipped(before.point.x))
@@ -98,7 +101,7 @@ class _Steps:
         It is not begun where nothing can.
         """
         self.done += 1
-        if _unbeatable(search):
+        if unbeatable(search):
             return search
         if self.on_start:
             self.on_start(self.done, self.count)
@@ -109,7 +112,19 @@ class _Steps:
         return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
 
 
-def _unbeatable(search: Search) -> bool:
+def tied(search: Search) -> bool:
+    """Say whether other designs may be as good as the best: other starts led there, or its bounds alone stop it."""
+    best, sizes = search.ranked[0], {v.name: v.scale for v in search.program.variables}
+
+    def apart(candidate: Candidate) -> bool:
+        x = candidate.point.x
+        return any(abs(x.get(name, value) - value) > ELSEWHERE * sizes[name] for name, value in best.point.x.items())
+
+    alike = (each for each in search.candidates if each.value <= best.value + SAME_OBJECTIVE)
+    return unbeatable(search) or any(map(apart, alike))
+
+
+def unbeatable(search: Search) -> bool:
     """Say whether the best is as good as bounds alone let any design be: none can be better by as much as counts."""
     lower = {v.name: v.lower for v in search.program.variables}
     least = 0.0

@@ -17,7 +17,7 @@ from loomopt.solving import change, report
 from loomopt.solving.rows import Row as Touched
 from loomopt.solving.rows import active_set
 from loomopt.solving.search import Judged, Search, judged, objectives, tried
-from loomopt.solving.strategy import searched, spread
+from loomopt.solving.strategy import searched, spread, tied
 from loomopt.studies import warm
 from loomopt.tolerances import FEASIBLE
 
@@ -111,7 +111,7 @@ class Solver:
             best = search.ranked[0].point
             after = tried(found, best.x)
             after = judged(after) if after.reached else after
-            if wide and after.passed:
+            if wide and after.passed and tied(search):
                 after = self._spread(after)
             search = after if after.passed else searched(found, None, 0, (), None)
         return self._told(change.with_least_change(search), asking)

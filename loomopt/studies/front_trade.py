@@ -32,7 +32,7 @@ from loomopt.tolerances import SAME_OBJECTIVE
 PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
-SEARCHED = 3
+SEARCHED = 1
 """Of the first round, so many points spread over it are searched for beyond their neighbours' basins."""
 WIDE = 8
 """Times a neighbour's solve that a search beyond its basin takes, roughly."""
