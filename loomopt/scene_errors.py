@@ -56,11 +56,21 @@ def refusal(
     )
 
 
-def unknown(what: str, name: str, known: Iterable[str], origin: str, key: str) -> BadInput:
-    """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …"""
+def unknown(
+    what: str,
+    name: str,
+    known: Iterable[str],
+    origin: str,
+    key: str,
+    remedy: str = "Correct the name or take it out",
+) -> BadInput:
+    """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …
+
+    remedy: where none is near.
+    """
     names = list(known)
     near = difflib.get_close_matches(name[:_LONGEST_VALUE], names, n=1, cutoff=0.5)
-    remedy = f'Perhaps "{near[0]}" is meant' if near else "Correct the name or take it out"
+    remedy = f'Perhaps "{near[0]}" is meant' if near else remedy
     return refusal(f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy)
 
 

@@ -157,7 +157,7 @@ def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--minimise", "nonsense", "--against", "m4e"), "nonsense is no axis"),
+        (("--minimise", "nonsense", "--against", "m4e"), 'unknown axis "nonsense"'),
         (("--minimise", "m4e", "--against", "m4e"), "two axes that differ"),
         (("--minimise", "peak_torque"), "--against"),
         (("--against", "m4e"), "no axis is sought"),

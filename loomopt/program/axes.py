@@ -9,6 +9,7 @@ from loomopt.maths import Number
 from loomopt.program.instant import Formula, Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Objective, Program
+from loomopt.scene_errors import unknown
 from loomopt.schema import Axis, Sense
 
 Asked = Mapping[str, Sense]
@@ -67,13 +68,8 @@ def asked_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Asked, ori
     known = {name: Axis(name, "") for name in numbers} | dict(axes)
     for name, sense in asked.items():
         if name not in known:
-            raise BadInput(
-                f"{name} is no axis",
-                file=origin,
-                key=name,
-                allowed=", ".join(known),
-                remedy="Name one of them, or give a number of the scene min and max in [bounds].",
-            )
+            remedy = "Name one of them, or give a number of the scene min and max in [bounds]"
+            raise unknown("axis", name, known, origin, name, remedy)
         if sense not in known[name].senses:
             other = "least" if sense == "most" else "most"
             problem = f"of {name} the {other} can be sought, not the {sense}"

@@ -1,7 +1,6 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
-import weakref
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -50,10 +49,6 @@ def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
     """Return nodes with so many evenly spread over each piece."""
     pieces = np.repeat(np.arange(len(counts)), counts)
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
-
-
-_ASKED: weakref.WeakKeyDictionary[JobModel, set[str]] = weakref.WeakKeyDictionary()
-"""Quantities that were asked for on samplers' own grids."""
 
 
 class Tally:
@@ -209,13 +204,9 @@ class Sampler:
         return sorted(found, key=lambda extreme: -extreme.height)
 
     def _sampled(self, name: str) -> Floats:
-        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next.
-
-        Where a model is only ever asked for one quantity, there is no next.
-        """
-        (pieces, u), asked = self.grid(), _ASKED.setdefault(self.model, set())
-        asked.add(name)
-        if len(u) > CHUNK or len(asked) == 1:
+        """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
+        pieces, u = self.grid()
+        if len(u) > CHUNK:
             return self.at(name, pieces, u)
         Tally.positions += len(u)
         with np.errstate(invalid="ignore", divide="ignore"):

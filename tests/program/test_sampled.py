@@ -1,7 +1,6 @@
 """Samplers that are kept: one for a design, whoever asks for it, and none from one solve to the next."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -37,16 +36,6 @@ def test_what_is_kept_is_what_would_be_sampled():
     assert kept.values == VALUES
     assert kept.figures == fresh.figures
     assert kept.extremes("peak_torque") == fresh.extremes("peak_torque")
-
-
-def test_one_quantity_alone_and_several_that_share_their_poses_have_the_same_extremes():
-    alone, both = replace(MODEL), replace(MODEL)
-    Sampler(both, VALUES).extremes("obliquity")
-    for k in range(100):
-        values = {**VALUES, "m4e": 0.1 * k}
-        first, second = Sampler(alone, values), Sampler(both, values)
-        assert first.extremes("peak_torque") == second.extremes("peak_torque")
-        assert ("_on_grid" in vars(first), "_on_grid" in vars(second)) == (False, True)
 
 
 def test_no_more_are_kept_than_one_start_looks_at():

@@ -332,7 +332,7 @@ def test_a_range_ends_the_front(ranges, axis, reached):
 @pytest.mark.parametrize(
     ("axes", "more", "said"),
     [
-        (("peak_torque", "nonsense"), {}, "nonsense is no axis"),
+        (("peak_torque", "nonsense"), {}, 'unknown axis "nonsense"'),
         (("peak_torque", "m4e"), {"maximise": ("peak_torque",)}, "the least can be sought, not the most"),
         (("peak_torque", "peak_torque"), {}, "two axes that differ"),
         (("peak_torque", "m4e"), {"ranges": {"m4e": (2.0, 1.0)}}, "from less to more"),
