@@ -20,7 +20,7 @@ import loomopt as lo
 from benchmarks import harness
 from benchmarks.front_rivals import Rival, Spot, beatup, rapier, shedding
 from benchmarks.fronts import asked_at
-from loomopt.studies import executors, front, runs
+from loomopt.studies import executors, front, front_read, front_trade, runs
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 
@@ -69,7 +69,7 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     """Return a row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
     began = time.process_time()
     trade = front.trade(lo.load(rival.problem), rival.axes, rival.target, points=points)
-    found = front.read(trade, runs.run(trade))
+    found = front_read.read(trade, runs.run(trade))
     spent, name = time.process_time() - began, " against ".join(rival.axes)
     certified = [row for row in found.rows if row.certified]
     mine = _judged(rival, [rival.own(row) for row in certified])
@@ -94,7 +94,7 @@ def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
     return [spot for design in designs if (spot := rival.judge(design))]
 
 
-def _asked(trade: front.Trade, found: front.Front, second: float) -> Row | None:
+def _asked(trade: front_trade.Trade, found: front_read.Front, second: float) -> Row | None:
     """Return the front's design at a place; None beside the front."""
     paid = found.values(trade.axes[1])
     row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
@@ -121,8 +121,8 @@ def plain_loop(points: int) -> int:
 
 
 @functools.lru_cache(maxsize=2)
-def _trade(payload: bytes) -> front.Trade:
-    found: front.Trade = pickle.loads(payload)
+def _trade(payload: bytes) -> front_trade.Trade:
+    found: front_trade.Trade = pickle.loads(payload)
     return found
 
 

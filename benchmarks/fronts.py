@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import loomopt as lo
-from loomopt.studies import front, front_plan, runs
+from loomopt.studies import front, front_plan, front_read, front_trade, runs
 from loomopt.studies.front_solve import Asking
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
@@ -95,7 +95,7 @@ def main() -> None:
     """Print a block for each front."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cold", action="store_true")
-    parser.add_argument("--points", type=int, default=front.POINTS)
+    parser.add_argument("--points", type=int, default=front_trade.POINTS)
     asked = parser.parse_args()
     for case in CASES:
         began = time.process_time()
@@ -104,13 +104,13 @@ def main() -> None:
         )
         rows = runs.run(trade)
         spent = time.process_time() - began
-        found = front.read(trade, rows)
+        found = front_read.read(trade, rows)
         told(case, trade, found, spent)
         if asked.cold:
             searched(trade, found)
 
 
-def told(case: Case, trade: front.Trade, found: front.Front, spent: float) -> None:
+def told(case: Case, trade: front_trade.Trade, found: front_read.Front, spent: float) -> None:
     """Print a front's points beside known ones, its ends, its changes and its speed."""
     first, second = case.axes
     sought, paid = found.values(first), found.values(second)
@@ -133,19 +133,19 @@ def told(case: Case, trade: front.Trade, found: front.Front, spent: float) -> No
     print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
 
 
-def asked_at(trade: front.Trade, found: front.Front, value: float) -> Row:
+def asked_at(trade: front_trade.Trade, found: front_read.Front, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
     return trade.solved(Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
-def trade_value(trade: front.Trade, row: Row) -> float:
+def trade_value(trade: front_trade.Trade, row: Row) -> float:
     """Return the second axis of a row."""
     return front_plan.value(row, trade.axes[1])
 
 
-def searched(trade: front.Trade, found: front.Front) -> None:
+def searched(trade: front_trade.Trade, found: front_read.Front) -> None:
     """Print which of every third point a search from scratch is better at, and which it is worse at."""
     better, worse, count = [], [], 0
     sought = trade.solver.axes[0]

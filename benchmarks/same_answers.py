@@ -135,7 +135,7 @@ def name_of(asked: Case) -> str:
 def answered(asked: Case) -> Case:
     """Return what is compared of a case's answer."""
     import loomopt as lo
-    from loomopt.errors import BadInput
+    from loomopt.base.errors import BadInput
 
     try:
         scene = lo.load(asked["scene"])

@@ -38,7 +38,7 @@ app()"""
 COMMANDS = ("--version", "list", "evaluate beatup", "solve beatup --starts 1", "solve beatup")
 SOLVE, REST = "loomopt solve beatup --starts 1", "loomopt solve beatup, less the solve"
 TOLD = """import sys, time
-from loomopt import api, cli
+from loomopt import api; from loomopt import cli
 solve = api.solve
 def timed(*arguments, **options):
     import casadi

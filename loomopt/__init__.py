@@ -7,9 +7,9 @@
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
     from loomopt.api import Answer, Evaluation, effects, evaluate, load, pareto, prove, scene, simulate, solve, sweep
+    from loomopt.base.errors import BadInput
     from loomopt.design_study import DesignStudy
     from loomopt.effects_study import EffectsStudy
-    from loomopt.errors import BadInput
     from loomopt.scenes import Scene
     from loomopt.solving.proof import Proofs
 
@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "Answer": "loomopt.api",
-    "BadInput": "loomopt.errors",
+    "BadInput": "loomopt.base.errors",
     "DesignStudy": "loomopt.design_study",
     "EffectsStudy": "loomopt.effects_study",
     "Evaluation": "loomopt.api",

@@ -11,14 +11,14 @@ def main() -> None:
     try:
         if not _open():
             os._exit(BAD_INPUT)
-        from loomopt import interrupts
+        from loomopt.base import interrupts
 
         interrupts.leave_at_once()
         from loomopt import cli
 
         cli.main()
     except KeyboardInterrupt:
-        from loomopt import interrupts
+        from loomopt.base import interrupts
 
         interrupts.leave()
 

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from loomopt import designs
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput, clean
+from loomopt.base.refusals import refusal, shown
 from loomopt.scene_document import looked_up
-from loomopt.scene_errors import clean, refusal, shown
 from loomopt.scene_paths import Paths
 from loomopt.scenes import Scene, build
 

@@ -18,12 +18,13 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
-import typer  # noqa: E402
+import typer
 
-from loomopt import commands, interrupts, study_commands  # noqa: E402
-from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked  # noqa: E402
-from loomopt.errors import BadInput  # noqa: E402
-from loomopt.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded  # noqa: E402
+from loomopt import commands, study_commands
+from loomopt.base import interrupts
+from loomopt.base.errors import BadInput
+from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked
+from loomopt.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
 
 UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
 
 if TYPE_CHECKING:
@@ -68,9 +68,9 @@ def new(
     file: Annotated[Path, typer.Argument(help="The scene to write; it must not exist yet.")],
 ) -> None:
     """Write a commented scene to start from."""
-    from loomopt.files import atomically
+    from loomopt.base.files import atomically
+    from loomopt.base.refusals import refusal
     from loomopt.jobs import registry
-    from loomopt.scene_errors import refusal
 
     template = registry.template(job)
     if file.exists():

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.lazy import lazy
+from loomopt.base.records import lazy
 from loomopt.maths import Number
 from loomopt.schema import Values
 from loomopt.tolerances import SAME_ANGLE

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt import arguments
-from loomopt.lazy import lazy
+from loomopt.base import arguments
+from loomopt.base.records import lazy
+from loomopt.base.refusals import refusal
 from loomopt.results import Answer, solved
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.studies import executors, runs, study_table, workers
 from loomopt.studies.findings import Findings, SceneStudy, counted

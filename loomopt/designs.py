@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Quantity, described, quantity_of
+from loomopt.base.refusals import misread, refusal, unknown
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.owned import label
-from loomopt.quantities import DISPLAY_UNIT, SI_UNIT, Quantity, QuantityError, described, quantity_of, show
-from loomopt.scene_errors import misread, refusal, unknown
 from loomopt.scenes import Scene
 
 LARGEST_FILE = 1_000_000

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput, clean
+from loomopt.base.refusals import shown
 from loomopt.scene_document import looked_up, read_document
-from loomopt.scene_errors import clean, shown
 
 
 def _folder(name: str) -> Path:

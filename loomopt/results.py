@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import designs, showing
-from loomopt.lazy import lazy
+from loomopt import designs
+from loomopt.base import records
+from loomopt.base.records import lazy
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import check_numbers, target_name
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(solution.Evaluation, showing.Shown):
+class Evaluation(solution.Evaluation, records.Shown):
     """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
 
     target: whose limits it was judged by.
@@ -144,13 +145,13 @@ class Answer(Evaluation, solution.Solution):
         return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._told
 
 
-def _html(thing: showing.Shown) -> str:
+def _html(thing: records.Shown) -> str:
     from loomopt.views import notebook
 
     return notebook.html(thing)
 
 
-showing.by(_html)
+records.show_by(_html)
 
 
 def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:

@@ -7,11 +7,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.errors import BadInput
-from loomopt.quantities import plain_number
-from loomopt.scene_errors import refusal
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import plain_number
+from loomopt.base.refusals import refusal
+from loomopt.base.units import DISPLAY_UNIT, factor
 from loomopt.scenes import Scene
-from loomopt.units import DISPLAY_UNIT, factor
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
 UNITS = {"angle": ("deg", "rad"), "length": ("mm", "cm", "m", "in")}

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from loomopt.errors import BadInput
-from loomopt.scene_errors import refusal, shown
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal, shown
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8

@@ -4,10 +4,10 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Quantity, quantity_of
+from loomopt.base.refusals import refusal, unknown
 from loomopt.owned import label
-from loomopt.quantities import Quantity, quantity_of
-from loomopt.scene_errors import refusal, unknown
 from loomopt.scenes import Scene
 from loomopt.schema import Table
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from loomopt.errors import BadInput
-from loomopt.scene_errors import refusal
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from loomopt.base.records import lazy
+from loomopt.base.units import Shown
 from loomopt.effects.kinds import Effect
-from loomopt.lazy import lazy
 from loomopt.schema import Axis, Conflict, Figure, Sense, Table, Target
-from loomopt.units import Shown
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene

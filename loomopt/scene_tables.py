@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from loomopt.base.quantities import Quantity, quantity_of, unit_of
+from loomopt.base.refusals import invalid, misread, missing, refusal, shown, unknown
+from loomopt.base.units import QuantityError
 from loomopt.effects.kinds import Check, Effect, Event, Load, Speed, instance
 from loomopt.owned import label
-from loomopt.quantities import Quantity, quantity_of, unit_of
-from loomopt.scene_errors import invalid, misread, missing, refusal, shown, unknown
 from loomopt.scene_schema import SceneSchema
 from loomopt.schema import Figure, Table
-from loomopt.units import QuantityError
 
 if TYPE_CHECKING:
     from loomopt.scenes import Jobs

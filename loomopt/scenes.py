@@ -6,18 +6,17 @@ from typing import Any, Protocol, TypeVar
 
 from loomopt import scene_display
 from loomopt import scene_tables as read
+from loomopt.base.errors import clean
+from loomopt.base.records import Shown, freeze, lazy
+from loomopt.base.refusals import refusal, shown, unknown
+from loomopt.base.units import show
 from loomopt.effects.kinds import Effect
-from loomopt.frozen import freeze
-from loomopt.lazy import lazy
 from loomopt.owned import label, owned
 from loomopt.scene_document import copied, looked_up, removed, replaced
-from loomopt.scene_errors import clean, refusal, shown, unknown
 from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Table
-from loomopt.showing import Shown
-from loomopt.units import show
 
 _Own = TypeVar("_Own", bound=Table)
 

@@ -6,16 +6,15 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from loomopt import designs
+from loomopt.base.refusals import refusal
+from loomopt.base.units import factor
 from loomopt.effects.kinds import Event
 from loomopt.jobs import registry
-from loomopt.provenance import csv as csv
-from loomopt.provenance import provenance as provenance
-from loomopt.scene_errors import refusal
+from loomopt.provenance import provenance
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 from loomopt.tolerances import SHOWN_AS_ZERO
-from loomopt.units import factor
 
 if TYPE_CHECKING:
     import pandas as pd

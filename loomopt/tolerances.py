@@ -46,8 +46,9 @@ SINGULAR_SAMPLES, WORTH_A_LOOK = 361, 10
 """Samples of one turn between which the closest position of a triangle is sought, and how many times NEARLY_SINGULAR
 its share may be there: between samples a degree apart a top stands at most 4e-5 of its curvature higher."""
 
-SAME_ANGLE, NARROWEST = 1e-12, 1e-10
-"""rad: a piece that ends this close before an angle ends at it, a thousand roundings; the least pulse, rise, return."""
+SAME_ANGLE = 1e-12
+"""rad: a piece that ends this close before an angle ends at it, a thousand roundings."""
+
 
 SPARSE_STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
 """Equal steps of one turn that curves of few rows begin with, by accuracy; no stretch between corners gets fewer than

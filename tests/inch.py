@@ -5,8 +5,8 @@ from typing import Any
 
 import loomopt as lo
 from loomopt import packaged
-from loomopt.quantities import QuantityError, exact, parse_unit, read
-from loomopt.units import SI_UNIT
+from loomopt.base.quantities import exact, read
+from loomopt.base.units import SI_UNIT, QuantityError, parse_unit
 
 UNITS = {
     "length": "in",

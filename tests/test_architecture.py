@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import loomopt
+from loomopt.base.units import SI_UNIT
 from loomopt.effects import found
 from loomopt.jobs import registry
-from loomopt.units import SI_UNIT
 
 PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
@@ -126,7 +126,7 @@ def test_imports_run_upward_only():
     "source",
     [
         "from loomopt.views import svg",
-        "from loomopt import tables, errors",
+        "from loomopt import tables; from loomopt.base import errors",
         "def f():\n    import loomopt.solving.engine",
         "import importlib\nimportlib.import_module('loomopt.nlp.exchange')",
     ],
@@ -136,7 +136,7 @@ def test_an_import_from_above_is_found(source):
 
 
 def test_imports_of_a_module_below_or_beside_are_allowed():
-    below = "from loomopt.program import sampling\nfrom loomopt.errors import BadInput"
+    below = "from loomopt.program import sampling\nfrom loomopt.base.errors import BadInput"
     for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.views import svg"
     assert climbing("jobs.beatup.model", below) == climbing("jobs.beatup.model", for_reading) == []
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import arguments
+from loomopt.base import arguments
 
 OVER = {"operation.M0": ["600 N*m"]}
 AXES = ("peak_torque", "m4e")

@@ -8,7 +8,7 @@ import os
 import pytest
 
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs.registry import load, scene
 
 BEATUP = load("beatup")

@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
+from loomopt.base.units import SI_UNIT
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import Scene
-from loomopt.units import SI_UNIT
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")

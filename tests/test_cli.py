@@ -13,12 +13,12 @@ import sys
 import pytest
 
 from loomopt import api, shell
+from loomopt.base.quantities import read
 from loomopt.cli import run
 from loomopt.effects import found
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.packaged import problem_names
-from loomopt.quantities import read
 from loomopt.solving import search
 from loomopt.solving.certificate import certify
 

@@ -8,7 +8,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import designs
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs.registry import load
 
 SCENE = load("beatup")

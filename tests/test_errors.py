@@ -5,8 +5,8 @@ import itertools
 import pytest
 
 import loomopt as lo
+from loomopt.base.errors import LONGEST_MESSAGE, BadInput, clean
 from loomopt.cli import run
-from loomopt.errors import LONGEST_MESSAGE, BadInput, clean
 
 PARTS = ("problem", "file", "key", "value", "allowed", "remedy")
 LONG = ["x" * 5000, "\x1b[2J" * 2000, "\u2028" * 3000, "织" * 4000]

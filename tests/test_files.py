@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from loomopt import files as store
-from loomopt.errors import BadInput
+from loomopt.base import files as store
+from loomopt.base.errors import BadInput
 
 
 def put(text):

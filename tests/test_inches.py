@@ -9,10 +9,10 @@ import pytest
 
 import loomopt as lo
 from loomopt import packaged, tables
+from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
 from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.solving.words import Words
-from loomopt.units import SI_UNIT, UNITS, factor, parse_unit
 from loomopt.views import layout, scene_view, terminal
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"

@@ -25,7 +25,7 @@ main()
 """The command as the shell starts it; Ctrl-C arrives while one module is looked for."""
 SWALLOWED = """
 import os, signal
-from loomopt import interrupts
+from loomopt.base import interrupts
 
 class Closed:
     def __del__(self):
@@ -40,7 +40,7 @@ raise SystemExit(interrupts.stoppable(run))
 """
 ENDED = """
 import os, signal, sys
-from loomopt import cli, shell
+from loomopt import cli; from loomopt import shell
 
 def say(self, text):
     if text.startswith("2 of"):
@@ -68,7 +68,7 @@ def is_stopped(done):
 
 @pytest.mark.parametrize(
     "module",
-    ["loomopt.cli", "typer", "pydantic", "loomopt.errors", "loomopt.jobs.beatup.job", "loomopt.scenes",
+    ["loomopt.cli", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job", "loomopt.scenes",
      "numpy.linalg", "casadi", "numpy", "loomopt.solving.certificate", "rich.table", "loomopt.solving.engine"],
 )  # fmt: skip
 def test_ctrl_c_during_an_import_stops_cleanly(module):

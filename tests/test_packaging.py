@@ -16,7 +16,7 @@ import pytest
 
 import loomopt
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 

@@ -10,27 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from loomopt import quantities
-from loomopt.quantities import (
-    DISPLAY_UNIT,
-    SI_UNIT,
-    UNITS,
+from loomopt.base import quantities, units
+from loomopt.base.quantities import (
+    NARROWEST,
     Length,
     PulseAngle,
     PureNumber,
     Quantity,
-    QuantityError,
     Speed,
     exact,
-    factor,
     kind_of,
-    parse_unit,
     quantity_of,
     read,
-    show,
     unit_of,
 )
-from loomopt.tolerances import NARROWEST
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, factor, parse_unit, show
 
 COMPOUND_UNITS = [
     "turn/min",
@@ -285,7 +279,7 @@ def test_showing():
 @pytest.mark.parametrize("kind", SI_UNIT)
 def test_every_kind_has_units_of_its_own_kind(kind):
     assert parse_unit(SI_UNIT[kind]).factor == 1
-    assert quantities.fits(DISPLAY_UNIT[kind], kind)
+    assert units.fits(DISPLAY_UNIT[kind], kind)
     if kind != "number":
         assert read(f"2 {DISPLAY_UNIT[kind]}", kind) == pytest.approx(2 * factor(DISPLAY_UNIT[kind]), rel=3e-16)
         assert DISPLAY_UNIT[kind] in quantities.described(kind)

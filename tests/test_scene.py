@@ -15,7 +15,7 @@ import pytest
 from together import combined
 
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load, scene

@@ -4,8 +4,8 @@ import inch
 import pytest
 
 import loomopt as lo
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
 from loomopt.scene_display import KINDS
-from loomopt.units import DISPLAY_UNIT, SI_UNIT, fits
 
 SHEDDING = lo.load("shedding")
 RAPIER = lo.load("rapier")

@@ -8,15 +8,15 @@ import pytest
 from together import combined
 
 from loomopt import scenes
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Length, PositiveMass
 from loomopt.effects.beatup import inertia, rocker_inertia
 from loomopt.effects.kinds import Clash, Load, ranked
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load
 from loomopt.owned import label, owned
 from loomopt.program import numbers
-from loomopt.quantities import Length, PositiveMass
 from loomopt.scene_tables import Bound, Limit
 from loomopt.schema import Figure, Table
 

@@ -3,7 +3,7 @@
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.scene_numbers import files, quantity
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier.scene import match_table
 from loomopt.scene_paths import Paths
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from loomopt import shell
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 
 CLEARED = "\x1b[K"
 

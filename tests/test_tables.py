@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt import tables
-from loomopt.units import factor, parse_unit
+from loomopt import provenance, tables
+from loomopt.base.units import factor, parse_unit
 from loomopt.views import outputs
 
 SCENE = lo.load("beatup")
@@ -44,7 +44,7 @@ def test_every_table_carries_its_provenance(answer):
         assert frame.attrs["loomopt"] == lo.__version__
         assert {"casadi", "numpy"} <= set(frame.attrs)
         assert re.fullmatch(r"\d{4}-\d\d-\d\d", frame.attrs["date"])
-        head = tables.csv(frame).splitlines()[: len(frame.attrs)]
+        head = provenance.csv(frame).splitlines()[: len(frame.attrs)]
         assert head == [f"# {name}: {value}" for name, value in frame.attrs.items()]
     assert answer.table().attrs["target"] == "balance"
 
@@ -122,7 +122,7 @@ def test_a_file_of_curves_has_the_scenes_units(scene, units, tmp_path):
 
 def test_csv_reads_back_to_the_last_digit(answer):
     for frame in (lo.simulate(SCENE), answer.table()):
-        back = pd.read_csv(io.StringIO(tables.csv(frame)), comment="#", dtype=str)
+        back = pd.read_csv(io.StringIO(provenance.csv(frame)), comment="#", dtype=str)
         for name in frame.select_dtypes(float):
             assert [float(cell) for cell in back[name].dropna()] == list(frame[name].dropna())
 
@@ -130,7 +130,7 @@ def test_csv_reads_back_to_the_last_digit(answer):
 def test_the_same_scene_gives_the_same_digits(answer):
     again = lo.solve(lo.load("beatup"))
     pd.testing.assert_frame_equal(again.table(), answer.table(), check_exact=True)
-    assert tables.csv(lo.simulate(SCENE)) == tables.csv(lo.simulate(lo.load("beatup")))
+    assert provenance.csv(lo.simulate(SCENE)) == provenance.csv(lo.simulate(lo.load("beatup")))
 
 
 def test_the_nearest_design_of_an_infeasible_answer_is_called_relaxed():

@@ -17,9 +17,9 @@ EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
-from loomopt.quantities import Torque
-from loomopt.schema import Table, Values
+from loomopt.maths import Maths; from loomopt.maths import Number
+from loomopt.base.quantities import Torque
+from loomopt.schema import Table; from loomopt.schema import Values
 
 
 class Own(Table):

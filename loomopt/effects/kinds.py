@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
+from loomopt.base.units import Shown
 from loomopt.maths import Maths, Number
 from loomopt.schema import Figure, Table, Values
-from loomopt.units import Shown
 
 if TYPE_CHECKING:
     from loomopt.effects.steady import Carried, Moved, Oscillator, Replied, Written

@@ -9,9 +9,10 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from loomopt.base.errors import BadInput
+from loomopt.base.units import SI_UNIT
 from loomopt.cycle import Floats
 from loomopt.effects.kinds import Event
-from loomopt.errors import BadInput
 from loomopt.picture.job_views import JobViews
 from loomopt.program import drive, numbers
 from loomopt.program.curves import STEPS, Columns, curves, tops
@@ -21,7 +22,6 @@ from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.studied import Studied
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.units import SI_UNIT
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

@@ -12,12 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import arguments, entry_points, packaged
+from loomopt import entry_points, packaged
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import unknown
 from loomopt.effects.kinds import Effect, ranked
-from loomopt.errors import BadInput
 from loomopt.jobs.base import Job
 from loomopt.scene_document import read_document
-from loomopt.scene_errors import unknown
 from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene, build

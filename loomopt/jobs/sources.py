@@ -7,7 +7,7 @@ computes every one of them again.
 import csv
 from typing import NamedTuple
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 
 

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from loomopt.lazy import lazy
+from loomopt.base.records import lazy
+from loomopt.base.units import Shown, usual
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
-from loomopt.units import Shown, usual
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,7 +7,7 @@ the +y side [Yuan24], −1 its mirror image. Every formula is stable for tiny cr
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.lazy import lazy
+from loomopt.base.records import lazy
 from loomopt.maths import Maths, Number, numpy
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector

@@ -2,8 +2,8 @@
 
 import math
 
+from loomopt.base.units import Shown, usual
 from loomopt.mechanisms.crank_rocker import Lengths, assembly_margins
-from loomopt.units import Shown, usual
 
 TELLING = 1e-15
 """Share of the links' sum below which a margin cannot be told from rounding: the linkage is at its change point."""

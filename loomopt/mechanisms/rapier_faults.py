@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt import maths
+from loomopt.base.units import Shown, usual
 from loomopt.mechanisms import crank_rocker_faults
 from loomopt.mechanisms.dyad import dot
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
-from loomopt.units import Shown, usual
 
 SAMPLES = 3600
 Floats = NDArray[np.float64]

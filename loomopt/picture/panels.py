@@ -3,15 +3,14 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from loomopt.base.records import Frozen
+from loomopt.base.units import SI_UNIT
 from loomopt.effects.kinds import Check, Load, Speed, State
-from loomopt.frozen import Frozen
-from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name
-from loomopt.program.curves import split as split
+from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name, split
 from loomopt.program.drive import MOTOR, SPEED
 from loomopt.program.drive import POWER as PEAK_POWER
 from loomopt.scene_tables import Limit
 from loomopt.scenes import Scene
-from loomopt.units import SI_UNIT
 
 EXTREMES = ("peak", "most", "least")
 """What of a curve may be marked: its largest magnitude, its largest and its least value."""

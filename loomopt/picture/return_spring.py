@@ -7,11 +7,11 @@ schematic. Its elongation and the travel are drawn at full scale.
 import math
 from dataclasses import dataclass
 
+from loomopt.base.units import show
 from loomopt.picture.drawing import Label, along
 from loomopt.picture.shapes import Line, Point, Primitive
 from loomopt.picture.symbols import dimension, ground, spring
 from loomopt.picture.units import Units
-from loomopt.units import show
 
 LAYER = "schematic"
 LENGTH, COIL, BAR = 20.0, 4.0, 9.0

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from loomopt.base.units import factor
 from loomopt.picture.shapes import Circle, Line, Point, Primitive, Trace
 from loomopt.picture.symbols import fixed_pivot, mass
 from loomopt.picture.units import METRIC, Units
-from loomopt.units import factor
 
 JOINT = 0.35
 """Radius of a joint's circle, in text heights."""

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from loomopt import units
+from loomopt.base import units
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene

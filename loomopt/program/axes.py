@@ -4,12 +4,12 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import unknown
 from loomopt.maths import Number
 from loomopt.program.instant import Formula, Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Objective, Program
-from loomopt.scene_errors import unknown
 from loomopt.schema import Axis, Sense
 
 Asked = Mapping[str, Sense]

@@ -8,6 +8,7 @@ import numpy as np
 
 from loomopt import balance, maths
 from loomopt.balance import Given
+from loomopt.base.refusals import refusal
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces
 from loomopt.effects.kinds import Motion, Speed
 from loomopt.maths import Maths, Number
@@ -16,7 +17,6 @@ from loomopt.program import drive
 from loomopt.program.instant import Instant, Row
 from loomopt.program.kinematics import Arcs, Group, Kinematics
 from loomopt.program.sampling import KEPT, Sampler
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.schema import Values
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from loomopt import maths
 from loomopt.balance import Acting
+from loomopt.base.records import Frozen
+from loomopt.base.units import SI_UNIT
 from loomopt.cycle import TURN, Floats, Pieces
-from loomopt.frozen import Frozen
 from loomopt.program.drive import motor_power
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
 from loomopt.tolerances import SAME_ANGLE, SAME_ROW
-from loomopt.units import SI_UNIT
 
 STEPS = 720
 ANGLE = "phi [rad]"

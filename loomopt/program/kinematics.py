@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from loomopt.balance import Given
+from loomopt.base.records import Frozen
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Motion
-from loomopt.frozen import Frozen
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import spikes

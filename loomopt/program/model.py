@@ -12,9 +12,9 @@ from typing import Any
 
 from loomopt import cycle
 from loomopt.balance import Acting, Given
+from loomopt.base.records import lazy
 from loomopt.cycle import Cycle, Node, Where
 from loomopt.effects.kinds import Check, Demand, Effect, Load, Speed, State
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.owned import label, owned
 from loomopt.program import formulas

@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
+from loomopt.base.errors import BadInput
 from loomopt.cycle import Where
 from loomopt.effects.kinds import Check, Load
-from loomopt.errors import BadInput
 from loomopt.owned import label, owned
 from loomopt.program import drive
 from loomopt.program.model import JobModel

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from loomopt.base.refusals import refusal
+from loomopt.base.units import SI_UNIT
 from loomopt.cycle import TURN, Floats, Node
 from loomopt.effects.kinds import Event
 from loomopt.maths import FLOAT
@@ -16,10 +18,8 @@ from loomopt.motion.free import Moving
 from loomopt.program.curves import ANGLE, POWER, Columns, Rows, columns_at, load_name, rows, split
 from loomopt.program.free_loads import SAMPLES, Forms, UnfollowedError, body, forms, sizes
 from loomopt.program.sampling import Sampler
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import ACCURACY, SAME_ANGLE
-from loomopt.units import SI_UNIT
 
 BEYOND = 1.01
 """Share of the largest sampled acceleration that no acceleration exceeds."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from loomopt.base.records import lazy
 from loomopt.cycle import Where
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import JobModel
 from loomopt.schema import Values

@@ -6,8 +6,8 @@ import functools
 import numpy as np
 
 from loomopt.balance import Given, total
+from loomopt.base.records import lazy
 from loomopt.cycle import Cycle, Floats, Node, Pieces
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from loomopt import maths
 from loomopt.balance import Given
+from loomopt.base.records import lazy
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
-from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.frozen import Frozen
+from loomopt.base.records import Frozen
 from loomopt.maths import Number
 
 if TYPE_CHECKING:

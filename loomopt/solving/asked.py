@@ -4,12 +4,11 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from loomopt import arguments
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal
 from loomopt.effects.kinds import EVALUATED
-from loomopt.errors import BadInput
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
-from loomopt.tolerances import ACCURACY as ACCURACY
 from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 
 GAP, SECONDS = 1e-3, 60.0

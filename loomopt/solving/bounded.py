@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt import maths
+from loomopt.base.records import lazy
 from loomopt.cycle import Where
-from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program

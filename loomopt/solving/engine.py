@@ -13,10 +13,11 @@ from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
 from loomopt.solving import report
-from loomopt.solving.asked import ACCURACY, Everywhere, check_everywhere, check_numbers, check_sought, target_name
+from loomopt.solving.asked import Everywhere, check_everywhere, check_numbers, check_sought, target_name
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
+from loomopt.tolerances import ACCURACY
 
 if TYPE_CHECKING:
     from loomopt.solving.search import Judged, Search

@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
+from loomopt.base.records import lazy
 from loomopt.cycle import Floats
-from loomopt.lazy import lazy
 from loomopt.nlp.point import sampler_at
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler

@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from loomopt import maths
+from loomopt.base.records import lazy
 from loomopt.cycle import Floats, Pieces
 from loomopt.jets import Jet, stacked, variables
-from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program

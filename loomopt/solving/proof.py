@@ -11,16 +11,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from loomopt import arguments, designs
+from loomopt import designs
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.records import Shown
 from loomopt.cycle import Where
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.program import states
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.showing import Shown
 from loomopt.solving.asked import check_sought, target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution

@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from loomopt.base.units import factor
 from loomopt.program import numbers
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.solving.words import Words
-from loomopt.units import factor
 
 LEAST_DIGITS, MOST_DIGITS = 4, 14
 """Significant digits of a rounded design: numbers of fewer are nominal ones, such as 155 mm, meant as they stand; those

@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
-from loomopt.frozen import freeze
-from loomopt.lazy import lazy
+from loomopt.base.records import freeze, lazy
 from loomopt.scene_document import copied
 from loomopt.solving.verdict import Certificate, GlobalBound
 

@@ -2,9 +2,10 @@
 
 import math
 
+from loomopt.base.quantities import quantity_of
+from loomopt.base.units import SI_UNIT, factor, show
 from loomopt.owned import label
 from loomopt.program.program import Limit
-from loomopt.quantities import SI_UNIT, factor, quantity_of, show
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from loomopt import tables
+from loomopt import provenance
 from loomopt.jobs import registry
 from loomopt.program import states
 from loomopt.scenes import Scene
@@ -105,7 +105,7 @@ def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Stud
             orders |= {} if measured is None else {name: measured}
             knees |= {} if at is None else {name: at}
     rows = tuple(row for _, found in climbs for row in found)
-    told = tables.provenance(scene, study="full" if full else "quick")
+    told = provenance.provenance(scene, study="full" if full else "quick")
     sampler = registry.of(scene).sampler(scene, {})
     left = [f" Not covered: {text}." for text in states.rests(sampler.model.effects, sampler.given.own)]
     return Study(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import packaged, tables
-from loomopt.errors import BadInput
+from loomopt import packaged, provenance
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY
 from loomopt.solving.solution import Solution
 from loomopt.studies import references
+from loomopt.tolerances import ACCURACY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +93,7 @@ def reference(found: Solution, scene: Scene) -> "pd.DataFrame":
         columns["objectives"] = " | ".join(level.objective for level in found.certificate.levels)
         columns["unique"] = found.certificate.unique
     frame = pd.DataFrame([columns])
-    frame.attrs.update(tables.provenance(scene, target=found.target, accuracy=ACCURACY))
+    frame.attrs.update(provenance.provenance(scene, target=found.target, accuracy=ACCURACY))
     return frame
 
 
@@ -135,14 +135,14 @@ def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
 
 def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = None) -> list[Path]:
     """Write the reference table of every target and front of the named scenes (all without one); returns the files."""
-    from loomopt.files import atomically
+    from loomopt.base.files import atomically
     from loomopt.studies import front_reference
 
     written = []
     for name in named(problems):
         scene = registry.load(name)
         for target in served(scene):
-            text = tables.csv(reference(_solved(scene, target, on_step), scene))
+            text = provenance.csv(reference(_solved(scene, target, on_step), scene))
             written.append(folder / f"{name}.{target}.csv")
             atomically(written[-1], functools.partial(_put, text))
         study = front_reference.trade(scene)
@@ -150,7 +150,7 @@ def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = N
             if on_step:
                 on_step(f"solving {name}, {front_reference.said(study)}")
             written.append(folder / front_reference.file(study))
-            atomically(written[-1], functools.partial(_put, tables.csv(front_reference.table(study))))
+            atomically(written[-1], functools.partial(_put, provenance.csv(front_reference.table(study))))
     return written
 
 

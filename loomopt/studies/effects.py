@@ -10,20 +10,22 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import arguments, designs
-from loomopt.errors import BadInput
+from loomopt import designs
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal
 from loomopt.jobs import registry
 from loomopt.provenance import versions
-from loomopt.scene_errors import refusal
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, OMITTED, check_numbers, target_name
+from loomopt.solving.asked import OMITTED, check_numbers, target_name
 from loomopt.studies import effects_known
 from loomopt.studies.effects_worth import Judge, Worth
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 from loomopt.studies.sweep import reason
+from loomopt.tolerances import ACCURACY
 
 REFUSED = "refused"
 """The status of what solve does not take."""

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt.frozen import freeze
-from loomopt.scene_errors import refusal
+from loomopt.base.records import freeze
+from loomopt.base.refusals import refusal
 from loomopt.scenes import Scene
 from loomopt.solving.words import Words
 from loomopt.studies import effects_known

@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 from loomopt import answers
+from loomopt.base.errors import BadInput
 from loomopt.effects.combining import Fault, faults
 from loomopt.effects.kinds import Effect, Event, Speed, State
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.scene_document import looked_up, replaced
 from loomopt.scene_tables import effects as read

@@ -5,8 +5,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from loomopt.errors import BadInput
-from loomopt.frozen import freeze
+from loomopt.base.errors import BadInput
+from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.program.program import Objective, Program
 from loomopt.scenes import Scene

@@ -11,8 +11,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from multiprocessing.connection import Connection
 from typing import Any, ParamSpec, TypeVar
 
-from loomopt import arguments
-from loomopt.errors import BadInput
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
 
 P = ParamSpec("P")
 T = TypeVar("T")

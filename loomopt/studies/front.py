@@ -7,21 +7,18 @@ non-convex parts are reached too [Haimes, Lasdon, Wismer, IEEE Trans. SMC 1 (197
 import math
 from collections.abc import Mapping, Sequence
 
-from loomopt import arguments
-from loomopt.errors import BadInput
-from loomopt.quantities import QuantityError
-from loomopt.quantities import read as read_quantity
-from loomopt.scene_errors import misread, refusal
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import read as read_quantity
+from loomopt.base.refusals import misread, refusal
+from loomopt.base.units import SI_UNIT, QuantityError
 from loomopt.scenes import Scene
 from loomopt.schema import Sense
-from loomopt.solving.asked import ACCURACY, check_numbers, check_sought, target_name
+from loomopt.solving.asked import check_numbers, check_sought, target_name
 from loomopt.solving.words import Words
 from loomopt.studies import ranges as texts
-from loomopt.studies.front_read import Front as Front
-from loomopt.studies.front_read import read as read
-from loomopt.studies.front_trade import POINTS as POINTS
-from loomopt.studies.front_trade import Trade as Trade
-from loomopt.units import SI_UNIT
+from loomopt.studies.front_trade import POINTS, Trade
+from loomopt.tolerances import ACCURACY
 
 FEWEST = 3
 """Points of a front."""

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from loomopt import tables
+from loomopt import provenance
 from loomopt.scenes import Scene
 from loomopt.solving.words import Words, grouped
-from loomopt.studies import front, front_plan, references, runs
+from loomopt.studies import front, front_plan, front_read, front_trade, references, runs
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 
@@ -19,7 +19,7 @@ BETWEEN = 0.25, 0.5, 0.75
 """Where between its ends a front is solved again, as shares of the second axis."""
 
 
-def trade(scene: Scene) -> front.Trade | None:
+def trade(scene: Scene) -> front_trade.Trade | None:
     """Return the front that stands for a scene's job; None where the scene is not named after it, or it has none."""
     found = scene.schema.conflict
     if found is None or scene.name != scene.schema.name:
@@ -27,28 +27,28 @@ def trade(scene: Scene) -> front.Trade | None:
     return front.trade(scene, found.axes, found.target, maximise=found.maximise, points=POINTS)
 
 
-def said(study: front.Trade) -> str:
+def said(study: front_trade.Trade) -> str:
     """Return what a front is called."""
     return " against ".join(study.axes)
 
 
-def file(study: front.Trade) -> str:
+def file(study: front_trade.Trade) -> str:
     """Return the name of a front's file."""
     return f"{study.scene.name}.{'-against-'.join(study.axes)}.csv"
 
 
-def table(study: front.Trade) -> "pd.DataFrame":
+def table(study: front_trade.Trade) -> "pd.DataFrame":
     """Return the whole front as a table, a line for each of its designs in the order of the second axis; SI."""
     import pandas as pd
 
-    found = front.read(study, runs.run(study))
+    found = front_read.read(study, runs.run(study))
     frame = pd.DataFrame([line(study, row) for row in found.rows if row.certified])
     more = {"target": study.target or "none", "accuracy": study.accuracy, "points": study.points}
-    frame.attrs.update(tables.provenance(study.scene, **more))
+    frame.attrs.update(provenance.provenance(study.scene, **more))
     return frame
 
 
-def line(study: front.Trade, row: Row) -> dict[str, object]:
+def line(study: front_trade.Trade, row: Row) -> dict[str, object]:
     """Return a certified design of a front as a line, SI: what was asked, axes, figures, slope, what is touched."""
     words, (first, second) = Words(study.scene), study.axes
     over, under = words.si(first), words.si(second)
@@ -62,7 +62,7 @@ def line(study: front.Trade, row: Row) -> dict[str, object]:
     return found
 
 
-def checked(study: front.Trade, then: "pd.DataFrame") -> Iterator[tuple[str, list[str]]]:
+def checked(study: front_trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[str, list[str]]]:
     """Yield the status of each design that is solved again, and what of its line in a reference differs.
 
     Its ends and three designs between, each from the design of its line, those between also from the nearest end.
@@ -93,7 +93,7 @@ def checked(study: front.Trade, then: "pd.DataFrame") -> Iterator[tuple[str, lis
         yield row.status, [f"{spot}: {difference}" for difference in found]
 
 
-def _ends(study: front.Trade, values: list[float]) -> tuple[int, int]:
+def _ends(study: front_trade.Trade, values: list[float]) -> tuple[int, int]:
     """Return the lines where the first axis, and the second, is best: lines are in the order of the second."""
     first, last = 0, len(values) - 1
     return (last, first) if study.senses[1] == "least" else (first, last)
@@ -106,7 +106,7 @@ def _between(values: list[float]) -> list[int]:
     return [min(inner, key=lambda k: abs(values[k] - low - share * (high - low))) for share in BETWEEN if inner]
 
 
-def _start(study: front.Trade, told: Mapping[str, str]) -> list[dict[str, dict[str, object]]]:
+def _start(study: front_trade.Trade, told: Mapping[str, str]) -> list[dict[str, dict[str, object]]]:
     """Return the design of a line as what a solve may start from; nothing where it does not assemble."""
     job, scene = study.solver.job, study.scene
     cells = {name.split(" [")[0]: value for name, value in told.items()}

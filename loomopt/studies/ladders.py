@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.maths import Number
 from loomopt.program.sampling import Tally
 from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER

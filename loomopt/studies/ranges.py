@@ -3,9 +3,9 @@
 import re
 from decimal import Decimal, localcontext
 
-from loomopt.errors import BadInput
-from loomopt.quantities import plain_number
-from loomopt.scene_errors import refusal
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import plain_number
+from loomopt.base.refusals import refusal
 
 MOST_VALUES = 20_000
 """Points of a study."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from loomopt.frozen import freeze
+from loomopt.base.records import freeze
 
 UNTIMED = "seconds"
 """The one part of a row that is not the same each time."""

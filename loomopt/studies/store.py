@@ -12,8 +12,8 @@ from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
 
-from loomopt import files
-from loomopt.errors import BadInput
+from loomopt.base import files
+from loomopt.base.errors import BadInput
 from loomopt.studies.rows import Row
 
 APPLICATION, VERSION = 0x6C6F6F6D, 1

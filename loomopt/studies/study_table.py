@@ -5,8 +5,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from loomopt.base.units import SI_UNIT, factor
 from loomopt.provenance import provenance
-from loomopt.quantities import SI_UNIT, factor
 from loomopt.solving.words import Words, grouped
 from loomopt.studies.findings import SceneStudy
 from loomopt.studies.rows import Row, parts

@@ -7,23 +7,25 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import arguments, designs
-from loomopt.errors import BadInput
+from loomopt import designs
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import misread, refusal
+from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
 from loomopt.nlp.point import Point
 from loomopt.provenance import versions
-from loomopt.quantities import QuantityError
-from loomopt.scene_errors import misread, refusal
 from loomopt.scene_numbers import files, quantity
 from loomopt.scenes import Scene
 from loomopt.solving import engine
-from loomopt.solving.asked import ACCURACY, check_numbers, check_sought, target_name
+from loomopt.solving.asked import check_numbers, check_sought, target_name
 from loomopt.solving.solution import Solution
 from loomopt.studies import ranges, warm
 from loomopt.studies.findings import Change, Findings
 from loomopt.studies.lattice import Lattice
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row, parts, priced
+from loomopt.tolerances import ACCURACY
 
 PLAN = 2
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from loomopt.scene_errors import refusal
+from loomopt.base.refusals import refusal
 
 if TYPE_CHECKING:
     from loomopt.studies.plan import Study, Task

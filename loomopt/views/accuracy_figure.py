@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from loomopt import tables
-from loomopt.files import atomically, suffix
-from loomopt.files import check as check_file
+from loomopt import provenance
+from loomopt.base.files import atomically, suffix
+from loomopt.base.files import check as check_file
 from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS
@@ -67,7 +67,7 @@ def check(path: Path) -> None:
 def write(study: Study, path: Path) -> None:
     """Write a study's table as CSV, or its figure, by the file's ending."""
     if suffix(path, FORMATS) == ".csv":
-        outputs.text(path, tables.csv(study.table()))
+        outputs.text(path, provenance.csv(study.table()))
     else:
         atomically(path, functools.partial(draw, study))
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from loomopt import files
+from loomopt.base import files
+from loomopt.base.units import factor, show
 from loomopt.cycle import Floats
 from loomopt.picture.panels import Panel, each
 from loomopt.picture.shapes import plain
 from loomopt.program.curves import ANGLE
-from loomopt.units import factor, show
 from loomopt.views import figure
 from loomopt.views.figure import COLOURS, STYLES
 from loomopt.views.heads import LEGEND, SIZE, Entry, head

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from loomopt.base.units import factor
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     DASH,
@@ -22,7 +23,6 @@ from loomopt.picture.shapes import (
     plain,
     scaled,
 )
-from loomopt.units import factor
 
 _TEXT_STYLE, _DASHES = "LABELS", "DASHES"
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from loomopt.errors import BadInput
-from loomopt.files import atomically, suffix
+from loomopt.base.errors import BadInput
+from loomopt.base.files import atomically, suffix
 from loomopt.picture.shapes import plain
 from loomopt.studies.effects_found import Found
 from loomopt.tolerances import SHOWN_AS_ZERO

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from loomopt.base.units import factor
 from loomopt.provenance import provenance
-from loomopt.quantities import factor
 from loomopt.solving.words import Words
 from loomopt.studies.effects_found import Found
 from loomopt.studies.effects_worth import LIMITS, Worth

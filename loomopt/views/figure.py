@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from loomopt import files
+from loomopt.base import files
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     CAPITAL,

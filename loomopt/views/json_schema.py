@@ -6,14 +6,13 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
-from loomopt.quantities import Quantity, quantity_of
-from loomopt.quantity_patterns import QUANTITY, foreign
+from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of
+from loomopt.base.units import DISPLAY_UNIT
 from loomopt.scene_display import KINDS
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Problem
 from loomopt.scenes import TABLES
 from loomopt.schema import Table
-from loomopt.units import DISPLAY_UNIT
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -154,12 +153,12 @@ def _hoisted(whole: Json) -> Json:
     kinds: dict[str, Json] = {}
 
     def hoist(part: Json) -> Json:
-        if QUANTITY not in part:
+        if QUANTITY_PATTERN not in part:
             return _each(part, hoist)
         own: Json = {key: part[key] for key in ("description",) if key in part}
-        name = re.sub(r"\W+", "_", part[QUANTITY])
+        name = re.sub(r"\W+", "_", part[QUANTITY_PATTERN])
         kinds.setdefault(
-            name, {key: value for key, value in part.items() if key not in (QUANTITY, "title", "default", *own)}
+            name, {key: value for key, value in part.items() if key not in (QUANTITY_PATTERN, "title", "default", *own)}
         )
         return {"$ref": f"#/$defs/{name}", **own}
 

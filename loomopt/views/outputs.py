@@ -9,10 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt import __version__, tables
+from loomopt import __version__, provenance, tables
+from loomopt.base.errors import BadInput
+from loomopt.base.files import atomically, check, check_room, suffix, together
 from loomopt.designs import Design, flat
-from loomopt.errors import BadInput
-from loomopt.files import atomically, check, check_room, suffix, together
 from loomopt.jobs import registry
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution
@@ -77,8 +77,10 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
 
     contents = {
         "answer.json": document(solution) + "\n",
-        "table.csv": tables.csv(tables.answer(solution, scene)),
-        "curves.csv": tables.csv(tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)),
+        "table.csv": provenance.csv(tables.answer(solution, scene)),
+        "curves.csv": provenance.csv(
+            tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
+        ),
     }
     view = registry.of(scene).views
     if not view.missing(scene):
@@ -137,7 +139,7 @@ def curves(
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target)
     if ending == ".csv":
-        text(path, tables.csv(tables.filed(frame, scene)))
+        text(path, provenance.csv(tables.filed(frame, scene)))
     elif ending == ".parquet":
         atomically(path, tables.filed(frame, scene).to_parquet)
     else:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from loomopt.base.units import factor
 from loomopt.cycle import Floats
 from loomopt.designs import Design, flat
 from loomopt.jobs import registry
@@ -13,7 +14,6 @@ from loomopt.owned import label, owned
 from loomopt.scene_display import KINDS
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words
-from loomopt.units import factor
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15

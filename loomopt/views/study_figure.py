@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from loomopt.errors import BadInput
-from loomopt.files import atomically, suffix
+from loomopt.base.errors import BadInput
+from loomopt.base.files import atomically, suffix
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing, Text, extent, plain
 from loomopt.studies import study_table

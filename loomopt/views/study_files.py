@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt.files import atomically, check, suffix
+from loomopt.base.files import atomically, check, suffix
+from loomopt.base.units import show
 from loomopt.provenance import csv
 from loomopt.studies import study_table
 from loomopt.studies.findings import Change, SceneStudy, counted
 from loomopt.studies.rows import Row
 from loomopt.studies.study_table import Column
-from loomopt.units import show
 from loomopt.views import outputs
 from loomopt.views.layout import Grid, joined
 

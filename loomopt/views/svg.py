@@ -3,6 +3,7 @@
 import math
 from xml.etree import ElementTree
 
+from loomopt.base.units import factor
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     CAPITAL,
@@ -21,7 +22,6 @@ from loomopt.picture.shapes import (
     plain,
     scaled,
 )
-from loomopt.units import factor
 
 
 def render(drawing: Drawing) -> str:

@@ -3,15 +3,15 @@
 import math
 from typing import TYPE_CHECKING
 
+from loomopt.base.quantities import exact
+from loomopt.base.units import factor
 from loomopt.jobs import registry
-from loomopt.quantities import exact
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution, remedies
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
 from loomopt.tables import rows
 from loomopt.tolerances import SLACK
-from loomopt.units import factor
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import random
 import pytest
 from test_benchmarks_small import FOLDER
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 
 COUNTS = {"scenes": 150, "designs": 100, "tables": 100, "calls": 30}

@@ -3,8 +3,8 @@
 import math
 from importlib.metadata import EntryPoint
 
+from loomopt.base.quantities import Coordinate, PositiveLength, PureNumber
 from loomopt.effects.kinds import Axis, Check, Demand, Load, Speed
-from loomopt.quantities import Coordinate, PositiveLength, PureNumber
 from loomopt.schema import Figure, Table
 
 BEGINS, ENDS = 1.1, 2.6

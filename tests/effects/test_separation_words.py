@@ -12,11 +12,11 @@ from flying_frames import JOB, ON, RUBBED, SLOW, figures
 
 import loomopt as lo
 from loomopt import tables
+from loomopt.base.errors import BadInput
+from loomopt.base.units import factor
 from loomopt.effects.shedding import separation, weight
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.studies import accuracy
-from loomopt.units import factor
 from loomopt.views import scene_view
 
 

@@ -8,12 +8,12 @@ from twisting_shafts import CENTRES, HALF, J4, OMEGA, PLAIN, read, sampler, shaf
 
 import loomopt as lo
 from loomopt import maths, tables
+from loomopt.base.quantities import exact
 from loomopt.cli import run
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.program import settled
 from loomopt.program.sampling import Sampler
-from loomopt.quantities import exact
 
 # What it takes away, what it refuses, what it says ------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import maths
+from loomopt.base.errors import BadInput
 from loomopt.cycle import Node
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.program.reading import DATUM
 from loomopt.studies import accuracy, front

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.views import scene_view
 

@@ -6,7 +6,7 @@ import pickle
 import pytest
 
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.studies import check
 

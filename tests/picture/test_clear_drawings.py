@@ -11,7 +11,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import packaged
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.mechanisms import crank_rocker_synthesis
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.program.sampling import sampled
 

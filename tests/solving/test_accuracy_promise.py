@@ -11,7 +11,7 @@ from shedding_cases import plain, programmed
 
 import loomopt as lo
 from loomopt import tables
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.tolerances import GAUSS_NODES
 

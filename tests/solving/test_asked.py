@@ -3,7 +3,7 @@
 import pytest
 import toy
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.solving.asked import check_numbers, target_name
 from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 

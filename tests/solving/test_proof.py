@@ -9,7 +9,7 @@ import pytest
 from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.packaged import problem_names
 from loomopt.solving import bounded
 from loomopt.studies.check import served

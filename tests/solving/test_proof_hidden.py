@@ -12,7 +12,7 @@ from shedding_by_hand import plain
 from shedding_cases import flat, freed, product
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.program.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes

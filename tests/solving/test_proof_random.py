@@ -12,7 +12,7 @@ from shedding_by_hand import RPM, lopsided, plain, softest
 from shedding_by_hand import product as framed
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 
 near = st.floats(-0.05, 0.05)
 PEAK_ACCELERATION = "limits.peak_acceleration.max", "m/rad^2"

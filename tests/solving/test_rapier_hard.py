@@ -7,7 +7,7 @@ import pytest
 from rapier_by_hand import LENGTHS, OPERATION
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 
 HARD: dict[str, dict[str, object]] = {
     "second crank of no length": {"mechanism.l4": "1e-6 mm", "bounds.l4": "1e-6 mm"},

@@ -5,9 +5,9 @@ import math
 import pytest
 
 import loomopt as lo
+from loomopt.base.units import factor
 from loomopt.solving.rounding import LEAST_DIGITS, digits, roundings
 from loomopt.solving.words import Words
-from loomopt.units import factor
 from loomopt.views import layout, terminal
 
 CASES = [("beatup", "retrofit"), ("beatup-heavy", "torque"), ("rapier", "stroke-dwell"), ("shedding", "speed")]

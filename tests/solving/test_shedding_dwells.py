@@ -3,7 +3,7 @@
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.solving import kkt
 
 G, T1, T2, H, X0 = 369.55, 124.545, 83.03, 0.0656, 0.08

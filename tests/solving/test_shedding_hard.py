@@ -8,7 +8,7 @@ import pytest
 from shedding_by_hand import peak, plain, product, softest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.solving.certificate import certify
 

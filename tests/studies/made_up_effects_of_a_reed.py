@@ -4,10 +4,10 @@ import copy
 from dataclasses import replace
 
 from loomopt import scenes
+from loomopt.base.quantities import Torque
 from loomopt.effects.kinds import Clash, Load, ranked
 from loomopt.jobs.beatup.scene import SCHEMA
 from loomopt.jobs.registry import load
-from loomopt.quantities import Torque
 from loomopt.schema import Table
 
 

@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from loomopt import packaged
+from loomopt.base.errors import BadInput
 from loomopt.cli import run
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.solving import engine

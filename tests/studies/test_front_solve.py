@@ -8,8 +8,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import results
-from loomopt.errors import BadInput
-from loomopt.studies import front, front_plan, front_solve, runs
+from loomopt.base.errors import BadInput
+from loomopt.studies import front, front_plan, front_read, front_solve, runs
 from loomopt.studies.front_solve import Asking
 from loomopt.studies.plan import Task
 
@@ -60,7 +60,7 @@ def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
 def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     """The least l3 needs the shortest crank, whose price what is held of l3 may carry too."""
     trade = front.trade(lo.load("beatup"), ("l1", "l3"))
-    found = front.read(trade, runs.run(trade))
+    found = front_read.read(trade, runs.run(trade))
     assert found.message.startswith("l1 and l3 do not conflict: one design is best in both.")
     assert found.values("l1") == pytest.approx([0.03])
     assert found.values("l3") == pytest.approx([0.147938261848])
@@ -76,7 +76,7 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
         assert front_plan.value(row, "K1") == pytest.approx(stiffness, rel=1e-10)
         assert row.figures["contact_speed"] == pytest.approx(speed * RPM, rel=1e-10)
         assert row.figures["speed"] == pytest.approx(600 * RPM)
-    found = front.read(trade, rows)
+    found = front_read.read(trade, rows)
     assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
     assert found.changes[0]["kind"] == "kink"
 
@@ -85,7 +85,7 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
 def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_read_at_the_scenes_speed(axes):
     scene = lo.load("shedding")
     trade = front.trade(scene, axes, points=4)
-    found = front.read(trade, runs.run(trade))
+    found = front_read.read(trade, runs.run(trade))
     assert len(found.rows) >= 4
     assert all(row.certified for row in found.rows)
     assert min(found.values("contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.studies import ranges
 from loomopt.studies.lattice import COARSE, Lattice
 

@@ -14,8 +14,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import results
+from loomopt.base.errors import BadInput
 from loomopt.design_study import DesignStudy
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.studies import front
 from loomopt.studies.store import Store

@@ -9,7 +9,7 @@ from multiprocessing import get_context
 import pytest
 from made_up_study import Chain
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.studies import executors, runs, workers
 from loomopt.studies.rows import Row, digest
 from loomopt.studies.store import Store

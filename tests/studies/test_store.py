@@ -4,7 +4,7 @@ import sqlite3
 
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.studies.rows import Row
 from loomopt.studies.store import Store
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.solving.solution import Solution
 from loomopt.studies import runs, sweep
 from loomopt.studies.rows import digest

@@ -8,7 +8,7 @@ import pytest
 import uncoiled
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.views import curve_figure, figure, svg
 

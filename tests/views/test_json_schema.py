@@ -12,13 +12,12 @@ import pytest
 
 import loomopt as lo
 from loomopt import packaged
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Quantity, foreign, pattern_schema, read
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
 from loomopt.cli import run
-from loomopt.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.quantities import Quantity, read
-from loomopt.quantity_patterns import foreign, schema
 from loomopt.scenes import TABLES
-from loomopt.units import DISPLAY_UNIT, SI_UNIT, fits
 from loomopt.views import json_schema
 
 JOBS = registry.own_names()
@@ -125,7 +124,7 @@ def test_an_effect_asks_for_what_it_needs():
 
 @pytest.mark.parametrize("kind", [kind for kind in SI_UNIT if kind != "number"])
 def test_patterns_tell_kinds_apart_by_their_usual_units_as_the_program_does(kind):
-    of_kind = schema(kind, *Quantity(kind)[1:], "")
+    of_kind = pattern_schema(kind, *Quantity(kind)[1:], "")
     units = {*SI_UNIT.values(), *DISPLAY_UNIT.values(), *inch.UNITS.values(), "kN/mm", "lbf/in", "kg*mm^2"} - {"1"}
     for unit in units:
         right = {key: value for key, value in of_kind.items() if not key.startswith("x-")}

@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
+from loomopt.base.errors import BadInput
 from loomopt.cli import run
-from loomopt.errors import BadInput
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.views import outputs
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import loomopt as lo
-from loomopt import files
+from loomopt.base import files
+from loomopt.base.errors import BadInput
 from loomopt.cli import run
-from loomopt.errors import BadInput
 from loomopt.solving import engine
 from loomopt.views import outputs
 

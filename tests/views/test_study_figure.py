@@ -9,7 +9,7 @@ import overlaps
 import pytest
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.studies import front, sweep
 from loomopt.studies.rows import Row
 from loomopt.views import study_figure

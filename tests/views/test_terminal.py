@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt import api
+from loomopt.base.quantities import read
 from loomopt.effects import found
 from loomopt.jobs.registry import load
-from loomopt.quantities import read
 from loomopt.solving.words import Words
 from loomopt.views import layout, scene_view, terminal
 from loomopt.views.layout import Grid

@@ -6,10 +6,10 @@ and both one-sided values are shown. The crank turns forward, so sgn q˙ depends
 
 from pydantic import Field
 
+from loomopt.base.quantities import RotaryDamping, Torque
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import RotaryDamping, Torque
 from loomopt.schema import Table, Values
 
 

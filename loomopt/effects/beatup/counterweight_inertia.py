@@ -5,10 +5,10 @@ Output term JS q¨, the J_s,4e of [Yuan24, eq 10]; it does not change with the c
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveInertia
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveInertia
 from loomopt.schema import Table, Values
 
 

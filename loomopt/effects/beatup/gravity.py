@@ -6,10 +6,10 @@ shaft, the counterweight opposite; tilt is the angle of A→D from the horizonta
 
 from pydantic import Field
 
+from loomopt.base.quantities import Angle
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Angle
 from loomopt.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665

@@ -5,10 +5,10 @@ Output term J4 q¨ with J4 = J4⁰ + m4e r4e² [Yuan24, eq 2 and 10]; rigid reed
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveInertia
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveInertia
 from loomopt.schema import Table, Values
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from loomopt.base.quantities import PulseAngle
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PulseAngle
 from loomopt.schema import Table, Values
 
 if TYPE_CHECKING:

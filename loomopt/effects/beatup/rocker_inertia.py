@@ -5,10 +5,10 @@ Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis.
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveInertia
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveInertia
 from loomopt.schema import Table, Values
 
 

@@ -9,10 +9,11 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from loomopt.base.quantities import Length, PositiveInertia, PositiveMass
+from loomopt.base.units import QuantityError
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Length, PositiveInertia, PositiveMass, QuantityError
 from loomopt.schema import Table, Values
 
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
 from loomopt.effects.kinds import Clash, Peak, State
 from loomopt.maths import FLOAT, Maths, Number
-from loomopt.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveInertia, PositiveTorque, Share
 from loomopt.effects.kinds import Speed
 from loomopt.maths import FLOAT, Maths, Number
-from loomopt.quantities import PositiveInertia, PositiveTorque, Share
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

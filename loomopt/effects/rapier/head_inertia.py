@@ -5,9 +5,9 @@ Output term m S¨: the force the tape must carry; times S' it reaches the main s
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveMass
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveMass
 from loomopt.schema import Table, Values
 
 

@@ -7,9 +7,9 @@ import math
 
 from pydantic import Field
 
+from loomopt.base.quantities import Force
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Force
 from loomopt.schema import Table, Values
 
 

@@ -8,11 +8,11 @@ import math
 
 from pydantic import Field
 
+from loomopt.base.quantities import PositiveStiffness
+from loomopt.base.units import Shown
 from loomopt.effects.kinds import Check, Motion
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveStiffness
 from loomopt.schema import Figure, Table, Values
-from loomopt.units import Shown
 
 MASS, ACCELERATION = "head_inertia.mass", "S''_stroke"
 """What it reads of the head: its mass, kg, and its acceleration at the hand-over, m/rad²."""

@@ -10,12 +10,12 @@ from typing import Literal
 
 from pydantic import Field
 
+from loomopt.base.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
+from loomopt.base.units import Shown, usual
 from loomopt.effects.kinds import Axis, Check, Demand
 from loomopt.maths import FLOAT, Maths, Number
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
-from loomopt.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
 from loomopt.schema import Figure, Table, Values
-from loomopt.units import Shown, usual
 
 INDEX = 4.0, 12.0
 """Spring indices that can be wound."""

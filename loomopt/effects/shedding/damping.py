@@ -2,10 +2,10 @@
 
 from pydantic import Field
 
+from loomopt.base.quantities import Damping
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Damping
 from loomopt.schema import Table, Values
 
 

@@ -6,10 +6,10 @@ It jumps where the frame starts and stops. In a dwell it is any value in [−F, 
 
 from pydantic import Field
 
+from loomopt.base.quantities import Force
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Force
 from loomopt.schema import Table, Values
 
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from loomopt.base.quantities import Quantity
 from loomopt.effects.kinds import Clash, Event, Motion, Rule, Terms
-from loomopt.quantities import Quantity
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ The spring's own waves are left out: with them the least stiffness moves by less
 
 from pydantic import Field
 
+from loomopt.base.quantities import Mass
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Mass
 from loomopt.schema import Table, Values
 
 

@@ -5,10 +5,10 @@ A frame whose weight presses the roller on the cam instead has a negative G.
 
 from pydantic import Field
 
+from loomopt.base.quantities import SignedForce
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
 from loomopt.maths import Maths, Number
-from loomopt.quantities import SignedForce
 from loomopt.schema import Table, Values
 
 

@@ -5,7 +5,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
+from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import crank_rocker, crank_rocker_faults
@@ -14,7 +15,6 @@ from loomopt.picture.shapes import Arc, Drawing, Point, Primitive
 from loomopt.picture.skeleton import Mass, Skeleton
 from loomopt.picture.symbols import POINTER, angle_between, pointer
 from loomopt.picture.units import METRIC, Units
-from loomopt.units import show
 
 REED, COUNTERWEIGHT = "G", "E"
 MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}

@@ -11,9 +11,9 @@ from typing import Any
 
 from loomopt import balance
 from loomopt.balance import Given
+from loomopt.base.records import lazy
 from loomopt.cycle import Node, Where
 from loomopt.effects.kinds import Effect, Load, Motion
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import drive

@@ -4,8 +4,8 @@ import functools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from loomopt.base.errors import BadInput
 from loomopt.effects.kinds import Check, Load
-from loomopt.errors import BadInput
 from loomopt.jobs import base
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.design import BALANCE

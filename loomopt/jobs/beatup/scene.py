@@ -5,16 +5,16 @@ from typing import Any
 
 from pydantic import Field
 
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
+from loomopt.base.units import Shown, usual
 from loomopt.effects import found
-from loomopt.errors import BadInput
 from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.mechanisms import crank_rocker_faults
 from loomopt.program import drive
-from loomopt.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.units import Shown, usual
 
 
 class Operation(Table):

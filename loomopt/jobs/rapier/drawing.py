@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt import maths
+from loomopt.base.errors import BadInput
 from loomopt.cycle import TURN, Floats
-from loomopt.errors import BadInput
 from loomopt.jobs.rapier.model import DIMENSIONS
 from loomopt.maths import FLOAT
 from loomopt.mechanisms import rapier_faults, turning_points

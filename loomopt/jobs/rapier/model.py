@@ -12,9 +12,9 @@ from typing import Any
 
 from loomopt import maths as systems
 from loomopt.balance import Given
+from loomopt.base.records import lazy
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Effect, Motion
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms import rapier_drive, turning_points
 from loomopt.mechanisms.dyad import Vector, dot

@@ -4,9 +4,10 @@ import functools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from loomopt.base.errors import BadInput
+from loomopt.base.records import Frozen
+from loomopt.base.refusals import refusal
 from loomopt.effects.kinds import Check
-from loomopt.errors import BadInput
-from loomopt.frozen import Frozen
 from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
@@ -19,7 +20,6 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.scene_errors import refusal
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
 

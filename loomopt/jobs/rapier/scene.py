@@ -6,13 +6,13 @@ from typing import Any
 from pydantic import Field
 
 from loomopt import scene_csv
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
+from loomopt.base.refusals import refusal
 from loomopt.effects import found
-from loomopt.errors import BadInput
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.mechanisms import rapier_faults
 from loomopt.program import drive
-from loomopt.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
-from loomopt.scene_errors import refusal
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Axis, Conflict, Figure, Table, Target

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt import maths, provenance
+from loomopt.base.refusals import refusal
+from loomopt.base.units import factor, show
 from loomopt.cycle import Floats, Pieces
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
@@ -25,10 +27,8 @@ from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.picture.symbols import arrow, fixed_pivot
 from loomopt.picture.units import Units, told
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
-from loomopt.units import factor, show
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"

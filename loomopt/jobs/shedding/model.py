@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from loomopt.balance import Given
+from loomopt.base.records import lazy
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.effects.shedding import FramePose as Frame
-from loomopt.lazy import lazy
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives

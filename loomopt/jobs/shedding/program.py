@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
+from loomopt.base.refusals import refusal
 from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
@@ -21,7 +22,6 @@ from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, de
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
 from loomopt.program.sampling import sampled
 from loomopt.program.speeds import followed
-from loomopt.scene_errors import refusal
 from loomopt.scenes import Scene
 from loomopt.tolerances import START_ROOM
 

@@ -7,14 +7,9 @@ from typing import Any, Literal
 from pydantic import Field, create_model
 
 from loomopt import scene_csv
-from loomopt.effects import found
-from loomopt.errors import BadInput
-from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
-from loomopt.mechanisms import cam_follower, cam_spline
-from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
-from loomopt.program import drive
-from loomopt.program.numbers import check_known
-from loomopt.quantities import (
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import (
+    NARROWEST,
     Angle,
     Force,
     Length,
@@ -25,12 +20,18 @@ from loomopt.quantities import (
     Speed,
     Stiffness,
 )
-from loomopt.scene_errors import refusal
+from loomopt.base.refusals import refusal
+from loomopt.base.units import Shown, usual
+from loomopt.effects import found
+from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
+from loomopt.mechanisms import cam_follower, cam_spline
+from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.program import drive
+from loomopt.program.numbers import check_known
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.tolerances import NARROWEST, SAME_ANGLE
-from loomopt.units import Shown, usual
+from loomopt.tolerances import SAME_ANGLE
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt import maths
+from loomopt.base.records import lazy
 from loomopt.boxes import PI, Enclosure, Floats, Interval, interval
 from loomopt.cycle import TURN, Node, Where
-from loomopt.lazy import lazy
 from loomopt.maths import Number
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.task import Task

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.program.program import Limit, Objective, Program, Variable, Wish
 from loomopt.tolerances import NO_MASS

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.mechanisms import crank_rocker_synthesis

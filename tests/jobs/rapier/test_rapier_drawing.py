@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from loomopt import maths
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier import drawing as rapier_drawing
 from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
 from loomopt.mechanisms import rapier_drive

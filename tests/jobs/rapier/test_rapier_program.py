@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.jobs.rapier.program import constructed

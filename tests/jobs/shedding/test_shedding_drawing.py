@@ -13,7 +13,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import designs
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import drawing as shedding_drawing

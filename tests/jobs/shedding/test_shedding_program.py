@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
 from loomopt.jobs.shedding.scene import Frame

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import PositiveLength, Speed
+from loomopt.base.units import Shown
 from loomopt.effects import found
-from loomopt.errors import BadInput
-from loomopt.quantities import PositiveLength, Speed
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
 from loomopt.schema import Figure, Table, Target
-from loomopt.units import Shown
 from loomopt_press.model import LONGER
 
 

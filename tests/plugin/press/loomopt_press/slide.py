@@ -1,8 +1,8 @@
 """Inertia of the slide and its die: output term m q¨."""
 
+from loomopt.base.quantities import PositiveMass
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
-from loomopt.quantities import PositiveMass
 from loomopt.schema import Table, Values
 
 

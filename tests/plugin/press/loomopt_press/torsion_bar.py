@@ -2,10 +2,10 @@
 
 from typing import Annotated
 
+from loomopt.base.quantities import Angle, Quantity
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
 from loomopt.maths import Maths, Number
-from loomopt.quantities import Angle, Quantity
 from loomopt.schema import Table, Values
 
 

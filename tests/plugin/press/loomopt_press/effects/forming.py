@@ -1,9 +1,9 @@
 """Forming of the sheet: output term F from where the slide meets it, `height` above its lowest position."""
 
+from loomopt.base.quantities import Force, PositiveLength
 from loomopt.effects.kinds import Load, Motion
 from loomopt.maths import Maths, Number
 from loomopt.mechanisms.dyad import heron
-from loomopt.quantities import Force, PositiveLength
 from loomopt.schema import Table, Values
 
 

@@ -15,28 +15,74 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from loomopt.quantity_patterns import NUMBER as _NUMBER
-from loomopt.quantity_patterns import schema
-from loomopt.tolerances import NARROWEST
-from loomopt.units import DISPLAY_UNIT as DISPLAY_UNIT
-from loomopt.units import SI_UNIT as SI_UNIT
-from loomopt.units import UNITS as UNITS
-from loomopt.units import QuantityError as QuantityError
-from loomopt.units import Unit
-from loomopt.units import ascii_unit as ascii_unit
-from loomopt.units import factor as factor
-from loomopt.units import fits as fits
-from loomopt.units import parse_unit as parse_unit
-from loomopt.units import show as show
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, Unit, fits, parse_unit, show
+
+NARROWEST = 1e-10
+"""rad: the least pulse, rise and return; a hundred times SAME_ANGLE."""
+
+
+NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+QUANTITY_PATTERN = "x-quantity"
+_UNIT_PATTERN = r"(?:1/)?[^\s0-9.,+-][^\s,]*"
+_NEVER = (r"k?N(?:m|cm|mm)", "1/(?:s|ms|us|min|h)")
+"""Often written, and no unit of any quantity: torques without their *, and what says neither turns nor radians."""
+_NEGATIVE, _ZERO = r"^[ \t]*-[0-9.]*[1-9]", r"^[ \t]*[+-]?[0.]+(?:[eE][+-]?[0-9]+)?(?:[^0-9.eE].*)?$"
+_RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
+
+
+def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
+    """Return the JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
+
+    Under the key `QUANTITY` stands a name that equal ones share.
+    """
+    refused = [_NEGATIVE] if max(least, above) >= 0 else []
+    refused += [_ZERO] if above >= 0 else []
+    text: dict[str, Any] = {"type": "string", "pattern": _RATIO_PATTERN}
+    if kind != "number":
+        text["pattern"] = rf"^[ \t]*{NUMBER_PATTERN} *{_UNIT_PATTERN}[ \t]*$"
+        refused.append(rf"^[ \t]*{NUMBER_PATTERN} *(?:{foreign(kind)})[ \t]*$")
+    if refused:
+        text["not"] = {"anyOf": [{"pattern": pattern} for pattern in refused]}
+    head = {QUANTITY_PATTERN: _name(kind, least, above, below), "description": allowed}
+    if kind != "number":
+        return {**head, **text}
+    ends = {"minimum": least, "exclusiveMinimum": above, "exclusiveMaximum": below}
+    number = {"type": "number"} | {name: end for name, end in ends.items() if math.isfinite(end)}
+    return {**head, "anyOf": [number, text]}
+
+
+def _name(kind: str, least: float, above: float, below: float) -> str:
+    """Return a name for quantities of a kind and a range."""
+    unit, ends = DISPLAY_UNIT[kind], (("from", least), ("above", above), ("below", below))
+    return " ".join([kind, *(f"{word} {show(end, unit)}" for word, end in ends if math.isfinite(end))])
+
+
+@functools.cache
+def foreign(kind: str) -> str:
+    """Return a pattern of units that are usual for other kinds of quantity and wrong for this one."""
+    single = [re.escape(name) for name in UNITS if not fits(name, kind)]
+    composed = {_usual(unit) for unit in SI_UNIT.values() if unit not in UNITS and unit != "1" and not fits(unit, kind)}
+    return "|".join([*single, *sorted(composed), *_NEVER])
+
+
+def _usual(unit: str) -> str:
+    """Return a pattern of an SI unit with each of its names exchanged for any other of the same dimension."""
+
+    def names(match: re.Match[str]) -> str:
+        alike = [name for name in UNITS if UNITS[name].powers == UNITS[match[0]].powers]
+        return f"(?:{'|'.join(alike)})"
+
+    return re.sub("[A-Za-z]+", names, re.sub(r"([*^()])", r"\\\1", unit))
+
 
 _SHOWN_NUMBER = {"length": "31", "angle": "23", "angular speed": "600", "torque": "745", "inertia": "0.62"}
 _LONGEST_TEXT = 100
 _MOST_DIGITS, _MOST_ZEROS = 20, 16
 _MOST_REMEMBERED = 4096
 _SMALLEST, _LARGEST = Fraction(1, 10**60), Fraction(10**60)
-_PLAIN = re.compile(_NUMBER)
-_QUANTITY = re.compile(rf"({_NUMBER}) *(.*)", re.DOTALL)
-_RATIO = re.compile(rf"({_NUMBER})(?: */ *({_NUMBER}))?")
+_PLAIN = re.compile(NUMBER_PATTERN)
+_QUANTITY = re.compile(rf"({NUMBER_PATTERN}) *(.*)", re.DOTALL)
+_RATIO = re.compile(rf"({NUMBER_PATTERN})(?: */ *({NUMBER_PATTERN}))?")
 _FRACTION = re.compile(r"(?:([0-9]{1,9}) +)?([0-9]{1,9}) */ *([0-9]{1,9}) *([a-z]*)")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ _'’\u00a0\u202f][0-9]{3})+(?![0-9])")
 _ARITHMETIC = re.compile(r"[0-9.] *(?:\*\*|[-+*/^]) *\(?[0-9.]|(?<![eE])\+ *[0-9]|[-*/^] +[0-9]")
@@ -174,7 +220,7 @@ def _misreading(text: str, kind: str, problem: str = "", remedy: str = "") -> Qu
         return _refusal(kind, "a comma stands in the number", "Write a decimal point and no thousands separators")
     if _GROUPED.match(text):
         return _refusal(kind, "the digits are grouped", "Write the digits without separators")
-    if kind == "angular speed" and re.fullmatch(rf"{_NUMBER} */ *(min|s|sec)", text):
+    if kind == "angular speed" and re.fullmatch(rf"{NUMBER_PATTERN} */ *(min|s|sec)", text):
         return _refusal(kind, "it does not say whether turns or radians are counted", "Write rpm or rad/s")
     fraction = _FRACTION.fullmatch(text)
     if fraction:
@@ -233,7 +279,7 @@ class Quantity(NamedTuple):
         """Return what an editor may check of it."""
         kind, least, above, below = self
         said = f"{described(kind)}, {self.range}" if self.range else described(kind)
-        return schema(kind, least, above, below, said)
+        return pattern_schema(kind, least, above, below, said)
 
 
 class NumberList(NamedTuple):

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from loomopt.errors import BadInput
+from loomopt.base.errors import BadInput
 
 PROBE = 1_000_000
 """Bytes for which a disk must have room before anything long is computed: four times the largest packaged answer."""

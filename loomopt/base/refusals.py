@@ -5,10 +5,9 @@ from collections.abc import Iterable, Sequence
 
 from pydantic import BaseModel, ValidationError
 
-from loomopt.errors import BadInput
-from loomopt.errors import clean as clean
-from loomopt.quantities import described, quantity_of
-from loomopt.units import QuantityError
+from loomopt.base.errors import BadInput, clean
+from loomopt.base.quantities import described, quantity_of
+from loomopt.base.units import QuantityError
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450
 _NOTHING = object()
