@@ -13,7 +13,7 @@ import harness
 import numpy as np
 import plain_beatup as plain
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 from loomopt.mechanisms.crank_rocker import Lengths, Pose
 
@@ -25,7 +25,7 @@ DIGITS, EXACT = 40, 200
 
 def exact(phi):
     """Return ψ, ψ', ψ'' by mpmath, a position at a time."""
-    m = maths.mpmath(DIGITS)
+    m = systems.mpmath(DIGITS)
     lengths = Lengths(*map(m.number, LENGTHS))
     poses = [Pose(m, lengths, m.number(float(angle))) for angle in phi]
     return np.array([[float(x) for x in (pose.psi, pose.psi_1, pose.psi_2)] for pose in poses]).T
@@ -34,7 +34,7 @@ def exact(phi):
 def symbolic():
     """Return the same formula as a CasADi function of φ."""
     phi = ca.SX.sym("phi")
-    pose = Pose(maths.casadi(), Lengths(*LENGTHS), phi)
+    pose = Pose(systems.casadi(), Lengths(*LENGTHS), phi)
     return ca.Function("curves", [phi], [ca.vertcat(pose.psi, pose.psi_1, pose.psi_2)])
 
 

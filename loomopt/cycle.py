@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base.records import lazy
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.schema import Values
 from loomopt.tolerances import SAME_ANGLE
 

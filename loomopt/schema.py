@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 
 
 class Table(BaseModel):

@@ -251,14 +251,6 @@ differences of the curvatures, extrapolated: their rounding of 1e-16/1e-3 = 1e-1
 NEWTON_SHIFT = "1e-3"
 """How far, in u, one Newton step may move a sampled extreme: it is right to 1e-8, what moves farther is no extreme."""
 
-CONE_STEPS = 30
-"""Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A
-heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
-missed; with one step some are (tests/solving/test_cone.py)."""
-
-CONE_OPEN, CONE_TIP = 1e-9, 1e-9
-"""Slope up to which a unit direction does not leave a limit, and length below which a projection is the cone's tip:
-what non-negative least squares leaves of ROUNDING times the condition of a few dozen slopes."""
 
 PROBES = 1e-2, 3e-3
 """Steps along a direction without curvature at which the Lagrangian is read: at both of them it must fall."""
@@ -316,9 +308,6 @@ Proofs of all packaged scenes take a tenth more readings with 0.5, tops inside a
 SLACK, LEAST_SLACK, MOST_SLACK = 1e-8, 1e-13, 0.1
 """What a proof leaves open, relative to a quantity's largest magnitude: usual, what balls resolve, most allowed."""
 
-NNLS_PULL, NNLS_GONE, NNLS_RANK, NNLS_EXCHANGES = 1e-13, 1e-15, 1e-14, 10
-"""Non-negative least squares: pull of a column that enters, size of one that leaves, singular value that counts, each
-about a hundred roundings; exchanges allowed per column (Lawson and Hanson need about one)."""
 
 ROUNDED = 1e-15
 """Nothing is known better, relative to its natural size: the least error an answer claims."""

@@ -4,11 +4,12 @@ import math
 
 import pytest
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.balance import Given, Pose
 from loomopt.effects.beatup.inertia import EFFECT as INERTIA
 from loomopt.effects.beatup.resistance import EFFECT as RESISTANCE
 from loomopt.effects.kinds import Load
+from loomopt.maths import systems
 from loomopt.schema import Table
 
 POSE = Pose(phi=1.2, omega=60.0, q=-1.7, q1=0.25, q2=-0.3)
@@ -30,12 +31,12 @@ def given(*loads):
 
 def test_the_output_force_is_the_sum_of_output_terms_alone():
     loads = load("a", 3.0), load("b", 100.0, "drive"), load("c", -5.0)
-    assert balance.output_force(maths.FLOAT, loads, POSE, given(*loads), {}) == -2.0
+    assert balance.output_force(systems.FLOAT, loads, POSE, given(*loads), {}) == -2.0
 
 
 def test_output_terms_reach_the_crank_through_q_prime_and_drive_terms_as_they_are():
     loads = load("a", 3.0), load("b", 100.0, "drive"), load("c", -5.0)
-    assert balance.crank_torque(maths.FLOAT, loads, POSE, given(*loads), {}) == -2.0 * 0.25 + 100.0
+    assert balance.crank_torque(systems.FLOAT, loads, POSE, given(*loads), {}) == -2.0 * 0.25 + 100.0
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,7 @@ def test_output_terms_reach_the_crank_through_q_prime_and_drive_terms_as_they_ar
     ],
 )
 def test_absent_kinds_of_terms_are_absent_from_the_sums(loads, force, torque):
-    arguments = (maths.FLOAT, loads, POSE, given(*loads), dict[str, float]())
+    arguments = (systems.FLOAT, loads, POSE, given(*loads), dict[str, float]())
     assert balance.output_force(*arguments) == force
     assert balance.crank_torque(*arguments) == torque
 
@@ -55,7 +56,7 @@ def test_absent_kinds_of_terms_are_absent_from_the_sums(loads, force, torque):
 def test_a_drive_alone_needs_no_output_motion():
     nothing_known = Pose(phi=1.2, omega=None, q=None, q1=None, q2=None)
     loads = (load("b", 7.0, "drive"),)
-    assert balance.crank_torque(maths.FLOAT, loads, nothing_known, given(*loads), {}) == 7.0
+    assert balance.crank_torque(systems.FLOAT, loads, nothing_known, given(*loads), {}) == 7.0
 
 
 def test_each_load_is_handed_its_own_switch_and_its_own_values():
@@ -67,13 +68,13 @@ def test_each_load_is_handed_its_own_switch_and_its_own_values():
 
     loads = [Load(name=name, summary="", own=Table, acts="output", force=force) for name in ("a", "b")]
     numbers = Given({"M0": 1.0}, {"a": {"x": 1.0}, "b": {"y": 2.0}})
-    assert balance.output_force(maths.FLOAT, loads, POSE, numbers, {"b": 20.0, "a": 10.0, "c": 1.0}) == 30.0
+    assert balance.output_force(systems.FLOAT, loads, POSE, numbers, {"b": 20.0, "a": 10.0, "c": 1.0}) == 30.0
     assert seen == [({"M0": 1.0}, {"x": 1.0}, 10.0), ({"M0": 1.0}, {"y": 2.0}, 20.0)]
 
 
 def test_a_load_without_corners_is_handed_0_for_a_switch():
     loads = load("a", lambda switch: switch), load("b", lambda switch: 10 + switch)
-    assert balance.output_force(maths.FLOAT, loads, POSE, given(*loads), {"b": 5.0}) == 15.0
+    assert balance.output_force(systems.FLOAT, loads, POSE, given(*loads), {"b": 5.0}) == 15.0
 
 
 def test_total_adds_no_zero_of_its_own():
@@ -100,6 +101,6 @@ def test_velocity_and_acceleration_of_the_output(omega_dot, acceleration):
 def test_terms_come_in_the_order_of_the_loads_with_their_numbers():
     loads = (INERTIA, RESISTANCE)
     numbers = Given({"s": 0.0, "M0": 745.0, "beta": 1.2}, {"inertia": {"J4": 0.62}, "resistance": {"pulse": 0.52}})
-    found = [(each.name, term) for each, term in balance.terms(maths.FLOAT, loads, POSE, numbers, {"resistance": 1})]
+    found = [(each.name, term) for each, term in balance.terms(systems.FLOAT, loads, POSE, numbers, {"resistance": 1})]
     assert found == [("inertia", 0.62 * -0.3 * 60.0**2), ("resistance", pytest.approx(745.0 * math.cos(0)))]
-    assert list(balance.terms(maths.FLOAT, (), POSE, NOTHING, {})) == []
+    assert list(balance.terms(systems.FLOAT, (), POSE, NOTHING, {})) == []

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from loomopt import boxes, maths
-from loomopt.box_series import Series, along
-from loomopt.boxes import Interval, variable
+from loomopt.maths import intervals, systems
+from loomopt.maths.interval_series import Series, along
+from loomopt.maths.intervals import Interval, variable
 
-M, MP = maths.box_series(), maths.mpmath()
+M, MP = systems.box_series(), systems.mpmath()
 ROOM = 1e-17
 """What differences leave."""
 FORMULAS = {
@@ -43,9 +43,9 @@ def test_terms_hold_those_in_40_digits(name):
         true = taylor(FORMULAS[name], *(MP.number(float(v)) for v in at[:, k]))
         there = taylor(FORMULAS[name], MP.number(float(at[0, k])), MP.number(float(middle[1, k])))
         for term, value, other in zip(found.terms, true, there, strict=True):
-            v = term.v if isinstance(term, boxes.Enclosure) else term
+            v = term.v if isinstance(term, intervals.Enclosure) else term
             assert float(v.low.ravel()[0]) - ROOM <= value <= float(v.high.ravel()[0]) + ROOM
-            if isinstance(term, boxes.Enclosure):
+            if isinstance(term, intervals.Enclosure):
                 ends = [
                     float(e.ravel()[0]) * (MP.number(float(at[1, k])) - MP.number(float(middle[1, k])))
                     for e in (term.g.low, term.g.high)

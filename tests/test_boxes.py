@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import boxes, maths
 from loomopt.balance import Given
-from loomopt.boxes import PI, TRIG_ERROR, Enclosure, Interval, chosen, interval, variable
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.maths import intervals, systems
+from loomopt.maths.intervals import PI, TRIG_ERROR, Enclosure, Interval, chosen, interval, variable
 
-M, MP = maths.boxes(), maths.mpmath()
+M, MP = systems.boxes(), systems.mpmath()
 FORMULAS = {
     "sum": lambda m, x, y: 3 - (x + y) - (2 - y) + 1,
     "product": lambda m, x, y: 2 * x * y * 0.5 - x * x,
@@ -69,7 +69,7 @@ def test_every_operation_holds_the_value_in_40_digits_at_10000_random_boxes_toge
 @pytest.mark.parametrize("far", [1.0, 20.0, 1e6])
 def test_sines_are_right_to_the_error_that_is_stated(far):
     x = np.random.default_rng(3).uniform(-far, far, 3000)
-    found = boxes.sin(interval(x)), boxes.cos(interval(x))
+    found = intervals.sin(interval(x)), intervals.cos(interval(x))
     for k, angle in enumerate(x):
         for each, true in zip(found, (MP.sin(MP.number(float(angle))), MP.cos(MP.number(float(angle)))), strict=True):
             assert each.low[k] <= true <= each.high[k]
@@ -78,22 +78,22 @@ def test_sines_are_right_to_the_error_that_is_stated(far):
 
 
 def test_sines_hold_their_tops_and_what_is_too_far_to_reduce():
-    whole = boxes.sin(Interval([1.5, 4.6, -0.1, 0.1, 2e6], [1.7, 4.8, 0.1, 7.0, 2e6]))
+    whole = intervals.sin(Interval([1.5, 4.6, -0.1, 0.1, 2e6], [1.7, 4.8, 0.1, 7.0, 2e6]))
     assert whole.high[0] == 1.0
     assert whole.low[1] == -1.0
     assert whole.low[2] < -0.0998 < 0.0998 < whole.high[2] < 0.0999
     assert (whole.low[3], whole.high[3]) == (whole.low[4], whole.high[4]) == (-1.0, 1.0)
-    assert boxes.cos(Interval(-0.1, 0.2)).high == 1.0
-    assert boxes.cos(Interval(3.0, 3.2)).low == -1.0
+    assert intervals.cos(Interval(-0.1, 0.2)).high == 1.0
+    assert intervals.cos(Interval(3.0, 3.2)).low == -1.0
 
 
 def test_angles_are_right_whatever_numpy_says(monkeypatch):
     rng = np.random.default_rng(5)
     y, x = rng.normal(size=(2, 2000))
-    exact, arctan2 = boxes.atan2(interval(y), interval(x)), np.arctan2
+    exact, arctan2 = intervals.atan2(interval(y), interval(x)), np.arctan2
     assert np.all(exact.high - exact.low < 2e-14)
     monkeypatch.setattr(np, "arctan2", lambda y, x: arctan2(y, x) + 1e-6)
-    wrong = boxes.atan2(interval(y), interval(x))
+    wrong = intervals.atan2(interval(y), interval(x))
     for k in range(2000):
         true = MP.atan2(MP.number(float(y[k])), MP.number(float(x[k])))
         assert exact.low[k] <= true <= exact.high[k]
@@ -105,7 +105,7 @@ def test_slopes_at_a_branch_cut_are_without_bound():
         variable(0, 2, np.array([-0.1, 0.1, -0.1]), np.array([0.1, 0.2, 0.1])),
         variable(1, 2, *np.array([[-2.0] * 3, [-1.0, -1.0, 0.0]])),
     )
-    found = boxes.atan2(y, x)
+    found = intervals.atan2(y, x)
     assert np.all(np.isinf(found.g.low[:, 0, [0, 2]]))
     assert np.all(np.isinf(found.g.high[:, 0, [0, 2]]))
     assert np.all(np.isfinite(found.g.high[:, 0, 1]))
@@ -125,12 +125,12 @@ def test_what_holds_zero_has_no_bounded_inverse_and_nothing_times_anything_is_no
 
 
 def test_roots_are_of_what_is_not_negative():
-    found = boxes.sqrt(Interval([-1.0, -2.0, 4.0], [4.0, -1.0, 4.0]))
+    found = intervals.sqrt(Interval([-1.0, -2.0, 4.0], [4.0, -1.0, 4.0]))
     assert found.low[0] == 0.0
     assert found.high[0] >= 2.0
     assert np.isinf(found.high[1])
     assert found.low[2] <= 2.0 <= found.high[2]
-    slope = boxes.sqrt(variable(0, 1, np.array([-1.0]), np.array([4.0]))).g
+    slope = intervals.sqrt(variable(0, 1, np.array([-1.0]), np.array([4.0]))).g
     assert np.isinf(slope.high).all()
 
 

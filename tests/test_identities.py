@@ -14,12 +14,13 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.effects import found as declared
 from loomopt.effects.kinds import Load
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import ReedPose
 from loomopt.jobs.beatup.scene import RESISTED
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 
 BEATUP = declared.of("loomopt.effects.beatup")
@@ -68,13 +69,13 @@ def sized(lengths):
     return NUMBERS | dict(zip(("l1", "l2", "l3", "l4"), lengths, strict=True))
 
 
-def torques(names, numbers, phi, rod="exact", omega_dot=None, system=maths.FLOAT):
+def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLOAT):
     """Return M3 and Md of the product at a crank angle, rad."""
     found = model(names, rod)
     given_ = found.given(system, {name: system.number(value) for name, value in numbers.items()})
-    plain = found.given(maths.FLOAT, numbers)
+    plain = found.given(systems.FLOAT, numbers)
     cornered = {load.name: load for load in found.loads if load.corners}
-    corners = {name: load.corners(maths.FLOAT, plain.values, plain.own[name]) for name, load in cornered.items()}
+    corners = {name: load.corners(systems.FLOAT, plain.values, plain.own[name]) for name, load in cornered.items()}
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
     lengths = given_.values["lengths"]
@@ -196,8 +197,8 @@ def test_friction_turns_the_work_of_a_cycle_into_heat():
     numbers, points = sized(LINKAGES[0]), 4096
     lengths = crank_rocker.Lengths(*LINKAGES[0])
     phi = np.arange(points) * TURN / points
-    psi_1 = crank_rocker.Pose(maths.numpy(), lengths, phi).psi_1
-    swing = crank_rocker.dead_centres(maths.FLOAT, lengths).swing
+    psi_1 = crank_rocker.Pose(systems.numpy(), lengths, phi).psi_1
+    swing = crank_rocker.dead_centres(systems.FLOAT, lengths).swing
     work = np.mean(cycle_of(("bearing_friction",), LINKAGES[0], "exact", points)) * TURN
     heat = 2 * 5.0 * swing + 0.7 * numbers["speed"] * np.mean(psi_1**2) * TURN
     assert work == pytest.approx(heat, rel=1e-5)
@@ -264,7 +265,7 @@ def test_crank_torque_is_lagranges_also_when_the_speed_changes(names, rod):
     for lengths, _ in itertools.product(LINKAGES, range(8)):
         numbers = sized(lengths) | {"m4e": rng.uniform(0, 12), "speed": rng.uniform(5, 100)}
         phi, omega_dot = rng.uniform(0, TURN), rng.uniform(-2000, 2000)
-        centres = crank_rocker.dead_centres(maths.FLOAT, crank_rocker.Lengths(*lengths))
+        centres = crank_rocker.dead_centres(systems.FLOAT, crank_rocker.Lengths(*lengths))
         inside = abs(math.remainder(phi - centres.beta, TURN)) < numbers["resistance.pulse"] / 2
         closing = -1 if (phi - centres.beta) % TURN < math.pi - centres.theta else 1
 
@@ -296,7 +297,7 @@ def test_torques_are_the_same_in_many_digits(names, rod):
     for lengths in LINKAGES:
         numbers = sized(lengths)
         around = [torques(names, numbers, k * TURN / 24, rod) for k in range(24)]
-        exact = [torques(names, numbers, k * TURN / 24, rod, system=maths.mpmath()) for k in range(24)]
+        exact = [torques(names, numbers, k * TURN / 24, rod, system=systems.mpmath()) for k in range(24)]
         for kind in (0, 1):
             size = max(abs(values[kind]) for values in around)
             for plain, many in zip(around, exact, strict=True):

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from loomopt import maths
-from loomopt.jets import Jet, chosen, stacked, variables
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, chosen, stacked, variables
 
 X, Y = 1.3, -0.7
-M = maths.jets()
+M = systems.jets()
 FORMULAS = {
     "sum": lambda m, x, y: 3 - (x + y) - (2 - y) + 1,
     "product": lambda m, x, y: 2 * x * y * 0.5,
@@ -33,7 +33,7 @@ FORMULAS = {
 def by_casadi(formula, x, y):
     """Return value, gradient and Hessian by CasADi's automatic differentiation."""
     at = ca.SX.sym("at", 2)
-    f = formula(maths.casadi(), at[0], at[1])
+    f = formula(systems.casadi(), at[0], at[1])
     hessian, gradient = ca.hessian(f, at)
     found = ca.Function("f", [at], [f, gradient, hessian])([x, y])
     return [np.asarray(each, dtype=float) for each in found]

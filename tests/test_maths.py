@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 from loomopt.mechanisms.crank_rocker import Lengths
 
-SYSTEMS = (maths.FLOAT, maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy())
+SYSTEMS = (systems.FLOAT, systems.numpy(), systems.casadi(), systems.mpmath(), systems.sympy())
 LINKAGES = {
     "the paper's": (0.031, 0.065, 0.155, 0.167, 1),
     "mirrored": (0.031, 0.065, 0.155, 0.167, -1),
@@ -61,7 +61,7 @@ def evaluated(system, figures, numbers, side):
 def test_one_formula_gives_the_same_number_in_every_system(linkage, kind):
     *lengths, side = LINKAGES[linkage]
     for phi in ANGLES:
-        reference = evaluated(maths.mpmath(), FORMULAS[kind], (*lengths, phi), side)
+        reference = evaluated(systems.mpmath(), FORMULAS[kind], (*lengths, phi), side)
         for system in SYSTEMS:
             found = evaluated(system, FORMULAS[kind], (*lengths, phi), side)
             assert found.keys() == reference.keys()
@@ -95,7 +95,7 @@ def test_a_scene_number_is_the_same_float64_in_every_system(system, value):
 
 def test_mpmath_has_its_own_digits_and_leaves_everybody_elses_alone():
     before = global_mpmath.mp.dps
-    few, many = maths.mpmath(20), maths.mpmath(60)
+    few, many = systems.mpmath(20), systems.mpmath(60)
     with global_mpmath.workdps(70):
         for system, digits in ((few, 20), (many, 60)):
             error = abs(global_mpmath.mpf(str(system.pi * 10**9)) / 10**9 - global_mpmath.pi)
@@ -107,7 +107,7 @@ def test_mpmath_has_its_own_digits_and_leaves_everybody_elses_alone():
 
 # A value chosen by a node's own data --------------------------------------------------------------------------------
 
-SCALAR = (maths.FLOAT, maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy(), maths.balls())
+SCALAR = (systems.FLOAT, systems.numpy(), systems.casadi(), systems.mpmath(), systems.sympy(), systems.balls())
 CHOICES = (-2.5, 0.0, 0.1, 7.0)
 
 
@@ -122,7 +122,7 @@ def test_the_value_at_a_place_is_chosen_in_every_system(system, place):
 
 
 def test_numpy_chooses_for_each_node_its_own():
-    choose, places = maths.numpy().choose, np.array([[2.0, 0.0, 1.0], [1.0, 1.0, 3.0]])
+    choose, places = systems.numpy().choose, np.array([[2.0, 0.0, 1.0], [1.0, 1.0, 3.0]])
     assert np.array_equal(choose(places, CHOICES), [[0.1, -2.5, 0.0], [0.0, 0.0, 7.0]])
     values = [10.0 * k + np.arange(6.0).reshape(2, 3) for k in range(3)] + [-1.0]
     assert np.array_equal(choose(places, values), [[20.0, 1.0, 12.0], [13.0, 14.0, -1.0]])
@@ -133,7 +133,7 @@ def test_numpy_chooses_for_each_node_its_own():
 def test_numpy_chooses_one_of_whole_columns():
     """A place for each node, a value for all of them but one that has its own at each: what a pose hands over."""
     theta = np.linspace(0.0, 1.0, 4)
-    found = maths.numpy().choose(np.array([0.0, 1.0, 0.0, 1.0]), (theta, 5))
+    found = systems.numpy().choose(np.array([0.0, 1.0, 0.0, 1.0]), (theta, 5))
     assert np.array_equal(found, [0.0, 5.0, 2 / 3, 5.0])
 
 
@@ -144,10 +144,10 @@ def test_numpy_chooses_among_few_and_many_at_few_nodes_and_many(nodes, count):
     drawn = np.random.default_rng(nodes)
     places = drawn.integers(1, count, nodes).astype(float)
     columns = [np.full(nodes, np.nan), *drawn.random((count - 2, nodes)), 7]
-    found = maths.numpy().choose(places, columns)
+    found = systems.numpy().choose(places, columns)
     assert found.tolist() == [float(np.broadcast_to(columns[int(k)], nodes)[n]) for n, k in enumerate(places)]
     assert found.dtype == np.float64
-    assert maths.numpy().choose(places, range(count)).tolist() == places.tolist()
+    assert systems.numpy().choose(places, range(count)).tolist() == places.tolist()
 
 
 def test_a_constant_is_the_same_number():
@@ -156,17 +156,17 @@ def test_a_constant_is_the_same_number():
         own = system.number(0.1)
         assert float(system.constant(own) - own if system.name != "balls" else (system.constant(own) - own)[0]) == 0.0
     column = np.array([[1.0], [2.0]])
-    assert maths.numpy().constant(column) is column
-    assert maths.numpy().constant(3).shape == ()
-    series = maths.ball_series(0.5, 0.1)
-    assert maths.balls().constant(series) is series
+    assert systems.numpy().constant(column) is column
+    assert systems.numpy().constant(3).shape == ()
+    series = systems.ball_series(0.5, 0.1)
+    assert systems.balls().constant(series) is series
 
 
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX])
 def test_casadi_chooses_by_a_symbol_and_only_the_chosen_moves(kind):
     """The slope is that of the chosen value; the place itself has none."""
     x, place = kind.sym("x"), kind.sym("place")
-    chosen = maths.casadi().choose(place, [x**2, 3 * x, -1, ca.sin(x)])
+    chosen = systems.casadi().choose(place, [x**2, 3 * x, -1, ca.sin(x)])
     function = ca.Function("f", [x, place], [chosen, ca.jacobian(chosen, x)])
     expected = [(0.49, 1.4), (2.1, 3.0), (-1.0, 0.0), (math.sin(0.7), math.cos(0.7))]
     for k, pair in enumerate(expected):
@@ -181,14 +181,14 @@ def test_there_is_no_place_beyond_the_last(system):
 
 # Powers of e, and sums over an array of positions --------------------------------------------------------------------
 
-ARRAYS = (*SCALAR, maths.jets())
+ARRAYS = (*SCALAR, systems.jets())
 
 
 def weighed(system, numbers):
     """Return Σ weights · sqrt(1 + a sin x) exp(−x) over positions, as plain floats; numbers: a."""
     angles = [system.number(x) for x in (0.1, 0.7, 2.0)]
     weights = [[system.number(w) for w in row] for row in ((1.0, -2.0, 0.5), (0.25, 3.0, -1.0))]
-    over = maths.arrays(system)
+    over = systems.arrays(system)
     x = over.spread(angles, [numbers])
     return system.weighted(weights, over.sqrt(1 + numbers * over.sin(x)) * over.exp(-x))
 
@@ -208,5 +208,5 @@ def test_sums_over_positions_are_the_same_in_every_system(system):
 
 def test_sums_over_positions_take_many_designs_at_once():
     a = np.array([0.3, 0.5])
-    single = [weighed(maths.FLOAT, float(each)) for each in a]
-    assert pytest.approx(np.array(single), rel=1e-14) == np.array(weighed(maths.numpy(), a)).T
+    single = [weighed(systems.FLOAT, float(each)) for each in a]
+    assert pytest.approx(np.array(single), rel=1e-14) == np.array(weighed(systems.numpy(), a)).T

@@ -11,10 +11,10 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry, sources
 from loomopt.jobs.rapier.model import HeadPose
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker_synthesis, rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 
@@ -62,8 +62,8 @@ def sley():
 
 def layout():
     """Return the paper's construction: sley at its rear dead centre, sector at 24.35°."""
-    swing = Sley(maths.FLOAT, PRINTED).centres.swing
-    return rapier_drive.construct(maths.FLOAT, PRINTED, PRINTED.phi30 - swing, PHI63)
+    swing = Sley(systems.FLOAT, PRINTED).centres.swing
+    return rapier_drive.construct(systems.FLOAT, PRINTED, PRINTED.phi30 - swing, PHI63)
 
 
 def built():
@@ -83,7 +83,7 @@ def rear_dead_centre():
 def link_5_at_180():
     """Return by what angle, deg, link 5 is past the second crank's direction at 180°."""
     sampled = JOB.sampler(RAPIER, built())
-    pose = sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(math.pi, {}))
+    pose = sampled.model.kinematics.pose(systems.FLOAT, sampled.given, Node(math.pi, {}))
     assert isinstance(pose, HeadPose)
     turned = rapier_drive.between(pose.joints.second_crank, pose.joints.dyad.link1)
     return math.degrees(math.atan2(turned.y, turned.x))
@@ -158,7 +158,7 @@ def test_the_packaged_scene_is_what_is_printed_on_the_layout_in_closed_form():
 def test_the_second_crank_stands_on_the_main_shafts_vertical_below_it():
     """The layout as drawn: A0 = (0.461034, 0.620465) m, C0 = (0.461034, 0.234217) m."""
     at_front = dataclasses.replace(PRINTED, **built())
-    pose = rapier_drive.Pose(maths.FLOAT, at_front, Sley(maths.FLOAT, at_front).stand, 0.0)
+    pose = rapier_drive.Pose(systems.FLOAT, at_front, Sley(systems.FLOAT, at_front).stand, 0.0)
     A0, C0 = pose.joints["A0"], pose.joints["C0"]
     assert (A0.x, A0.y) == (pytest.approx(0.461034, abs=6e-7), pytest.approx(0.620465, abs=6e-7))
     assert (C0.x, C0.y) == (pytest.approx(0.461034, abs=6e-7), pytest.approx(0.234217, abs=6e-7))

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.jobs import registry, sources
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 
 ROWS = {row.key: row._asdict() for row in sources.read("beatup").figures}
@@ -78,7 +78,7 @@ def torque_745():
 def bends(lengths, size):
     """Return max ψ'' − min ψ'' ("peak to peak") or max ψ'' ("peak") over the cycle."""
     phi = np.linspace(0, 2 * math.pi, 20_000)
-    psi_2 = crank_rocker.Pose(maths.numpy(), crank_rocker.Lengths(*lengths), phi).psi_2
+    psi_2 = crank_rocker.Pose(systems.numpy(), crank_rocker.Lengths(*lengths), phi).psi_2
     return np.max(psi_2) - (np.min(psi_2) if size == "peak to peak" else 0.0)
 
 

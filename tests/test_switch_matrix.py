@@ -12,11 +12,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt import maths
 from loomopt.cycle import TURN, Node
 from loomopt.effects.combining import faults
 from loomopt.effects.kinds import Check, Event, Load, Speed, State
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.program.crank_motion import PIECE
 from loomopt.program.reading import DATUM
 
@@ -166,7 +166,7 @@ def offered(job):
 def read_by(combination):
     """Return the names of all symbols in the model's graphs: quantities on every piece, rows, corners."""
     sampled = sampler_of(combination)
-    model, system, phi = sampled.model, maths.casadi(), ca.SX.sym("phi")
+    model, system, phi = sampled.model, systems.casadi(), ca.SX.sym("phi")
     symbols = {name: ca.SX.sym(name) for name in offered(combination.job)}
     motors = [effect for effect in effects_of(combination) if isinstance(effect, Speed)]
     if motors:  # the formulas of all else are those at constant speed
@@ -233,7 +233,7 @@ def test_curves_have_columns_of_the_active_effects_only(combination):
 def test_the_balance_has_exactly_the_active_terms(combination):
     sampled, always = sampler_of(combination), ALWAYS.get(combination.job, [])
     node = Node(1.2, sampled.cycle.switch(sampled.cycle.place(1.2)[0]))
-    terms = sampled.model.instant(maths.FLOAT, sampled.given, node).terms()
+    terms = sampled.model.instant(systems.FLOAT, sampled.given, node).terms()
     assert list(terms) == always + [load.name for load in loads_of(combination)]
     checks = [effect.name for effect in effects_of(combination) if isinstance(effect, Check)]
     assert [check.name for check in sampled.model.checks] == checks

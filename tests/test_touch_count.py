@@ -17,7 +17,7 @@ EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths; from loomopt.maths import Number
+from loomopt.maths.systems import Maths; from loomopt.maths.systems import Number
 from loomopt.base.quantities import Torque
 from loomopt.schema import Table; from loomopt.schema import Values
 

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from loomopt import maths
-from loomopt.jets import Jet, variables
-from loomopt.tracing import DEEPEST, Tape
+from loomopt.maths import recording, systems
+from loomopt.maths.jets import Jet, variables
+from loomopt.maths.recording import DEEPEST, Tape
 
 FORMULAS = {
     "sum": lambda m, x, y: 3 - (x + y) - (2.5 - y) + 1 + x,
@@ -31,12 +31,12 @@ FORMULAS = {
 X, Y = 1.3, -0.7
 flint = importlib.import_module("flint")
 SYSTEMS = {
-    "float": (maths.FLOAT, lambda x: x),
-    "numpy": (maths.numpy(), lambda x: x * np.linspace(0.5, 2.0, 7)),
-    "mpmath": (maths.mpmath(), maths.mpmath().number),
-    "balls": (maths.balls(), lambda x: maths.ball_series(x, 1e-3)),
-    "jets": (maths.jets(), lambda x: variables([x * np.linspace(0.5, 2.0, 7)], np.array([[1.0, x]]), curved=True)[0]),
-    "jets of a number": (maths.jets(), lambda x: variables([x], np.array([[1.0, x]]), curved=False)[0]),
+    "float": (systems.FLOAT, lambda x: x),
+    "numpy": (systems.numpy(), lambda x: x * np.linspace(0.5, 2.0, 7)),
+    "mpmath": (systems.mpmath(), systems.mpmath().number),
+    "balls": (systems.balls(), lambda x: systems.ball_series(x, 1e-3)),
+    "jets": (systems.jets(), lambda x: variables([x * np.linspace(0.5, 2.0, 7)], np.array([[1.0, x]]), curved=True)[0]),
+    "jets of a number": (systems.jets(), lambda x: variables([x], np.array([[1.0, x]]), curved=False)[0]),
 }
 
 
@@ -47,7 +47,7 @@ def bits(value):
     if isinstance(value, flint.arb):
         return str(value.mid().man_exp()), str(value.rad().man_exp())
     if isinstance(value, flint.arb_series):
-        return [bits(value[k]) for k in range(maths.ORDER)]
+        return [bits(value[k]) for k in range(systems.ORDER)]
     if isinstance(value, np.ndarray | float | int):
         return np.asarray(value, dtype=np.float64).tobytes()
     return value._mpf_
@@ -57,7 +57,7 @@ def written(formula, called=1):
     """Return a formula of (maths, known number, number of the call) as a program; called: how many are of the call."""
     tape = Tape()
     inputs = [tape.input(), tape.input()]
-    return tape.program((formula(maths.recorded(tape), *inputs),), inputs[2 - called :], inputs[: 2 - called])
+    return tape.program((formula(recording.recorded(tape), *inputs),), inputs[2 - called :], inputs[: 2 - called])
 
 
 def run(program, system, x, y, called=1):
@@ -80,7 +80,7 @@ def test_every_operation_gives_the_same_bits_in_every_system(name, system, calle
     assert bits(run(written(formula, called), own, x, y, called)) == bits(formula(own, x, y))
 
 
-def counting(system=maths.FLOAT):
+def counting(system=systems.FLOAT):
     """Return a number system, and a list of what its sine is called with and what is made a constant."""
     asked, constants = [], []
 
@@ -100,14 +100,14 @@ def test_equal_expressions_are_computed_once():
         return m.sin(x + y) * m.sin(x + y) + m.sin(y + x) / m.sin(x + y)
 
     own, asked, _ = counting()
-    assert run(written(formula, 2), own, X, Y, 2) == formula(maths.FLOAT, X, Y)
+    assert run(written(formula, 2), own, X, Y, 2) == formula(systems.FLOAT, X, Y)
     assert asked == [X + Y, Y + X], "the order of a sum is kept: jets and others may add in theirs"
 
 
 def test_what_no_output_needs_is_left_out_unless_it_may_fail():
     own, asked, _ = counting()
     tape = Tape()
-    m, x = maths.recorded(tape), tape.input()
+    m, x = recording.recorded(tape), tape.input()
     m.sin(x)
     before = len(tape.operations)
     _ = (m.pi * x + 1) * x
@@ -132,9 +132,9 @@ def test_what_is_known_is_computed_once_for_all_calls_and_what_always_is_once_fo
     function = bind([X])
     assert asked == [math.pi * 2, X]
     for y in (0.25, 0.5):
-        assert function(y)[0] == formula(maths.FLOAT, X, y)
+        assert function(y)[0] == formula(systems.FLOAT, X, y)
     assert asked == [math.pi * 2, X, 0.25, 0.5]
-    assert bind([0.125])(0.25)[0] == formula(maths.FLOAT, 0.125, 0.25), "of another design nothing is left"
+    assert bind([0.125])(0.25)[0] == formula(systems.FLOAT, 0.125, 0.25), "of another design nothing is left"
 
 
 def test_scalars_that_meet_what_varies_in_arithmetic_become_constants_once():
@@ -143,15 +143,15 @@ def test_scalars_that_meet_what_varies_in_arithmetic_become_constants_once():
 
     own, _, constants = counting()
     function = written(formula)([own])([X])
-    assert function(Y)[0] == formula(maths.FLOAT, X, Y)
-    assert function(X)[0] == formula(maths.FLOAT, X, X)
+    assert function(Y)[0] == formula(systems.FLOAT, X, Y)
+    assert function(X)[0] == formula(systems.FLOAT, X, X)
     assert sorted(constants) == [X, 2, X + 5]
 
 
 def test_two_systems_share_a_formula():
     """The design's numbers in one, the nodes' in the other, as samplers do."""
     tape = Tape()
-    first, second = maths.recorded(tape, 0), maths.recorded(tape, 1)
+    first, second = recording.recorded(tape, 0), recording.recorded(tape, 1)
     x, y = tape.input(), tape.input()
     program = tape.program((first.sin(x) * second.sin(y) * second.sin(x),), [y], [x])
     one, by_one, _ = counting()
@@ -164,11 +164,11 @@ def test_outputs_may_be_inputs_numbers_and_several():
     tape = Tape()
     x, y = tape.input(), tape.input()
     program = tape.program((x, 2, y, x * y, x * y, -0.0, "a word"), [y], [x])
-    found = program([maths.FLOAT])([X])(Y)
+    found = program([systems.FLOAT])([X])(Y)
     assert found == (X, 2, Y, X * Y, X * Y, 0.0, "a word")
     assert math.copysign(1.0, found[5]) == -1.0
     assert type(found[1]) is int
-    assert tape.program((), [], [])([maths.FLOAT])([])() == ()
+    assert tape.program((), [], [])([systems.FLOAT])([])() == ()
 
 
 def test_literals_that_are_equal_but_not_the_same_stay_apart():
@@ -192,25 +192,25 @@ def test_literals_that_are_equal_but_not_the_same_stay_apart():
     x = tape.input()
     tape.program(tuple(x + number for number in numbers), [x], [])
     assert len(tape.operations) == 1 + 2 * len(numbers)
-    found = tape.program(numbers, [x], [])([maths.FLOAT])([])(X)
+    found = tape.program(numbers, [x], [])([systems.FLOAT])([])(X)
     assert [(type(value), repr(value)) for value in found] == [(type(value), repr(value)) for value in numbers]
-    assert tape.program((x * -3, (-3) ** x, x - -3.5), [x], [])([maths.FLOAT])([])(2.0) == (-6.0, 9, 5.5)
+    assert tape.program((x * -3, (-3) ** x, x - -3.5), [x], [])([systems.FLOAT])([])(2.0) == (-6.0, 9, 5.5)
 
 
 @pytest.mark.parametrize("places", [1.0, np.array([2.0, 0.0, 1.0, 1.0]), np.array([0.0, 0.0, 0.0, 0.0])])
 def test_a_place_of_the_node_chooses_when_the_function_is_called(places):
     tape = Tape()
-    m, place, x = maths.recorded(tape), tape.input(), tape.input()
+    m, place, x = recording.recorded(tape), tape.input(), tape.input()
     program = tape.program((m.choose(place, (x * x, 1, -x)) + m.choose(place, (1, 3, 5)),), [place, x], [])
-    own, u = maths.numpy(), np.linspace(0.1, 0.7, 4)
+    own, u = systems.numpy(), np.linspace(0.1, 0.7, 4)
     expected = own.choose(places, (u * u, 1, -u)) + own.choose(places, (1, 3, 5))
     assert bits(program([own])([])(places, u)[0]) == bits(expected)
 
 
 def test_one_recording_serves_every_piece():
     tape = Tape()
-    m, place, x = maths.recorded(tape), tape.input(), tape.input()
-    function = tape.program((m.choose(place, (x, x + 1, 10)),), [place, x], [])([maths.FLOAT])([])
+    m, place, x = recording.recorded(tape), tape.input(), tape.input()
+    function = tape.program((m.choose(place, (x, x + 1, 10)),), [place, x], [])([systems.FLOAT])([])
     assert [function(place, 0.5)[0] for place in (0.0, 1, 2.0)] == [0.5, 1.5, 10]
     with pytest.raises(IndexError):
         function(3.0, 0.5)
@@ -224,7 +224,7 @@ def test_deep_and_wide_formulas_are_written_in_pieces():
     for k in range(1000):
         value, expected = (value + k) * x, (expected + k) * X
     assert DEEPEST < 100
-    assert tape.program((value,), [x], [])([maths.FLOAT])([])(X) == (expected,)
+    assert tape.program((value,), [x], [])([systems.FLOAT])([])(X) == (expected,)
 
 
 def test_names_are_taken_again_when_they_are_free():
@@ -235,7 +235,7 @@ def test_names_are_taken_again_when_they_are_free():
     for _ in range(100):
         value, expected = value * value - value, expected * expected - expected
         value, expected = value / 2, expected / 2
-    function = tape.program((value,), [x], [])([maths.FLOAT])([])
+    function = tape.program((value,), [x], [])([systems.FLOAT])([])
     assert function(X) == (expected,)
     assert function.__code__.co_nlocals <= 4
 
@@ -274,4 +274,4 @@ def test_an_input_stands_for_what_is_known_and_an_input_for_itself():
     assert tape.known(x).place == x.place
     stand_in = tape.known(x * x)
     program = tape.program((stand_in + x,), [x], [stand_in])
-    assert program([maths.FLOAT])([100.0])(X) == (100.0 + X,)
+    assert program([systems.FLOAT])([100.0])(X) == (100.0 + X,)

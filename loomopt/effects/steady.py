@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Values
 
 

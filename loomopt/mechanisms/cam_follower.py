@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
 from loomopt.base.units import Shown, usual
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.mechanisms.dyad import Vector
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 
 class Derivatives(NamedTuple):

@@ -8,8 +8,8 @@ from energy and its duration from arc cosines; what is left is one unknown, the 
 
 from dataclasses import dataclass
 
-from loomopt import maths
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 
 DIGITS, ROUNDS = 40, 400
 
@@ -57,7 +57,7 @@ def least_stiffness(frame: Frame, high: Number) -> Number | None:
 
 def _duration(frame: Frame, stiffness: Number) -> Number:
     """Return the share of the rise that bang and arc take, infinite where the spring cannot hold the frame up."""
-    context = maths.mpmath(DIGITS)
+    context = systems.mpmath(DIGITS)
     (a, b), (c, d) = frame.slopes(stiffness)
     if not (c > 0 and a + b / 2 > 0):
         return float("inf")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol
 
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
 from loomopt.mechanisms.turning_points import crossing

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.mechanisms.cam_laws import Derivatives
 
 if TYPE_CHECKING:

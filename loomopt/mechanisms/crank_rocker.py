@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.records import lazy
-from loomopt.maths import Maths, Number, numpy
+from loomopt.maths.systems import Maths, Number, numpy
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector
 

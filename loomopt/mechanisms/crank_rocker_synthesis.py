@@ -2,7 +2,7 @@
 
 import math
 
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.mechanisms.crank_rocker import Lengths
 from loomopt.mechanisms.crank_rocker_faults import fault
 

@@ -6,7 +6,7 @@ of P1→P2, −1 to the right; it never flips while the dyad's triangle keeps it
 
 from typing import NamedTuple
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 
 class Vector(NamedTuple):

@@ -9,7 +9,7 @@ link l5 = CD; l6 = B2D carries the gear sector; B2 on the sley at radius l3p, an
 from dataclasses import dataclass
 
 from loomopt.base.records import lazy
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms import crank_rocker, dyad
 from loomopt.mechanisms.crank_rocker import Lengths
 from loomopt.mechanisms.dyad import Vector, dot

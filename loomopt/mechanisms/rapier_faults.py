@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt import maths
 from loomopt.base.units import Shown, usual
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker_faults
 from loomopt.mechanisms.dyad import dot
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
@@ -44,7 +44,7 @@ def fault(dimensions: Dimensions, shown: Shown = usual) -> str:
 
 def _span(d: Dimensions, phi1: NDArray[np.floating[Any]]) -> Floats:
     """Return the distance of C and B2, m, at crank angles φ1, rad."""
-    base = Pose(maths.numpy(), d, Sley(maths.FLOAT, d).stand, phi1).base
+    base = Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, phi1).base
     return np.asarray(np.sqrt(dot(base, base)), dtype=np.float64)
 
 

@@ -1,6 +1,6 @@
 """The sley four-bar from its time ratio and swing, in closed form [Hong17]."""
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 
 def sley(maths: Maths, theta: Number, swing: Number, l3: Number, l71: Number) -> tuple[Number, Number]:

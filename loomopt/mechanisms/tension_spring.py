@@ -9,7 +9,7 @@ tension that can be wound in, its surge and its length. SI throughout; formulas 
 import math
 from dataclasses import dataclass
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 DECAY = math.exp(-0.105)
 """How the initial stress that can be wound in falls per unit of spring index [Shigley, eq 10-41]."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.tolerances import CROSSING_STEPS, CROSSING_WIDTH, TURN_SAMPLES
 
 Floats = NDArray[np.float64]

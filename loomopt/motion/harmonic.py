@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 FEWEST, MOST = 32, 512
 """Harmonics of a smooth force: doubled from the fewest until the last of them are below TAIL of the largest."""

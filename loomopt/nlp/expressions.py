@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from loomopt.balance import total
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.nlp.families import Family
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from loomopt import maths
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.tolerances import FEW_CHOICES
 
 
@@ -35,7 +35,7 @@ def chosen(place: Number, values: Sequence[Number]) -> Number:
     if isinstance(place, float | int):
         return values[int(place)]
     if len(values) <= FEW_CHOICES:
-        return maths.casadi().choose(place, values)
+        return systems.casadi().choose(place, values)
     return ca.dot(place == ca.DM(range(len(values))), ca.vertcat(*values))
 
 
@@ -65,7 +65,7 @@ class Lifts:
     """
 
     def __init__(self, own: Any) -> None:
-        self.maths: Maths = replace(maths.casadi(), choose=self.choose)
+        self.maths: Maths = replace(systems.casadi(), choose=self.choose)
         self.named: list[Lifted] = []
         self.picked: list[Lifted] = []
         self._moving = own

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Node
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.nlp.lifted import Lifts, Options, chosen, identity
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
@@ -45,7 +45,7 @@ class Quantities:
         self._symbols = list(symbols.values())
         """Kept: what identifies a symbol is another's once it is gone."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
-        found = model.given(replace(maths.casadi(), choose=chosen), symbols)
+        found = model.given(replace(systems.casadi(), choose=chosen), symbols)
         pairs = zip((found, *found.cases), (given, *given.cases), strict=True)
         first, *others = [Given(self._shared(one.values, worth.values), one.own) for one, worth in pairs]
         self.given, self._in_symbols = given, first._replace(cases=tuple(others))
@@ -76,7 +76,7 @@ class Quantities:
         import casadi as ca
 
         choices = _Choices(self.switches, self._worth)
-        system = replace(maths.casadi(), choose=choices.choose)
+        system = replace(systems.casadi(), choose=choices.choose)
         value = self.model.quantity(system, self._in_symbols, name, Node(self.phi, self.switches))
         read = [each for each in ca.symvar(ca.SX(value)) if identity(each) in self._worth]
         inputs = ca.vertcat(*read), self.phi, *self.switches.values(), *choices.symbols

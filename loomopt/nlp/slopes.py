@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.cycle import Floats
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 
 
 def second(
@@ -19,7 +19,7 @@ def second(
     import casadi as ca
 
     phi, data = ca.SX.sym("phi"), ca.SX.sym("switch", switches)
-    slope = ca.gradient(formula(maths.casadi(), phi, ca.vertsplit(data) if switches else []), phi)
+    slope = ca.gradient(formula(systems.casadi(), phi, ca.vertsplit(data) if switches else []), phi)
     found = ca.Function("second", [phi, data], [ca.gradient(slope, phi)])
 
     def at(angles: Floats, places: Floats) -> Floats:

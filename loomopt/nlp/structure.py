@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.cycle import Cycle, Floats, Node, node_angle
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.layout import Layout
 from loomopt.nlp.stations import Stood, held

@@ -5,8 +5,8 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from loomopt import maths
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
@@ -54,7 +54,7 @@ def law(found: CamLaw) -> list[Equation]:
         return _table(found.table)
     assert isinstance(found, Named)
     u, ends = symbol("u"), [Fraction(0), *found.breaks, Fraction(1)]
-    pieces = [found.at(maths.sympy(), {}, u, k) for k in range(len(ends) - 1)]
+    pieces = [found.at(systems.sympy(), {}, u, k) for k in range(len(ends) - 1)]
     sp = sympy()
     bounds = list(itertools.pairwise(sp.Rational(end.numerator, end.denominator) for end in ends))
     written = []
@@ -89,7 +89,7 @@ def _spline(found: Spline) -> list[Equation]:
     n = found.intervals
     made = cam_spline.Spline(*(_knots(letter, n + 1) for letter in "sva"))
     t, u = symbol("t"), symbol("u")
-    at = made.at(maths.sympy(), t, 0)
+    at = made.at(systems.sympy(), t, 0)
     kind = f"cam law spline, k = 0 ... {n - 1}"
     ends = [("s_0", 0), ("v_0", 0), (f"s_{n}", 1), (f"v_{n}", 0)]
     return [

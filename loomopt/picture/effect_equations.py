@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.balance import Acting, Given
 from loomopt.effects.kinds import Check, Event, Load, Motion, State, Terms
+from loomopt.maths import systems
 from loomopt.picture.equations import (
     Case,
     Equation,
@@ -69,7 +70,7 @@ def crank_motion(model: JobModel, pose: Motion, known: Given, torque: str) -> li
     own = motor(model.effects)
     if own is None:
         return []
-    system, sp, table = maths.sympy(), sympy(), known.own[own.name]
+    system, sp, table = systems.sympy(), sympy(), known.own[own.name]
     own_names = {name: symbol(name) for name in ("speed", "no_load_speed")}
     values = ChainMap(own_names, known.values)  # type: ignore[arg-type]  # it is only read
     given_torque, omega, phi = symbol("M_motor"), symbol("omega"), pose.phi
@@ -125,15 +126,15 @@ def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression
     if isinstance(load, State):
         return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
     number = sympy().Rational(switch)
-    return load.force(maths.sympy(), pose, known.values, known.own[load.name], number)
+    return load.force(systems.sympy(), pose, known.values, known.own[load.name], number)
 
 
 def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
     """Return a load's formula between each corner and the next, the last ending a turn after the first."""
-    whole_turn = 2 * maths.sympy().pi
+    whole_turn = 2 * systems.sympy().pi
     if not isinstance(load, Load) or load.corners is None:
         return [(force(load, pose, known, 0), (0, whole_turn))]
-    corners = tuple(map(sympy().sympify, load.corners(maths.sympy(), known.values, known.own[load.name])))
+    corners = tuple(map(sympy().sympify, load.corners(systems.sympy(), known.values, known.own[load.name])))
     numbers = tuple(float(corner.subs(dict.fromkeys(corner.free_symbols, 1))) for corner in corners)
     ends, number_ends = (*corners[1:], corners[0] + whole_turn), (*numbers[1:], numbers[0] + 2 * math.pi)
     middles = [(begin + end) / 2 for begin, end in zip(numbers, number_ends, strict=True)]
@@ -145,7 +146,7 @@ def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
 
 def check_equations(check: Check[Any], pose: Motion, known: Given) -> list[Equation]:
     """Write each figure and row of an effect that takes no part in the balance, and what it must keep."""
-    system, own = maths.sympy(), known.own[check.name]
+    system, own = systems.sympy(), known.own[check.name]
     found = {name: read(system, pose, known.values, own) for name, read in check.quantities.items()}
     found |= {name: row(system, known.values, own) for name, row in check.rows.items()}
     return [each for name, value in found.items() for each in _kept(check, name, value)]

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.balance import Acting
 from loomopt.effects.kinds import Effect, Load, Motion
+from loomopt.maths import systems
 from loomopt.schema import Values
 
 Expression = Any
@@ -91,7 +92,7 @@ def sums(
 
     torque: what the crank's torque is called, and its symbol.
     """
-    system, found = maths.sympy(), []
+    system, found = systems.sympy(), []
     shown = [_shown(load, symbol(f"{letter}_{load.name}")) for load in loads]
     output, gone = [load for load in shown if load.acts == "output"], balance.carried(loads)
     given = balance.Given({}, {load.name: {} for load in loads})

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.effects.kinds import Load
+from loomopt.maths import systems
 from loomopt.program import states
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
@@ -23,7 +23,7 @@ def twisted(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
             on = sampler.cycle.on((load.name, 1.0))[pieces]
             if load.name not in state.carries or not on.any():
                 continue
-            at = model.instant(maths.numpy(), sampler.given, sampler.node(pieces[on], u[on]))
+            at = model.instant(systems.numpy(), sampler.given, sampler.node(pieces[on], u[on]))
             largest = float(np.abs(states.moved(state, at).coordinate()).max())
             travel = float(np.ptp(at.pose.q))
             if largest > MOST * travel:

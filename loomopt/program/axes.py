@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.program.instant import Formula, Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Objective, Program

@@ -3,9 +3,9 @@
 from collections.abc import Collection
 from typing import NamedTuple
 
-from loomopt import maths
 from loomopt.balance import Given
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.kinematics import Chain
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
@@ -40,7 +40,7 @@ def stations(model: JobModel, given: Given, variables: Collection[str]) -> tuple
     for arc in model.kinematics.arcs if chains else ():
         if arc.name in chains:
             found += [Station(first + k, switch) for k, switch in enumerate(chains[arc.name].stations)]
-        first += len(arc.corners(maths.FLOAT, given))
+        first += len(arc.corners(systems.FLOAT, given))
     return tuple(found)
 
 

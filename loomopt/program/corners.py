@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.balance import Given
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 
 if TYPE_CHECKING:
     from loomopt.program.model import JobModel

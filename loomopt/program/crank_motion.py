@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.balance import Given
 from loomopt.base.refusals import refusal
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces
 from loomopt.effects.kinds import Motion, Speed
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.motion.turning import NoTurn, Turning, solved
 from loomopt.program import drive
 from loomopt.program.instant import Instant, Row
@@ -46,7 +47,7 @@ def turned(steady: Sampler, scene: Scene) -> Sampler:
 @functools.lru_cache(maxsize=KEPT)
 def _turned(steady: Sampler, motor: Speed) -> Sampler:
     model, given = steady.model, steady.given
-    own, loads, system = given.own[motor.name], model.loads, maths.numpy()
+    own, loads, system = given.own[motor.name], model.loads, systems.numpy()
 
     def surplus(pieces: Pieces, u: Floats, no_load: float, omega: Floats, omega_dot: Floats) -> Floats:
         node, known = steady.node(pieces, u), {**given.values, NO_LOAD: no_load}

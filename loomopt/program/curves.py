@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.balance import Acting
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
 from loomopt.cycle import TURN, Floats, Pieces
+from loomopt.maths import systems
 from loomopt.program.drive import motor_power
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
@@ -62,7 +62,7 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
     """Return the curves at rows, SI."""
     pieces, u, phi = rows
     node = sampler.node(pieces, u)
-    at = sampler.model.instant(maths.numpy(), sampler.given, node)
+    at = sampler.model.instant(systems.numpy(), sampler.given, node)
     unknown = np.zeros(u.shape, dtype=bool)
     if sampler.model.known_in:
         unknown = ~np.any([sampler.cycle.on(where)[pieces] for where in sampler.model.known_in], axis=0)

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable
 
 from loomopt.effects.kinds import Effect, Load, Speed, State
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.program.instant import Instant, Quantity
 from loomopt.schema import Figure
 

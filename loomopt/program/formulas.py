@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from loomopt.effects.kinds import Check
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.instant import Instant
 from loomopt.schema import Values
 

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.balance import Acting
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Event, Load, State
-from loomopt.maths import FLOAT, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT, Number
 from loomopt.motion.free import Body, Zone
 from loomopt.program.sampling import Sampler
 
@@ -65,7 +65,7 @@ class Sizes(NamedTuple):
 def sizes(sampler: Sampler) -> Sizes:
     """Return the sizes of the output's motion."""
     pieces, u = sampler.grid(SAMPLES)
-    pose = sampler.model.instant(maths.numpy(), sampler.given, sampler.node(pieces, u)).pose
+    pose = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(pieces, u)).pose
     rates = (float(np.abs(values).max()) for values in (pose.velocity, pose.acceleration))
     return Sizes(*(size or 1.0 for size in (float(np.ptp(pose.q)), *rates)))
 

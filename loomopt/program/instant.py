@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from loomopt import balance
 from loomopt.balance import Given
 from loomopt.cycle import Node, Where
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Values
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from loomopt.balance import Given
 from loomopt.base.records import Frozen
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import spikes
 from loomopt.schema import Values

@@ -15,7 +15,7 @@ from loomopt.balance import Acting, Given
 from loomopt.base.records import lazy
 from loomopt.cycle import Cycle, Node, Where
 from loomopt.effects.kinds import Check, Demand, Effect, Load, Speed, State
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.owned import label, owned
 from loomopt.program import formulas
 from loomopt.program.corners import cornered

@@ -11,7 +11,7 @@ from loomopt.base.refusals import refusal
 from loomopt.base.units import SI_UNIT
 from loomopt.cycle import TURN, Floats, Node
 from loomopt.effects.kinds import Event
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms.turning_points import crossing
 from loomopt.motion.flight import Cam, Course, Stretch
 from loomopt.motion.free import Moving

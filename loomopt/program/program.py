@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.cycle import Where
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.model import JobModel
 from loomopt.schema import Values
 from loomopt.tolerances import FEASIBLE

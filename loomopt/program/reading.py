@@ -8,7 +8,7 @@ import numpy as np
 from loomopt.balance import Given, total
 from loomopt.base.records import lazy
 from loomopt.cycle import Cycle, Floats, Node, Pieces
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit
 from loomopt.program.traced import Quantities

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt import maths
 from loomopt.balance import Given
 from loomopt.base.records import lazy
 from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.parabolas import inside, vertex
@@ -62,10 +62,10 @@ class Sampler:
 
     def __init__(self, model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> None:
         self.model, self.values = model, dict(values)
-        given = model.given(maths.FLOAT, values)
+        given = model.given(systems.FLOAT, values)
         self.hints = model.hints(given)
-        self.given: Given = model.given(maths.FLOAT, {**values, **self.hints}) if self.hints else given
-        self.cycle: Cycle = model.split(maths.FLOAT, self.given)
+        self.given: Given = model.given(systems.FLOAT, {**values, **self.hints}) if self.hints else given
+        self.cycle: Cycle = model.split(systems.FLOAT, self.given)
         self.samples = max(samples, model.samples(self.given))
         self._extremes: dict[str, list[Extreme]] = {}
 
@@ -79,14 +79,14 @@ class Sampler:
         """The switches just before each event that a row stands at, by event and name."""
         found = {}
         for event in self.model.events_read:
-            piece = self.cycle.piece_before(float(self.model.event(maths.FLOAT, self.given, event)))
+            piece = self.cycle.piece_before(float(self.model.event(systems.FLOAT, self.given, event)))
             found[event] = {name: float(value) for name, value in self.cycle.switch(piece).items()}
         return found
 
     @lazy
     def static(self) -> dict[str, float]:
         """Figures that need one position only."""
-        return self.model.static(maths.FLOAT, self.given, self.stills)
+        return self.model.static(systems.FLOAT, self.given, self.stills)
 
     @lazy
     def figures(self) -> dict[str, float]:
@@ -94,7 +94,7 @@ class Sampler:
         means = [name for integral in self.model.integrals for name in (integral.name, integral.root)]
         return self.static | {name: self.single(name) for name in means}
 
-    def read(self, system: maths.Maths) -> Reading:
+    def read(self, system: systems.Maths) -> Reading:
         """Return the design in another number system."""
         values = {name: system.number(value) for name, value in {**self.values, **self.hints}.items()}
         return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
@@ -126,7 +126,7 @@ class Sampler:
     @lazy
     def quantities(self) -> Quantities:
         """The design's whole-cycle quantities in NumPy."""
-        return Quantities(self.model, (maths.FLOAT, maths.numpy()), self.given)
+        return Quantities(self.model, (systems.FLOAT, systems.numpy()), self.given)
 
     def at(self, name: str, pieces: Pieces, u: Floats) -> Floats:
         """Return a quantity at nodes (pieces, u), SI."""
@@ -151,7 +151,7 @@ class Sampler:
 
     @lazy
     def _floats(self) -> Quantities:
-        return Quantities(self.model, (maths.FLOAT, maths.FLOAT), self.given)
+        return Quantities(self.model, (systems.FLOAT, systems.FLOAT), self.given)
 
     def node(self, pieces: Pieces, u: Floats) -> Node:
         """Return nodes (pieces, u) with their crank angles, rad, and switches."""
@@ -214,7 +214,7 @@ class Sampler:
 
     @lazy
     def _on_grid(self) -> Callable[[str], Number]:
-        return self.model.together(maths.numpy(), self.given, self.node(*self.grid()))
+        return self.model.together(systems.numpy(), self.given, self.node(*self.grid()))
 
     @lazy
     def singular(self) -> tuple[float, ...]:
@@ -322,7 +322,7 @@ class _SampledRows(Rows):
     """Rows of a sampled design, in floats."""
 
     def __init__(self, sampler: Sampler) -> None:
-        super().__init__(sampler.model, maths.FLOAT, sampler.given, sampler.stills)
+        super().__init__(sampler.model, systems.FLOAT, sampler.given, sampler.stills)
         self.sampler = sampler
         self._single |= sampler.static
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from loomopt.cycle import TURN
 from loomopt.effects.steady import UnsteadyError
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.program import states
 from loomopt.program.instant import Integral
 from loomopt.program.model import JobModel

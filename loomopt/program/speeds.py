@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from loomopt.cycle import Floats, Node
-from loomopt.maths import numpy
+from loomopt.maths.systems import numpy
 from loomopt.program.model import JobModel
 from loomopt.program.sampling import Sampler, Tally, sampled
 from loomopt.program.traced import Quantities

@@ -8,7 +8,7 @@ from loomopt.balance import Acting, Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Event, Load, State
 from loomopt.effects.steady import Carried, Moved
-from loomopt.maths import Maths, Number, arrays
+from loomopt.maths.systems import Maths, Number, arrays
 from loomopt.program.instant import Instant, Quantity
 from loomopt.program.kinematics import Kinematics
 from loomopt.schema import Values

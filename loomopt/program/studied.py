@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.records import Frozen
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene

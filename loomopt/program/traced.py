@@ -15,12 +15,12 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Node
-from loomopt.maths import Maths, Number
+from loomopt.maths import recording
+from loomopt.maths.recording import Bind, Program, Recorded, Tape
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.model import JobModel
-from loomopt.tracing import Bind, Program, Recorded, Tape
 
 WORTH_IT = 64
 """Evaluations after which a formula is recorded: that takes 1 to 3 ms, and saves some 30 us of each."""
@@ -110,7 +110,7 @@ def recorded(model: JobModel, names: tuple[str, ...], switches: tuple[str, ...],
     Raises what a formula raises that cannot be recorded.
     """
     tape = Tape()
-    first, there = (maths.recorded(tape, system) for system in range(2))
+    first, there = (recording.recorded(tape, system) for system in range(2))
     phi, switch = tape.input(), {name: tape.input() for name in switches}
     raw = model.given(first, {name: tape.input() for name in sorted(known)})
     inputs: dict[int, tuple[int, str]] = {}

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.cycle import Floats, Node, Pieces
-from loomopt.jets import Jet, variables
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, variables
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.reading import DATUM, Reading, quadrature
@@ -102,9 +102,9 @@ class Batch:
         return Judged(np.where(np.isfinite(found), found, np.inf), residuals, [o.sign == 0 for o in self.limits])
 
     def _reading(self, x: Floats, directions: Floats | None) -> BatchReading:
-        system, columns = maths.numpy(), list(x.T)
+        system, columns = systems.numpy(), list(x.T)
         if directions is not None:
-            system, columns = maths.jets(), variables(columns, directions, curved=False)
+            system, columns = systems.jets(), variables(columns, directions, curved=False)
         known = {**self.program.parameters, **self.like.hints}
         return BatchReading(self.program, system, {**known, **dict(zip(self.names, columns, strict=True))}, self.like)
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.base.records import lazy
 from loomopt.cycle import Where
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
@@ -59,7 +59,7 @@ class Boxes(Reading):
     """One design read in balls, ready to be bounded."""
 
     def __init__(self, sampler: Sampler) -> None:
-        system, model = maths.balls(), sampler.model
+        system, model = systems.balls(), sampler.model
         exact = {name: system.number(value) for name, value in {**sampler.values, **sampler.hints}.items()}
         super().__init__(model, system, model.given(system, exact), sampler.cycle, sampler.stills)
         self.sampler = sampler
@@ -127,11 +127,11 @@ class Boxes(Reading):
 
     def _series(self, name: str, piece: int, centre: float, half: float) -> Number:
         """Return a quantity's Taylor series in u, to second order, around a ball of u on a piece."""
-        u = maths.ball_series(centre, half)
+        u = systems.ball_series(centre, half)
         begin, end = self.starts[piece : piece + 2]
         angle = begin + (end - begin) * u
         value = self.quantity(name, angle, self._switches[piece])
-        return maths.ball_series(0.0, 0.0) * 0 + value
+        return systems.ball_series(0.0, 0.0) * 0 + value
 
 
 def judged_box(
@@ -164,7 +164,7 @@ def _keeps(here: Number, bend: Number, box: Box, at: float, limit: float) -> boo
 
     What is no number keeps nothing.
     """
-    ball = maths.balls().number
+    ball = systems.balls().number
     value, slope, bend = here[0], here[1], bend.upper()
     low, high = (ball(end) - ball(at) for end in (box.low, box.high))
     if bend < 0 and not (slope + 2 * bend * low < 0 or slope + 2 * bend * high > 0):

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.program.instant import Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import LEAST_CHANGE

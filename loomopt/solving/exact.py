@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.cycle import Floats
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
@@ -28,7 +28,7 @@ class Exact(Derivatives):
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
         super().__init__(program, x, sampler, rows)
-        self.maths = maths.mpmath(DIGITS)
+        self.maths = systems.mpmath(DIGITS)
         number: Callable[[Any], Number] = self.maths.number
         self.number = number
         self.parameters = {name: number(value) for name, value in self.known.items()}

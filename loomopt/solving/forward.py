@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.base.records import lazy
 from loomopt.cycle import Floats, Pieces
-from loomopt.jets import Jet, stacked, variables
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, stacked, variables
+from loomopt.maths.systems import Number
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import DATUM, Reading, quadrature
@@ -143,8 +143,8 @@ class Forward(Derivatives):
         if directions is not None:
             moved = np.array(self.sizes)[:, None] * directions
             x = dict(zip(self.names, variables(list(x.values()), moved, curved), strict=True))
-        given = self.program.model.given(maths.jets(), {**self.known, **x})
-        return JetReading(self.program.model, maths.jets(), given, self.sampler.cycle, self.sampler.stills)
+        given = self.program.model.given(systems.jets(), {**self.known, **x})
+        return JetReading(self.program.model, systems.jets(), given, self.sampler.cycle, self.sampler.stills)
 
     def _static(self, reading: JetReading, width: int) -> list[tuple[int, Jet]]:
         """Return the rows that are no node's, by place, along so many directions."""

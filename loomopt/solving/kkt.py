@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.solving.nnls import nnls
+from loomopt.maths.nnls import nnls
 from loomopt.solving.rows import ActiveSet, Groups
 from loomopt.tolerances import POSITIVE
 

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from loomopt.cycle import Floats
-from loomopt.jets import Jet
+from loomopt.maths.jets import Jet
+from loomopt.maths.sobol import points
 from loomopt.program.chains import roots
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
@@ -30,7 +31,6 @@ from loomopt.solving.sizes import (
     VIOLATION_WEIGHT,
     WORST,
 )
-from loomopt.solving.sobol import points
 
 Start = dict[str, float]
 

@@ -21,10 +21,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from loomopt.cycle import Floats
+from loomopt.maths.nnls import least_on_cone
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
-from loomopt.solving.cone import least_on_cone
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.feasible_curve import FeasibleCurve, Verdict
 from loomopt.solving.kkt import Multipliers, System

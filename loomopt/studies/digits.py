@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.balance import total
 from loomopt.cycle import Floats
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.point import Point
 from loomopt.nlp.stations import Stood, held
@@ -42,7 +42,7 @@ def tiny(system: Maths, decimals: int) -> Number:
 
 def precise(sampler: Sampler, digits: int = REFERENCE_DIGITS) -> Reading:
     """Return a sampled design in many digits."""
-    return sampler.read(maths.mpmath(digits))
+    return sampler.read(systems.mpmath(digits))
 
 
 def extreme(exact: Reading, name: str, near: Extreme) -> Number:
@@ -90,7 +90,7 @@ class _Rows:
 
     def __init__(self, program: Program, point: Point, x: Mapping[str, float], digits: int) -> None:
         self.program, self.point = program, point
-        self.maths = maths.mpmath(digits)
+        self.maths = systems.mpmath(digits)
         self.fixed: dict[str, Number] = {}
         self.number: Callable[[Number], Number] = self.maths.number
         prices = point.raw["lam_x"]

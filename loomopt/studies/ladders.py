@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from loomopt.base.errors import BadInput
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 from loomopt.program.sampling import Tally
 from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
 

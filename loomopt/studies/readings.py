@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.cycle import TURN, Floats, Node
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.nlp import slopes
 from loomopt.program.sampling import Sampler, Tally
 from loomopt.program.studied import Crossing
@@ -139,11 +139,11 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
 
     def displaced(moved: Floats) -> Floats:
         Tally.positions += POSITIONS
-        return _each(subject.output(maths.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
+        return _each(subject.output(systems.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
 
     def closed(_: str) -> dict[str, Any]:
         Tally.positions += POSITIONS
-        return {name: _each(subject.output(maths.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles)}
+        return {name: _each(subject.output(systems.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles)}
 
     def formula(system: Maths, phi: Number, places: Sequence[Number]) -> Number:
         symbols = model.given(system, {**subject.sampler.values, **subject.sampler.hints})
@@ -179,11 +179,11 @@ def _numbers(subject: Subject) -> Ladder:
 
     def run(system: str) -> dict[str, Any]:
         Tally.positions += POSITIONS + len(known)
-        exact = digits.precise(sampler) if system == "mpmath 40" else sampler.read(maths.FLOAT)
+        exact = digits.precise(sampler) if system == "mpmath 40" else sampler.read(systems.FLOAT)
         single = {figure: exact.single(figure) for figure in known}
         if system != "NumPy":
             return {name: subject.motion(exact.maths, exact.given), **single}
         node = Node(angles, sampler.cycle.switch(pieces))
-        return {name: _each(subject.output(maths.numpy(), exact.given, node).q2, angles), **single}
+        return {name: _each(subject.output(systems.numpy(), exact.given, node).q2, angles), **single}
 
     return _today(subject, NUMBERS, (name, *known), SYSTEMS, run)

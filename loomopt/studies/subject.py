@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import designs, maths
+from loomopt import designs
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Floats, Node, Pieces
 from loomopt.effects.kinds import Motion
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler
@@ -135,12 +136,12 @@ class Target:
             return Reference(self.placed(found.x), found.design_uncertainty, 1.0)
         objective, value = self.program.objectives[-1], found.objectives[-1]
         if objective.power != 1:
-            value = value ** (1 / maths.mpmath(REFERENCE_DIGITS).number(objective.power))
+            value = value ** (1 / systems.mpmath(REFERENCE_DIGITS).number(objective.power))
         return Reference(value, found.uncertainty, 0.0 if value else objective.scale)
 
     def placed(self, x: Mapping[str, Number]) -> list[Number]:
         """Return variables in natural sizes, apart from the moves that leave every figure unchanged."""
-        number = maths.mpmath(REFERENCE_DIGITS).number
+        number = systems.mpmath(REFERENCE_DIGITS).number
         scaled = {v.name: number(x[v.name]) / number(v.scale) for v in self.program.variables}
         for move in self.program.moves:
             if move.kind == "axis":

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from loomopt import maths
 from loomopt.effects.kinds import Check
 from loomopt.effects.shedding import coil
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.mechanisms.tension_spring import WIRES
 from loomopt.program import numbers
 
@@ -52,8 +52,8 @@ def test_the_bound_it_explains_by_is_below_the_shear_of_every_coil_that_surges_l
         made = coil.coil({**one.model_dump(), "wire": wire, "diameter": D, "turns": turns})
         stretch = BOUNDS["X0"][1] + KNOWN["travel"]
         bound = 2 * made.wahl * stretch * f * math.sqrt(2 * one.shear_modulus * one.density)
-        assert made.surge_frequency(maths.FLOAT) == pytest.approx(f, rel=1e-12)
-        assert made.shear_stress(maths.FLOAT, made.rate * stretch) == pytest.approx(bound, rel=1e-12)
+        assert made.surge_frequency(systems.FLOAT) == pytest.approx(f, rel=1e-12)
+        assert made.shear_stress(systems.FLOAT, made.rate * stretch) == pytest.approx(bound, rel=1e-12)
 
 
 def test_it_explains_surge_against_stress_with_both_numbers_and_else_says_nothing():

@@ -9,10 +9,11 @@ import pytest
 from contract import LOOSE, every_job, sampler, scene_of, solve
 
 import loomopt as lo
-from loomopt import cli, maths, tables
+from loomopt import cli, tables
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Check, Demand
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.program.sampling import Sampler
 from loomopt.schema import Figure
 from loomopt.studies.check import served
@@ -60,10 +61,10 @@ def test_figures_are_told_of_today_and_of_an_answer(job):
     for found in (lo.evaluate(scene), answer):
         sampled = sampler(scene, found.design)
         pieces, u = sampled.grid(20000)
-        pose = sampled.model.instant(maths.numpy(), sampled.given, sampled.node(pieces, u)).pose
-        values = check.quantities["made_up_peak"](maths.numpy(), pose, sampled.given.values, {})
+        pose = sampled.model.instant(systems.numpy(), sampled.given, sampled.node(pieces, u)).pose
+        values = check.quantities["made_up_peak"](systems.numpy(), pose, sampled.given.values, {})
         assert found.figures["made_up_peak"] == pytest.approx(np.max(np.abs(values)), rel=1e-6)
-        size = check.rows["made_up_size"](maths.FLOAT, sampled.given.values, {})
+        size = check.rows["made_up_size"](systems.FLOAT, sampled.given.values, {})
         assert found.figures["made_up_size"] == pytest.approx(size, rel=1e-14)
 
 
@@ -134,7 +135,7 @@ def test_loads_are_in_the_force_and_in_the_torque(job):
     both = [sampler(each) for each in (scene, without)]
     for phi in (0.4, 1.9, 4.0):
         nodes = [Node(phi, s.cycle.switch(s.cycle.place(phi)[0])) for s in both]
-        at, before = (s.model.instant(maths.FLOAT, s.given, n) for s, n in zip(both, nodes, strict=True))
+        at, before = (s.model.instant(systems.FLOAT, s.given, n) for s, n in zip(both, nodes, strict=True))
         on = made_up.BEGINS <= phi < made_up.ENDS
         drag = 0.02 * at.pose.velocity + 0.3 * on
         assert at.force - before.force == pytest.approx(drag, rel=1e-9)
@@ -200,12 +201,12 @@ def test_an_event_that_an_effect_calls_in_is_there_and_parts_the_cycle(job):
     scene = lo.load(job).set("effects.made_up_event.jump", "0.5")
     sampled = sampler(scene)
     load = {"beatup": made_up.DEAD_CENTRE, "rapier": made_up.TURNS, "shedding": made_up.HALF_OPEN}[job]
-    angles = load.corners(maths.FLOAT, sampled.given.values, {})
+    angles = load.corners(systems.FLOAT, sampled.given.values, {})
     events = angles[: {"beatup": 1, "shedding": 2}.get(job)]
 
     def at(angle, beside=0.0):
         node = Node(angle, sampled.cycle.switch(sampled.cycle.place(angle + beside)[0]))
-        return sampled.model.instant(maths.FLOAT, sampled.given, node)
+        return sampled.model.instant(systems.FLOAT, sampled.given, node)
 
     assert all(abs(EVENT[job](at(angle).pose)) < 1e-12 for angle in events)
     for angle in angles:

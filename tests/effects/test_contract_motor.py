@@ -9,8 +9,9 @@ import pytest
 from contract import LOADS, every_job, sampler
 
 import loomopt as lo
-from loomopt import maths, tables
+from loomopt import tables
 from loomopt.jobs import registry
+from loomopt.maths import systems
 
 MOTOR = {"line": "0.05", "wheel": "20"}
 AT_SPEED = {"rapier": {"effects.head_inertia": {"mass": "0.35 kg"}}, "beatup": {}, "shedding": {}}
@@ -36,7 +37,7 @@ def test_every_pose_has_the_speed_that_a_motor_gives_the_shaft(job):
     wide = np.flatnonzero(widths > 0)  # both made-up loads have the same corners
     assert len(wide) == len(widths) - 2
     pieces, u, h = np.repeat(wide, 50), np.tile(np.linspace(0.02, 0.98, 50), len(wide)), 1e-5
-    at = sampled.model.instant(maths.numpy(), sampled.given, sampled.node(pieces, u))
+    at = sampled.model.instant(systems.numpy(), sampled.given, sampled.node(pieces, u))
     pose = at.pose
     low, high = (sampled.at("omega", pieces, u + side * h) for side in (-1, 1))
     assert pose.omega_dot == pytest.approx(pose.omega * (high - low) / (2 * h * widths[pieces]), rel=1e-4, abs=1e-3)

@@ -6,10 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.effects import found as declared
 from loomopt.effects.kinds import Check, Load, Speed
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 
 BEATUP = {
@@ -46,7 +46,7 @@ OWN = {
     "centrifugal": {},
     "speed_fluctuation": {"motor_torque": 35.0, "slip": 0.08, "flywheel": 2.0},
 }
-SYSTEMS = (maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy())
+SYSTEMS = (systems.numpy(), systems.casadi(), systems.mpmath(), systems.sympy())
 G = 9.80665
 
 
@@ -111,7 +111,7 @@ def test_every_effect_has_its_case():
 @pytest.mark.parametrize("label", CASES)
 def test_the_same_number_in_every_system(label, omega_dot):
     for phi in (0.2, 1.15, 2.4, 4.0, 5.9):
-        reference = value(maths.FLOAT, *CASES[label], phi, omega_dot)
+        reference = value(systems.FLOAT, *CASES[label], phi, omega_dot)
         for system in SYSTEMS:
             found = value(system, *CASES[label], phi, omega_dot)
             assert found == pytest.approx(reference, rel=1e-12, abs=1e-12), system.name
@@ -141,17 +141,17 @@ EXPECTED = {
 @pytest.mark.parametrize("label", EXPECTED)
 def test_a_term_is_its_formula(label):
     function, own = CASES[label]
-    assert function(maths.FLOAT, PLAIN, GIVEN, own) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
+    assert function(systems.FLOAT, PLAIN, GIVEN, own) == pytest.approx(EXPECTED[label], rel=1e-14, abs=0)
 
 
 @pytest.mark.parametrize("label", CASES)
 def test_terms_take_arrays_of_crank_angles(label):
     function, own = CASES[label]
     phi = np.array([0.2, 1.15, 2.4, 4.0, 5.9])
-    joints = crank_rocker.Pose(maths.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi)
+    joints = crank_rocker.Pose(systems.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi)
     pose = Pose(phi, GIVEN["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints)
-    found = np.broadcast_to(function(maths.numpy(), pose, GIVEN, own), phi.shape)
-    assert found == pytest.approx([value(maths.FLOAT, function, own, angle) for angle in phi], rel=1e-12, abs=1e-12)
+    found = np.broadcast_to(function(systems.numpy(), pose, GIVEN, own), phi.shape)
+    assert found == pytest.approx([value(systems.FLOAT, function, own, angle) for angle in phi], rel=1e-12, abs=1e-12)
 
 
 def names_read(function, own):
@@ -165,7 +165,7 @@ def names_read(function, own):
     rod = {name: number(f"joints.{name}", 0) for name in ("rod_1", "rod_2", "cos_crank_rod", "sin_crank_rod")}
     joints = type("Joints", (), rod)
     pose = Pose(angle, given["speed"], number("q", 0), number("q1", 0), number("q2", 0), joints, rate)
-    found = function(maths.casadi(), pose, given, mine)
+    found = function(systems.casadi(), pose, given, mine)
     return {symbol.name() for symbol in ca.symvar(found)}
 
 

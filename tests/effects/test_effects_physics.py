@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
 from loomopt.jobs.beatup.model import ReedPose
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 
 MP = mpmath.MPContext()
@@ -23,13 +23,13 @@ TURN = 2 * math.pi
 LENGTHS = (0.031, 0.066, 0.155, 0.167)
 GIVEN = dict(zip(("l1", "l2", "l3", "l4"), LENGTHS, strict=True)) | {"today.l2": 0.065, "M0": 745.0}
 GIVEN |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}
-CENTRES = crank_rocker.dead_centres(maths.FLOAT, crank_rocker.Lengths(*LENGTHS))
+CENTRES = crank_rocker.dead_centres(systems.FLOAT, crank_rocker.Lengths(*LENGTHS))
 GIVEN |= {"beta": CENTRES.beta, "beta_r": CENTRES.beta_r}
 angles = st.floats(0, TURN)
 small = st.floats(-3, 3)
 
 
-def pose(phi, omega_dot=None, system=maths.FLOAT):
+def pose(phi, omega_dot=None, system=systems.FLOAT):
     joints = crank_rocker.Pose(system, crank_rocker.Lengths(*LENGTHS), phi)
     return Pose(phi, SPEED, -joints.psi, -joints.psi_1, -joints.psi_2, joints, omega_dot)
 
@@ -58,7 +58,7 @@ def test_gravity_is_the_slope_of_the_potential(phi, tilt, offset):
         opposite = psi + MP.mpf(offset) + MP.pi + MP.mpf(tilt)
         return MP.mpf("9.80665") * (reed + MP.mpf(GIVEN["m4e"]) * GIVEN["r4e"] * MP.sin(opposite))
 
-    found = gravity.force(maths.FLOAT, pose(phi), GIVEN, own, 0)
+    found = gravity.force(systems.FLOAT, pose(phi), GIVEN, own, 0)
     assert found == pytest.approx(-float(slope(potential, joints(MP.mpf(phi))[2])), rel=0, abs=1e-12 * 24)
 
 
@@ -91,9 +91,9 @@ def test_the_rods_torque_is_half_the_slope_of_its_inertia_plus_inertia_times_acc
     phi_mp, wide = MP.mpf(phi), MP.mpf(10) ** -9
     Je = rod_energy_at(phi_mp, own, model)
     half_slope = slope(lambda p: rod_energy_at(p, own, model), phi_mp, wide) / 2
-    steady = rod_inertia.force(maths.FLOAT, pose(phi), GIVEN, own, 0)
+    steady = rod_inertia.force(systems.FLOAT, pose(phi), GIVEN, own, 0)
     assert steady == pytest.approx(float(half_slope) * SPEED**2, rel=1e-12, abs=1e-12 * 0.01 * SPEED**2)
-    changing = rod_inertia.force(maths.FLOAT, pose(phi, omega_dot), GIVEN, own, 0)
+    changing = rod_inertia.force(systems.FLOAT, pose(phi, omega_dot), GIVEN, own, 0)
     assert changing - steady == pytest.approx(float(Je) * omega_dot, rel=1e-11, abs=1e-12 * 0.01 * SPEED**2)
 
 
@@ -103,9 +103,9 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
     own = {"m2": 4.0, "s2": 0.03, "JS2": 4.0 * 0.03 * (0.065 - 0.03)}
     lengths = crank_rocker.Lengths(LENGTHS[0], 0.065, LENGTHS[2], LENGTHS[3])
     for phi in np.linspace(0, TURN, 50):
-        rod = crank_rocker.Pose(maths.FLOAT, lengths, float(phi))
+        rod = crank_rocker.Pose(systems.FLOAT, lengths, float(phi))
         here = ReedPose(phi, SPEED, rod, 30.0)
-        lumped, exact = (rod_inertia.MODELS[name](maths.FLOAT, here, same, own) for name in ("lumped", "exact"))
+        lumped, exact = (rod_inertia.MODELS[name](systems.FLOAT, here, same, own) for name in ("lumped", "exact"))
         assert lumped == pytest.approx(exact, rel=1e-12, abs=1e-11)
 
 
@@ -119,18 +119,18 @@ def test_centrifugal_forces_are_those_of_the_centres_of_mass(phi, omega_dot):
     rate = slope(lambda p: joints(p)[2], phi_mp) * SPEED
     bend = slope(lambda p: slope(lambda r: joints(r)[2], p), phi_mp, MP.mpf(10) ** -10) * SPEED**2
     bend += slope(lambda p: joints(p)[2], phi_mp) * omega_dot
-    found = centrifugal.bearing_force(maths.FLOAT, moving, GIVEN, own)
+    found = centrifugal.bearing_force(systems.FLOAT, moving, GIVEN, own)
     assert found == pytest.approx(float(moment * rate**2), rel=1e-11, abs=1e-12)
     inertia = moment * MP.hypot(rate**2, bend)
-    assert centrifugal.shaking_force(maths.FLOAT, moving, GIVEN, own) == pytest.approx(float(inertia), rel=1e-12)
+    assert centrifugal.shaking_force(systems.FLOAT, moving, GIVEN, own) == pytest.approx(float(inertia), rel=1e-12)
 
 
 def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():
     own = {"pulse": 0.52}
-    begin, end = resistance.corners(maths.FLOAT, GIVEN, own)
+    begin, end = resistance.corners(systems.FLOAT, GIVEN, own)
     assert ((begin + end) / 2, end - begin) == (pytest.approx(GIVEN["beta"]), pytest.approx(0.52))
     phi = np.linspace(begin, end, 2001)
-    inside = resistance.force(maths.numpy(), pose(phi, system=maths.numpy()), GIVEN, own, 1)
+    inside = resistance.force(systems.numpy(), pose(phi, system=systems.numpy()), GIVEN, own, 1)
     assert inside[1000] == np.max(inside) == pytest.approx(745.0, rel=1e-14)
     assert (inside[0], inside[-1]) == pytest.approx((0, 0), abs=1e-11)
     assert inside == pytest.approx(inside[::-1], abs=1e-10)
@@ -141,7 +141,7 @@ def test_the_pulse_is_a_half_cosine_of_height_M0_and_area_two_over_pi():
 @pytest.mark.parametrize("beta", [0.05, 1.15, 3.1, 6.2])
 @pytest.mark.parametrize("pulse", [1e-4, 0.52, 3.0, 6.2])
 def test_the_pulse_is_on_within_half_its_width_of_the_dead_centre_on_any_turn(beta, pulse):
-    corners = resistance.corners(maths.FLOAT, {"beta": beta}, {"pulse": pulse})
+    corners = resistance.corners(systems.FLOAT, {"beta": beta}, {"pulse": pulse})
     for turns in (-2, 0, 1):
         for share in (-0.499, -0.2, 0.0, 0.4, 0.499):
             assert resistance.switch(beta + share * pulse + turns * TURN, corners) == 1.0
@@ -151,11 +151,11 @@ def test_the_pulse_is_on_within_half_its_width_of_the_dead_centre_on_any_turn(be
 
 
 def test_friction_always_opposes_the_motion():
-    corners = bearing_friction.corners(maths.FLOAT, GIVEN, {})
+    corners = bearing_friction.corners(systems.FLOAT, GIVEN, {})
     assert corners == (GIVEN["beta"], math.pi + GIVEN["beta_r"])
     for phi in np.linspace(-TURN, 2 * TURN, 1000):
         here = pose(float(phi))
         switch = bearing_friction.switch(float(phi), corners)
         assert switch == math.copysign(1, here.q1)
         for own in ({"coulomb": 2.0, "viscous": 0.0}, {"coulomb": 0.0, "viscous": 0.3}):
-            assert bearing_friction.force(maths.FLOAT, here, GIVEN, own, switch) * here.velocity > 0
+            assert bearing_friction.force(systems.FLOAT, here, GIVEN, own, switch) * here.velocity > 0

@@ -14,10 +14,10 @@ from pathlib import Path
 import plain_effects
 import pytest
 
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Check, Event, Speed
 from loomopt.jobs import registry
+from loomopt.maths import systems
 
 ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[1] / "data" / "effects.csv").open())]
 EFFECTS = {
@@ -71,13 +71,13 @@ def test_an_effect_says_what_its_row_does(row):
     else:
         phi = math.radians(float(angle))
         node = Node(phi, found.cycle.switch(found.cycle.place(phi)[0]))
-        instant = found.model.instant(maths.FLOAT, found.given, node)
+        instant = found.model.instant(systems.FLOAT, found.given, node)
         read = instant.terms()[effect] if what == "term" else quantity(found, what, node)
     assert float(read) == pytest.approx(float(value), rel=1e-11, abs=1e-12)
 
 
 def quantity(found, name, node):
-    return found.model.quantity(maths.FLOAT, found.given, name, node)
+    return found.model.quantity(systems.FLOAT, found.given, name, node)
 
 
 @pytest.mark.parametrize("row", [row for row in ROWS if plain_effects.knows(*row[:2])], ids=" ".join)

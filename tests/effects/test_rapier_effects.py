@@ -9,12 +9,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Motion
 from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs import registry
+from loomopt.maths import systems
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 RAPIER = lo.load("rapier")
@@ -30,16 +30,16 @@ numbers = st.floats(-1e3, 1e3)
 @given(st.floats(1e-3, 1e3), numbers, numbers, st.floats(0, 1e3))
 @REPEATABLE
 def test_head_inertia_is_mass_times_acceleration(mass, S_1, S_2, omega):
-    steady = head_inertia.force(maths.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2), {}, {"mass": mass}, 0)
+    steady = head_inertia.force(systems.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2), {}, {"mass": mass}, 0)
     assert steady == pytest.approx(mass * S_2 * omega**2, rel=1e-14)
-    changing = head_inertia.force(maths.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0), {}, {"mass": mass}, 0)
+    changing = head_inertia.force(systems.FLOAT, Pose(0.0, omega, 0.0, S_1, S_2, None, 7.0), {}, {"mass": mass}, 0)
     expected = mass * (S_2 * omega**2 + 7.0 * S_1)
     assert changing == pytest.approx(expected, rel=1e-14, abs=1e-14 * mass * (abs(S_2) * omega**2 + abs(S_1)))
 
 
 @pytest.mark.parametrize("switch", [-1.0, 0.0, 1.0])
 def test_tape_friction_is_its_force_with_the_sign_of_the_speed(switch):
-    assert tape_friction.force(maths.FLOAT, Motion(), {}, {"force": 15.0}, switch) == 15.0 * switch
+    assert tape_friction.force(systems.FLOAT, Motion(), {}, {"force": 15.0}, switch) == 15.0 * switch
 
 
 @given(st.lists(st.floats(0, TURN), min_size=2, max_size=6, unique=True).filter(lambda c: len(c) % 2 == 0))
@@ -57,13 +57,15 @@ def test_the_direction_changes_at_every_turn_the_first_of_them_outward(corners):
 
 def test_a_head_that_never_turns_has_no_friction_and_no_corner():
     assert tape_friction.direction(1.0, ()) == 0.0
-    assert tape_friction.corners(maths.FLOAT, {"turns": ()}, {"force": 15.0}) == ()
+    assert tape_friction.corners(systems.FLOAT, {"turns": ()}, {"force": 15.0}) == ()
 
 
 def paths(sampled):
     """Return the way the head goes in a turn, m: all its travels between turning points."""
     turns = np.sort(np.mod(sampled.given.values["turns"], TURN))
-    places = [float(sampled.model.kinematics.pose(maths.FLOAT, sampled.given, Node(float(phi), {})).q) for phi in turns]
+    places = [
+        float(sampled.model.kinematics.pose(systems.FLOAT, sampled.given, Node(float(phi), {})).q) for phi in turns
+    ]
     return float(np.abs(np.diff([*places, places[0]])).sum())
 
 
@@ -97,7 +99,7 @@ def test_the_packaged_head_draws_back_a_little_on_both_sides_of_front_dead_centr
     """It turns four times, at S = 0, −0.2206, 849.2312 and −0.3219 mm: each way it goes their sum."""
     sampled = JOB.sampler(FRICTION, {})
     phi = np.linspace(0, TURN, 400_001)
-    S = sampled.model.kinematics.pose(maths.numpy(), sampled.given, Node(phi, {})).q
+    S = sampled.model.kinematics.pose(systems.numpy(), sampled.given, Node(phi, {})).q
     after, before = S[phi < 1].min(), S[phi > 5].min()
     assert (after, before) == (pytest.approx(-0.00022065, abs=2e-8), pytest.approx(-0.00032193, abs=2e-8))
     assert len(sampled.given.values["turns"]) == 4

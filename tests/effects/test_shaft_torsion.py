@@ -22,11 +22,11 @@ from twisting_shafts import (
 )
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import TURN, Node
-from loomopt.jets import Jet, variables
 from loomopt.jobs import registry
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, variables
+from loomopt.maths.systems import FLOAT
 from loomopt.program import states
 
 TABLE = {
@@ -51,7 +51,7 @@ def digits(value):
 @every
 def test_reference_figures_in_floats_and_in_40_digits(case):
     found = sampler(*case)
-    many = found.read(maths.mpmath())
+    many = found.read(systems.mpmath())
     own = {
         "M3_fdc": (found.static["M3_fdc"], many.single("M3_fdc")),
         "z": (float(twist(found, CENTRES.beta)), None),
@@ -169,7 +169,7 @@ def test_the_largest_torque_of_the_packaged_shaft_is_where_it_was_found():
 def formula(k, c, resisted):
     """Return M3 at front dead centre in 40 digits by the formula itself, however stiff the shaft."""
     base = sampler(2e6, 45.0, resisted)
-    many = maths.mpmath()
+    many = systems.mpmath()
     values = {**base.values, "shaft_torsion.stiffness": k, "shaft_torsion.damping": c}
     given = base.model.given(many, {name: many.number(value) for name, value in values.items()})
     return base.model.static(many, given, base.stills, ("M3_fdc",))["M3_fdc"]
@@ -177,7 +177,7 @@ def formula(k, c, resisted):
 
 def rigid(resisted):
     scene = PLAIN if resisted else PLAIN.without_effect("resistance")
-    return registry.of(scene).sampler(scene, {}).read(maths.mpmath()).single("M3_fdc")
+    return registry.of(scene).sampler(scene, {}).read(systems.mpmath()).single("M3_fdc")
 
 
 def test_without_resistance_the_error_of_a_rigid_shaft_falls_as_one_over_k():
@@ -185,7 +185,7 @@ def test_without_resistance_the_error_of_a_rigid_shaft_falls_as_one_over_k():
     assert float(rigid(False)) == pytest.approx(RIGID, rel=1e-12)
     stiffnesses = (1e6, 1e7, 9e7, 1e8, 1e9, 1e10)
     from_scenes = [
-        sampler(k, one_percent(k), False).read(maths.mpmath()).single("M3_fdc") for k in stiffnesses if k < 9.7e7
+        sampler(k, one_percent(k), False).read(systems.mpmath()).single("M3_fdc") for k in stiffnesses if k < 9.7e7
     ]
     by_formula = [formula(k, one_percent(k), False) for k in stiffnesses]
     assert [float(value) for value in from_scenes] == pytest.approx([float(v) for v in by_formula[:3]], rel=1e-15)
@@ -211,7 +211,7 @@ QUANTITIES = ("peak_torque", "shaft_peak", "twist_peak", "reed_front")
 
 def traced(found):
     """Return the quantities at nodes as CasADi has them."""
-    system, symbols = maths.casadi(), {name: ca.SX.sym(name) for name in found.values}
+    system, symbols = systems.casadi(), {name: ca.SX.sym(name) for name in found.values}
     given, phi, inside = found.model.given(system, symbols), ca.SX.sym("phi"), ca.SX.sym("inside")
     values = [found.model.quantity(system, given, name, Node(phi, {"resistance": inside})) for name in QUANTITIES]
     function = ca.Function("f", [ca.vertcat(*symbols.values()), phi, inside], [ca.vertcat(*values)])
@@ -224,8 +224,8 @@ def traced(found):
 def test_every_number_system_gives_the_same():
     for case in ((2e6, 45.0), (2e5, 7.0), (1e5, 700.0)):
         found = sampler(*case)
-        many = found.read(maths.mpmath())
-        symbols, balls = traced(found), found.read(maths.balls())
+        many = found.read(systems.mpmath())
+        symbols, balls = traced(found), found.read(systems.balls())
         for name, in_symbols in zip(QUANTITIES, symbols, strict=True):
             true = [float(many.at(name, p, many.maths.number(u))) for p, u in NODES]
             size = 1e-12 * max(map(abs, true))
@@ -236,7 +236,7 @@ def test_every_number_system_gives_the_same():
             for (p, u), value in zip(NODES[1:5:3], true[1:5:3], strict=True):
                 angle = balls.starts[p] + u * (balls.starts[p + 1] - balls.starts[p])
                 ball = balls.quantity(name, angle, {"resistance": float(found.cycle.switch(p)["resistance"])})
-                series = maths.ball_series(0.0, 0.0) * 0 + ball
+                series = systems.ball_series(0.0, 0.0) * 0 + ball
                 assert abs(series[0] - value) < 1e-9 * max(map(abs, true))
 
 
@@ -253,15 +253,15 @@ def test_recordings_give_the_same_bits():
 
 
 def test_jets_have_the_slopes_and_curvatures_of_40_digits():
-    found, many = sampler(2e6, 45.0), maths.mpmath()
+    found, many = sampler(2e6, 45.0), systems.mpmath()
     names = ("l1", "l2", "l3", "l4", "m4e", "shaft_torsion.stiffness")
     start = {**found.values, "m4e": 2.0, "r4e": 0.07}
     sizes = np.diag([abs(start[name]) for name in names])
     moving = dict(zip(names, variables([start[name] for name in names], sizes, True), strict=True))
-    given = found.model.given(maths.jets(), {**start, **moving})
+    given = found.model.given(systems.jets(), {**start, **moving})
     phi = np.array([0.5, 2.0, 5.0])
     node = Node(phi, {"resistance": np.zeros(3)})
-    jet = found.model.quantity(maths.jets(), given, "shaft_peak", node)
+    jet = found.model.quantity(systems.jets(), given, "shaft_peak", node)
     assert isinstance(jet, Jet)
     step = many.number(10) ** -12
 
@@ -282,9 +282,9 @@ def test_jets_have_the_slopes_and_curvatures_of_40_digits():
 def test_many_designs_at_once_are_each_of_them():
     found = sampler(2e6, 45.0)
     l2 = np.array([0.062, 0.065, 0.07])
-    given = found.model.given(maths.numpy(), {**found.values, "l2": l2})
+    given = found.model.given(systems.numpy(), {**found.values, "l2": l2})
     node = Node(np.array([[2.0], [5.0]]), {"resistance": 0})
-    at_once = found.model.quantity(maths.numpy(), given, "shaft_peak", node)
+    at_once = found.model.quantity(systems.numpy(), given, "shaft_peak", node)
     for k, value in enumerate(l2):
         one = found.model.given(FLOAT, {**found.values, "l2": float(value)})
         single = [found.model.quantity(FLOAT, one, "shaft_peak", Node(a, {"resistance": 0})) for a in (2.0, 5.0)]
@@ -302,7 +302,7 @@ def test_what_the_crank_gives_is_what_the_cloth_and_the_damper_take(k, c):
     crank = cloth = damper = 0.0
     for piece in range(2):
         u = (x + 1) / 2
-        at = found.model.instant(maths.numpy(), found.given, found.node(np.full(400, piece), u))
+        at = found.model.instant(systems.numpy(), found.given, found.node(np.full(400, piece), u))
         (state,) = found.model.states
         z, torque = states.moved(state, at).coordinate(), at.force
         rate = (torque - k * z) / c

@@ -7,11 +7,12 @@ import pytest
 from twisting_shafts import CENTRES, HALF, J4, OMEGA, PLAIN, read, sampler, shaft, twist
 
 import loomopt as lo
-from loomopt import maths, tables
+from loomopt import tables
 from loomopt.base.quantities import exact
 from loomopt.cli import run
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.program import settled
 from loomopt.program.sampling import Sampler
 
@@ -23,7 +24,7 @@ def test_the_rocker_s_own_inertia_stays_with_the_rocker():
     phi = np.linspace(0.1, 6.0, 7)
     found = [registry.of(scene).sampler(scene, {}) for scene in (base, more)]
     pieces, u = found[0].cycle.located(phi)
-    acceleration = found[0].model.instant(maths.numpy(), found[0].given, found[0].node(pieces, u)).pose.acceleration
+    acceleration = found[0].model.instant(systems.numpy(), found[0].given, found[0].node(pieces, u)).pose.acceleration
     forces = [each.at("shaft_peak", pieces, u) for each in found]
     assert forces[1] - forces[0] == pytest.approx(0.05 * acceleration, rel=1e-11)
     assert twist(found[1], phi) == pytest.approx(twist(found[0], phi), rel=1e-14)
@@ -168,7 +169,7 @@ def test_equations_are_the_effect_s_own_and_the_product_obeys_them():
     for phi in (0.5, 1.2, 2.5, 4.0):
         low, z, high = (float(twist(found, phi + sign * h)) for sign in (-1, 0, 1))
         pieces, u = found.cycle.located(np.array([phi]))
-        terms = found.model.instant(maths.numpy(), found.given, found.node(pieces, u)).terms()
+        terms = found.model.instant(systems.numpy(), found.given, found.node(pieces, u)).terms()
         carried = sum(float(np.ravel(value)[0]) for name, value in terms.items() if name != "shaft_torsion")
         left = J4 * OMEGA**2 * (high - 2 * z + low) / h**2 + 45.0 * OMEGA * (high - low) / (2 * h) + 2e6 * z
         assert left == pytest.approx(carried, abs=2e-2)

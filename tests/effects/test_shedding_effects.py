@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.effects import found as declared
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import damping as frame_damping
@@ -19,6 +19,7 @@ from loomopt.effects.shedding import dry_friction, warp_tension, weight
 from loomopt.effects.shedding import inertia as frame_inertia
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import spring_force
+from loomopt.maths import systems
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 SHEDDING = declared.of("loomopt.effects.shedding")
@@ -30,7 +31,7 @@ H, M, G, T1, T2, C, F = 0.0656, 37.68361265059934, 369.55, 124.545, 83.03, 35.0,
 K1, X0, OMEGA = 8029.14, 0.08, 20 * math.pi
 BETA = math.radians(120)
 RISE, FAR, RETURN, NEAR = range(4)
-SYSTEMS = (maths.FLOAT, maths.numpy(), maths.casadi(), maths.mpmath(), maths.sympy())
+SYSTEMS = (systems.FLOAT, systems.numpy(), systems.casadi(), systems.mpmath(), systems.sympy())
 force_values = st.floats(-1e4, 1e4)
 shares = st.floats(0, 1)
 
@@ -71,30 +72,30 @@ def plain(value):
 @REPEATABLE
 def test_inertia_is_mass_times_acceleration(mass, q1, q2, omega):
     at = moving(q1, q2, omega)
-    assert frame_inertia.force(maths.FLOAT, at, {}, {"M": mass}, 0) == pytest.approx(mass * q2 * omega**2, rel=1e-14)
+    assert frame_inertia.force(systems.FLOAT, at, {}, {"M": mass}, 0) == pytest.approx(mass * q2 * omega**2, rel=1e-14)
     changing = moving(q1, q2, omega, 7.0)
     expected = mass * (q2 * omega**2 + q1 * 7.0)
     size = mass * (abs(q2) * omega**2 + abs(q1) * 7.0)
-    assert abs(frame_inertia.force(maths.FLOAT, changing, {}, {"M": mass}, 0) - expected) <= 1e-14 * size
+    assert abs(frame_inertia.force(systems.FLOAT, changing, {}, {"M": mass}, 0) - expected) <= 1e-14 * size
 
 
 @given(st.floats(0, 1e3), st.floats(-5, 5), st.floats(1, 100))
 @REPEATABLE
 def test_damping_pushes_against_the_velocity(damping, q1, omega):
-    found = frame_damping.force(maths.FLOAT, moving(q1, 0.0, omega), {}, {"C": damping}, 0)
+    found = frame_damping.force(systems.FLOAT, moving(q1, 0.0, omega), {}, {"C": damping}, 0)
     assert found == pytest.approx(damping * q1 * omega, rel=1e-14)
 
 
 @given(force_values)
 @REPEATABLE
 def test_weight_relieves_the_cam_and_a_negative_one_presses(value):
-    assert weight.force(maths.FLOAT, pose(), {}, {"G": value}, 0) == -value
+    assert weight.force(systems.FLOAT, pose(), {}, {"G": value}, 0) == -value
 
 
 @given(st.floats(0, 1e6), st.floats(0, 1), st.floats(0, 1))
 @REPEATABLE
 def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness, lowered, preload):
-    found = spring_force(maths.FLOAT, pose(q=lowered), {"K1": stiffness, "X0": preload}, {}, 0)
+    found = spring_force(systems.FLOAT, pose(q=lowered), {"K1": stiffness, "X0": preload}, {}, 0)
     assert found == pytest.approx(stiffness * (lowered + preload), rel=1e-15)
 
 
@@ -102,7 +103,7 @@ def test_the_return_spring_is_its_stiffness_times_its_whole_elongation(stiffness
 @REPEATABLE
 def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u, worst):
     def term(segment):
-        return dry_friction.force(maths.FLOAT, pose(segment=segment, worst=worst), {}, {"F": friction}, 0)
+        return dry_friction.force(systems.FLOAT, pose(segment=segment, worst=worst), {}, {"F": friction}, 0)
 
     assert [term(k) for k in (RISE, FAR, RETURN, NEAR)] == [friction, worst * friction, -friction, worst * friction]
 
@@ -112,7 +113,7 @@ def test_dry_friction_opposes_the_motion_and_is_the_worst_in_dwells(friction, u,
 def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle(up, down, lowered):
     own = {"T1": up, "T2": down, "shape": "linear"}
     below = lowered > 0.5
-    found = warp_tension.force(maths.FLOAT, pose(lowered=lowered), {}, own, float(below))
+    found = warp_tension.force(systems.FLOAT, pose(lowered=lowered), {}, own, float(below))
     pull = -down * (2 * lowered - 1) if below else up * (1 - 2 * lowered)
     assert abs(found + pull) <= 1e-14 * max(up, down)
 
@@ -121,14 +122,14 @@ def test_linear_tension_is_proportional_to_the_shed_on_either_side_of_its_middle
 @REPEATABLE
 def test_stepped_tension_is_the_papers_cubic_step(up, down, u):
     """STEP: y0 + (y1 − y0)u²(3 − 2u) from T1 to −T2 [Qiu21, eq 8]."""
-    found = warp_tension.force(maths.FLOAT, pose(u=u), {}, {"T1": up, "T2": down, "shape": "step"}, 0)
+    found = warp_tension.force(systems.FLOAT, pose(u=u), {}, {"T1": up, "T2": down, "shape": "step"}, 0)
     assert abs(found + (up + (-down - up) * u * u * (3 - 2 * u))) <= 1e-14 * (up + down)
 
 
 def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
     u = sp.Symbol("u")
     step = -warp_tension.force(
-        maths.sympy(), pose(u=u), {}, {"T1": sp.Integer(5), "T2": sp.Integer(3), "shape": "step"}, 0
+        systems.sympy(), pose(u=u), {}, {"T1": sp.Integer(5), "T2": sp.Integer(3), "shape": "step"}, 0
     )
     assert [step.subs(u, at) for at in (0, sp.Rational(1, 2), 1)] == [5, 1, -3]
     assert [sp.diff(step, u).subs(u, at) for at in (0, 1)] == [0, 0]
@@ -136,7 +137,7 @@ def test_a_step_starts_and_ends_level_and_is_halfway_in_the_middle():
 
 def test_levels_pull_in_the_dwells_only():
     own = {"T1": 5.0, "T2": 3.0, "shape": "levels"}
-    found = [warp_tension.force(maths.FLOAT, pose(segment=k), {}, own, 0) for k in (RISE, FAR, RETURN, NEAR)]
+    found = [warp_tension.force(systems.FLOAT, pose(segment=k), {}, own, 0) for k in (RISE, FAR, RETURN, NEAR)]
     assert found == [0, 3.0, 0, -5.0]
 
 

@@ -10,10 +10,10 @@ import plain_turn
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.base.errors import BadInput
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.program.reading import DATUM
 from loomopt.studies import accuracy, front
 from loomopt.tolerances import SAME_ANGLE
@@ -119,7 +119,7 @@ def test_what_the_motor_gives_in_a_turn_is_what_the_loads_take(scene):
     """In each turn inertia, weight, rod and flywheel give back what they take; friction and cloth do not."""
     sampler = sampler_of(turned(0.5, scene), {"m4e": 5.0, "r4e": 0.07})
     pieces, u, weights = rule(sampler)
-    at = sampler.model.instant(maths.numpy(), sampler.given, sampler.node(pieces, u))
+    at = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(pieces, u))
     pose, terms = at.pose, at.terms()
     lever = {load.name: pose.q1 if load.acts == "output" else 1.0 for load in sampler.model.loads}
     works = {name: float(weights @ (lever[name] * term)) for name, term in terms.items()}
@@ -139,7 +139,7 @@ def test_what_the_motor_gives_in_a_turn_is_what_the_loads_take(scene):
 def test_the_motors_line_is_the_torque_on_the_crank_and_on_the_flywheel(scene):
     sampler = sampler_of(turned(0.5, scene))
     pieces, u = sampler.grid(2000)
-    at = sampler.model.instant(maths.numpy(), sampler.given, sampler.node(pieces, u))
+    at = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(pieces, u))
     line = 35 / (0.08 * plain_turn.SPEED) * (sampler.static["no_load_speed"] - at.pose.omega)
     assert np.max(np.abs(line - at.crank_torque - 0.5 * at.pose.omega_dot)) < 1e-9
     assert np.max(np.abs(line - sampler.at("motor_torque", pieces, u))) < 1e-9
@@ -181,7 +181,7 @@ def test_both_sides_of_a_corner_have_their_own_change_of_speed():
     sampler = sampler_of(turned(0.5, ON.with_effect("bearing_friction")))
     count = sampler.cycle.pieces
     at = [
-        sampler.model.instant(maths.numpy(), sampler.given, sampler.node(np.arange(count), np.full(count, side))).pose
+        sampler.model.instant(systems.numpy(), sampler.given, sampler.node(np.arange(count), np.full(count, side))).pose
         for side in (0.0, 1.0)
     ]
     assert count == 4
@@ -267,9 +267,9 @@ def test_a_node_a_turn_away_is_the_same_node():
     for turns in (-1, 1):
         node = sampler.node(pieces, np.full(len(pieces), 0.3))
         away = node._replace(phi=node.phi + turns * 2 * math.pi)
-        here, there = (kinematics.pose(maths.numpy(), sampler.given, at) for at in (node, away))
+        here, there = (kinematics.pose(systems.numpy(), sampler.given, at) for at in (node, away))
         assert there.omega == pytest.approx(here.omega, rel=10 * SAME_ANGLE)
-        alone = kinematics.pose(maths.numpy(), sampler.given, away._replace(switch={}))
+        alone = kinematics.pose(systems.numpy(), sampler.given, away._replace(switch={}))
         assert alone.omega == pytest.approx(here.omega, rel=10 * SAME_ANGLE)
 
 
@@ -278,7 +278,7 @@ def test_a_scene_without_it_is_read_as_if_there_were_none():
     off = ON.without_effect("speed_fluctuation")
     sampler = sampler_of(off)
     assert sampler.model is JOB.model(BEATUP)
-    pose = sampler.model.instant(maths.numpy(), sampler.given, sampler.node(*sampler.grid())).pose
+    pose = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(*sampler.grid())).pose
     assert pose.omega_dot is None
     assert pose.omega is sampler.given.values["speed"]
     before, after = figures(BEATUP), figures(off)
@@ -301,7 +301,7 @@ ALGEBRAIC = {
 @pytest.mark.parametrize("job", NODES)
 def test_a_scene_of_algebraic_effects_has_not_a_node_more(job):
     scene = functools.reduce(lambda scene, name: scene.with_effect(name), ALGEBRAIC[job], lo.load(job))
-    own, system = registry.of(scene), maths.casadi()
+    own, system = registry.of(scene), systems.casadi()
     sampler = own.sampler(scene, own.today(scene))
     model, phi = sampler.model, ca.SX.sym("phi")
     numbers = {name: ca.SX.sym(name) for name in own.numbers(scene)}
@@ -317,4 +317,4 @@ def test_a_scene_of_algebraic_effects_has_not_a_node_more(job):
 def test_other_number_systems_refuse_a_speed_of_its_own():
     sampler = sampler_of(ON)
     with pytest.raises(TypeError):
-        sampler.read(maths.mpmath(40)).quantity("peak_torque", maths.mpmath(40).number(1.0), {})
+        sampler.read(systems.mpmath(40)).quantity("peak_torque", systems.mpmath(40).number(1.0), {})

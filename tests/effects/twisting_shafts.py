@@ -6,9 +6,9 @@ import math
 import numpy as np
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.jobs import registry
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import states
 
@@ -44,6 +44,6 @@ def twist(found, phi):
 
 def read(found, phi):
     pieces, u = found.cycle.located(np.asarray(phi))
-    at = found.model.instant(maths.numpy(), found.given, found.node(pieces, u))
+    at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
     (state,) = found.model.states
     return states.moved(state, at)

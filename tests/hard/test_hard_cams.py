@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -158,6 +158,6 @@ def test_a_jump_of_acceleration_is_judged_on_both_sides():
 @pytest.mark.parametrize("name", [name for name, law in LAWS.items() if law.smooth == 1])
 def test_laws_whose_acceleration_jumps_have_both_one_sided_values(name):
     law = LAWS[name]
-    first, last = law.formula(maths.FLOAT, 0.0, 0.0), law.formula(maths.FLOAT, 1.0, float(len(law.breaks)))
+    first, last = law.formula(systems.FLOAT, 0.0, 0.0), law.formula(systems.FLOAT, 1.0, float(len(law.breaks)))
     assert [first.s, first.s1, last.s, last.s1] == [0.0, 0.0, 1.0, 0.0]
     assert [first.s2, last.s2] == pytest.approx([math.pi**2 / 2, -(math.pi**2) / 2], rel=1e-15)

@@ -12,7 +12,7 @@ import pytest
 from hard_digits import MP, TIME_STEP, angle, centres, exact, worst_ulps
 
 import loomopt as lo
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker_synthesis, rapier_faults, sley_synthesis
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -34,7 +34,7 @@ def test_synthesis_as_the_time_ratio_goes_to_1(theta):
     random = np.random.default_rng(11)
     for _ in range(4):
         data = theta, random.uniform(0.6, 1.4), random.uniform(0.1, 0.8)
-        assert worst_ulps(crank_rocker_synthesis.synthesis(maths.FLOAT, *data), four_bar, data) <= 2
+        assert worst_ulps(crank_rocker_synthesis.synthesis(systems.FLOAT, *data), four_bar, data) <= 2
 
 
 def seen_under(l1, l2, l3, l71):
@@ -46,13 +46,13 @@ def seen_under(l1, l2, l3, l71):
 @pytest.mark.parametrize("swing", [0.1, 0.227, 0.5])
 def test_the_sleys_synthesis_as_the_time_ratio_goes_to_1(theta, swing):
     """Back through the dead centres in 120 digits: θ and swing to 1e-14 rad, and no time ratio of 1 is singular."""
-    l1, l2 = sley_synthesis.sley(maths.FLOAT, theta, swing, 0.684, 0.773)
+    l1, l2 = sley_synthesis.sley(systems.FLOAT, theta, swing, 0.684, 0.773)
     found = seen_under(*exact(l1, l2, 0.684, 0.773))
     assert [float(found[0] - MP.mpf(theta)), float(found[1] - MP.mpf(swing))] == pytest.approx([0, 0], abs=1e-14)
 
 
 def test_the_sleys_crank_keeps_its_digits_as_the_swing_goes_to_0():
-    l1, l2 = sley_synthesis.sley(maths.FLOAT, 0.0, 1e-12, 0.684, 0.773)
+    l1, l2 = sley_synthesis.sley(systems.FLOAT, 0.0, 1e-12, 0.684, 0.773)
     found = seen_under(*exact(l1, l2, 0.684, 0.773))[1]
     assert float(found) == pytest.approx(1e-12, rel=1e-12, abs=0)
 
@@ -83,7 +83,7 @@ def drive_rates(*data):
 def spans():
     """Return crank angles and the distance from C to B2 there, of today's drive."""
     phi = np.linspace(0, 2 * math.pi, 200_001)
-    base = Pose(maths.numpy(), TODAY, Sley(maths.FLOAT, TODAY).stand, phi).base
+    base = Pose(systems.numpy(), TODAY, Sley(systems.FLOAT, TODAY).stand, phi).base
     return phi, np.hypot(base.x, base.y)
 
 
@@ -100,7 +100,7 @@ def nearly_singular(side, gap):
 def test_a_five_bar_near_its_singular_position_to_two_ulps_times_condition(side, gap):
     d, place = nearly_singular(side, gap)
     for off in (0, 1e-8, -1e-5, 1e-3):
-        pose = Pose(maths.FLOAT, d, Sley(maths.FLOAT, d).stand, place + off)
+        pose = Pose(systems.FLOAT, d, Sley(systems.FLOAT, d).stand, place + off)
         data = [*(getattr(d, key) for key in KEYS), place + off]
         assert worst_ulps((pose.phi63_1, pose.phi63_2), drive_rates, data) <= 2
 

@@ -11,8 +11,8 @@ import pytest
 from hard_digits import CENTRES, EPS, MP, centres, exact, motion, transmission, turns, worst_ulps
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.effects.beatup import inertia
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker, dyad
 from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 
@@ -84,7 +84,7 @@ def draws(name, cases=None):
     for number, (sides, place) in enumerate(chosen):
         lengths = Lengths(*[*map(float, sides), int(random.choice([-1, 1]))])
         if place == "dead centre":
-            stands = dead_centres(maths.FLOAT, lengths)
+            stands = dead_centres(systems.FLOAT, lengths)
             yield lengths, float(random.choice([stands.beta, math.pi + stands.beta_r]))
         elif place is None:
             yield lengths, float(random.uniform(0, 2 * math.pi))
@@ -99,7 +99,7 @@ def sides_of(lengths):
 @pytest.mark.parametrize("name", CASES)
 def test_positions_and_rates_to_a_few_ulps_times_condition(name):
     for lengths, phi in draws(name):
-        pose = Pose(maths.FLOAT, lengths, phi)
+        pose = Pose(systems.FLOAT, lengths, phi)
         found = pose.psi, pose.psi_1, pose.psi_2
         assert worst_ulps(found, motion(lengths.side), [*sides_of(lengths), phi]) <= CASES[name][2]
 
@@ -107,11 +107,11 @@ def test_positions_and_rates_to_a_few_ulps_times_condition(name):
 @pytest.mark.parametrize("name", CASES)
 def test_dead_centres_and_transmission_angles_to_a_few_ulps_times_condition(name):
     for lengths, _ in draws(name):
-        stands = dead_centres(maths.FLOAT, lengths)
+        stands = dead_centres(systems.FLOAT, lengths)
         data = sides_of(lengths)
         assert worst_ulps([getattr(stands, of) for of in CENTRES], centres(lengths.side), data) <= CASES[name][2]
         near, far = (
-            of(maths.FLOAT, lengths)
+            of(systems.FLOAT, lengths)
             for of in (crank_rocker.transmission_angle_near, crank_rocker.transmission_angle_far)
         )
         assert worst_ulps((near, far), transmission, data) <= CASES[name][2]
@@ -124,7 +124,7 @@ def test_a_rod_of_1e6_cranks_and_a_short_rocker_to_1e_9_rad(name):
     For that front and rear move apart; in ulps times condition it is up to 400.
     """
     for lengths, phi in draws(name, SHORT_ROCKERS):
-        data, pose, stands = sides_of(lengths), Pose(maths.FLOAT, lengths, phi), dead_centres(maths.FLOAT, lengths)
+        data, pose, stands = sides_of(lengths), Pose(systems.FLOAT, lengths, phi), dead_centres(systems.FLOAT, lengths)
         found = [pose.psi, pose.psi_1, pose.psi_2, *(getattr(stands, of) for of in CENTRES)]
         true = [*motion(lengths.side)(*exact(*data, phi)), *centres(lengths.side)(*exact(*data))]
         most = max(float(abs(MP.mpf(one) - other)) for one, other in zip(found, true, strict=True))
@@ -135,7 +135,7 @@ def test_a_rod_of_1e6_cranks_and_a_short_rocker_to_1e_9_rad(name):
 def test_the_branch_never_flips(name):
     """Even where the condition allows no digit: C stays on its side, ψ within 1e-6 rad of the true branch."""
     for lengths, phi in draws(name):
-        pose = Pose(maths.FLOAT, lengths, phi)
+        pose = Pose(systems.FLOAT, lengths, phi)
         true = motion(lengths.side)(*exact(*sides_of(lengths), phi))[0]
         assert abs(MP.sin((MP.mpf(pose.psi) - true) / 2)) < 1e-6
         assert math.copysign(1, pose.dyad.area4) == lengths.side
@@ -158,7 +158,7 @@ def test_transmission_angle_180_less_1e_8_is_beyond_float64_and_told_by_its_cond
     chosen = [sides for sides in found if turns(*sides)]
     assert len(chosen) > 5
     for sides in chosen:
-        far = crank_rocker.transmission_angle_far(maths.FLOAT, Lengths(*sides))
+        far = crank_rocker.transmission_angle_far(systems.FLOAT, Lengths(*sides))
         assert 0 <= far < 1e-7
         assert worst_ulps([far], lambda *x: transmission(*x)[1:], sides) <= 2
 
@@ -226,7 +226,7 @@ def test_peaks_are_right_as_near_to_a_change_point_as_designs_may_come(share):
 def test_at_both_dead_centres_the_reed_stands_still_and_nothing_jumps():
     """ψ' vanishes to rounding of the crank angle; without friction M3 is the same from either side."""
     scene = lo.load("beatup")
-    stands = dead_centres(maths.FLOAT, Lengths(*(scene.mechanism[f"l{k}"] for k in (1, 2, 3, 4))))
+    stands = dead_centres(systems.FLOAT, Lengths(*(scene.mechanism[f"l{k}"] for k in (1, 2, 3, 4))))
     curves = lo.simulate(scene)
     for at in (stands.beta, math.pi + stands.beta_r):
         rows = curves[np.abs(curves["phi [rad]"] - at) < 1e-12]
@@ -247,6 +247,6 @@ def test_friction_at_a_dead_centre_is_shown_from_both_sides():
 
 def test_a_dyad_that_does_not_close_is_never_a_number():
     with pytest.raises(ValueError, match=r"math domain|nonnegative"):
-        dyad.close(maths.FLOAT, dyad.Vector(2.0 + 4 * EPS, 0.0), 1.0, 1.0, 1)
+        dyad.close(systems.FLOAT, dyad.Vector(2.0 + 4 * EPS, 0.0), 1.0, 1.0, 1)
     with np.errstate(invalid="ignore"):
-        assert np.isnan(dyad.close(maths.numpy(), dyad.Vector(np.array([2.1]), 0.0), 1.0, 1.0, 1).area4)
+        assert np.isnan(dyad.close(systems.numpy(), dyad.Vector(np.array([2.1]), 0.0), 1.0, 1.0, 1).area4)

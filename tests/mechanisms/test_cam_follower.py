@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_follower import Contact, Follower, fault
 from loomopt.mechanisms.cam_laws import LAWS
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
-MP = maths.mpmath(60)
+MP = systems.mpmath(60)
 H = MP.number(1) / 10**15
 """Step of the differences: error about H² times a derivative, 1e-30; 60 digits leave 1e-30 of second differences."""
 
@@ -204,7 +204,7 @@ def test_the_start_angle_keeps_its_digits_folded_and_stretched(reach, sign, marg
     a, side, r0 = (MP.number(value) for value in (1.0, arm, follower.base_radius))
     cosine = (a**2 + side**2 - r0**2) / (2 * a * side)
     known = MP.atan2(MP.sqrt(1 - cosine**2), cosine)
-    found = follower.start_angle(maths.FLOAT)
+    found = follower.start_angle(systems.FLOAT)
     room = min(r0 - abs(a - side), a + side - r0)
     rounded = 2.0**-52 * (a + side) / room * min(known, MP.pi - known)
     assert abs(found - known) < 4 * (2.0**-52 * known + rounded)
@@ -216,8 +216,8 @@ def test_a_larger_cam_of_the_same_shape_has_the_same_angles(motion, exponent):
     follower, *swing = motion
     scale = math.exp(exponent)
     sizes = [*(value * scale for value in dataclasses.astuple(follower)[:4]), follower.arm_swing]
-    here = Contact(maths.FLOAT, follower, *swing)
-    there = Contact(maths.FLOAT, Follower(*sizes), *swing)
+    here = Contact(systems.FLOAT, follower, *swing)
+    there = Contact(systems.FLOAT, Follower(*sizes), *swing)
     size = 1e-9 * (abs(here.curvature) + 1 / here.speed)
     assert there.pressure_angle == pytest.approx(here.pressure_angle, rel=0, abs=1e-11)
     assert there.curvature * scale == pytest.approx(here.curvature, rel=0, abs=size)
@@ -232,11 +232,11 @@ def test_a_whole_cam_turns_its_tangent_once(name):
     total = 2 * math.pi / 3
     for piece, (begin, end) in enumerate(itertools.pairwise(bounds)):
         u = begin + (end - begin) * (1 + nodes) / 2
-        found = law.formula(maths.numpy(), u, np.full(u.shape, float(piece)))
+        found = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
         parts = weights * (end - begin) / 2 * angle
         for slope in (1, -1):
             swing = (SHEDDING.arm_swing * value for value in (found.s, slope * found.s1 / angle, found.s2 / angle**2))
-            contact = Contact(maths.numpy(), SHEDDING, *swing)
+            contact = Contact(systems.numpy(), SHEDDING, *swing)
             total += parts @ (contact.curvature * contact.speed)
     assert total == pytest.approx(2 * math.pi, rel=0, abs=1e-11)
 
@@ -260,10 +260,10 @@ def test_every_number_system_gives_the_same_numbers(swing):
 
     known = [float(value) for value in figures_of(MP, [MP.number(value) for value in numbers])]
     symbols = ca.SX.sym("x", 9)
-    function = ca.Function("f", [symbols], [ca.vertcat(*figures_of(maths.casadi(), ca.vertsplit(symbols)))])
-    arrays = figures_of(maths.numpy(), [*numbers[:5], *(np.full((2, 3), value) for value in numbers[5:])])
-    sympy = figures_of(maths.sympy(), [maths.sympy().number(value) for value in numbers])
-    assert figures_of(maths.FLOAT, numbers) == pytest.approx(known, rel=1e-12, abs=1e-14)
+    function = ca.Function("f", [symbols], [ca.vertcat(*figures_of(systems.casadi(), ca.vertsplit(symbols)))])
+    arrays = figures_of(systems.numpy(), [*numbers[:5], *(np.full((2, 3), value) for value in numbers[5:])])
+    sympy = figures_of(systems.sympy(), [systems.sympy().number(value) for value in numbers])
+    assert figures_of(systems.FLOAT, numbers) == pytest.approx(known, rel=1e-12, abs=1e-14)
     assert np.array(function(numbers)).ravel() == pytest.approx(known, rel=1e-12, abs=1e-14)
     assert [value.shape for value in arrays] == [(2, 3)] * len(known)
     assert [value[1, 2] for value in arrays] == pytest.approx(known, rel=1e-12, abs=1e-14)
@@ -302,7 +302,7 @@ def test_a_follower_is_refused_exactly_when_its_triangle_does_not_close(arm, cen
     gap = sides[0] + sides[1] - sides[2]
     if gap > 1e-12:
         assert fault(follower) == ""
-        assert 0 < follower.start_angle(maths.FLOAT) < math.pi
+        assert 0 < follower.start_angle(systems.FLOAT) < math.pi
     elif gap < -1e-12:
         assert "the roller cannot" in fault(follower)
 
@@ -313,6 +313,6 @@ def test_a_follower_that_only_just_closes_is_refused_too():
     assert fault(follower) == ""
     assert "so near" in fault(dataclasses.replace(follower, base_radius=0.25))
     assert "so far" in fault(dataclasses.replace(follower, base_radius=0.75))
-    rest = math.pi - follower.start_angle(maths.FLOAT)
-    assert follower.start_angle(maths.FLOAT) + rest == math.pi
+    rest = math.pi - follower.start_angle(systems.FLOAT)
+    assert follower.start_angle(systems.FLOAT) + rest == math.pi
     assert "below 180 deg" in fault(dataclasses.replace(follower, arm_swing=rest))

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
-MP = maths.mpmath(60)
+MP = systems.mpmath(60)
 PI = MP.pi
 H = MP.number(1) / 10**15
 """Step of the differences: their error is H² times a derivative below 1e9; 60 digits leave 1e-30 of the second one."""
@@ -131,7 +131,7 @@ def test_the_laws_are_those_that_scenes_may_name():
 
 @every_law
 def test_a_law_rises_from_rest_at_0_to_rest_at_1_exactly_in_floats(law):
-    start, stop = law.formula(maths.FLOAT, 0.0, 0.0), law.formula(maths.FLOAT, 1.0, float(len(law.breaks)))
+    start, stop = law.formula(systems.FLOAT, 0.0, 0.0), law.formula(systems.FLOAT, 1.0, float(len(law.breaks)))
     assert (start.s, start.s1, stop.s, stop.s1) == (0, 0, 1, 0)
     if law.smooth >= 2:
         assert (start.s2, stop.s2) == (0, 0)
@@ -165,7 +165,7 @@ def test_each_derivative_is_that_of_the_one_before(law, u):
 @every_law
 def test_derivatives_agree_with_automatic_differentiation(law):
     u, piece = ca.SX.sym("u"), ca.SX.sym("piece")
-    found = law.formula(maths.casadi(), u, piece)
+    found = law.formula(systems.casadi(), u, piece)
     by_ad = ca.vertcat(*(ca.jacobian(ca.SX(value), u) for value in found[:3]))
     both = ca.Function("both", [u, piece], [by_ad, ca.vertcat(*found[1:])])
     for place in np.linspace(0, 1, 81):
@@ -193,7 +193,7 @@ def test_a_law_is_continuous_to_the_order_it_claims_and_no_further(law):
 def test_a_law_rises_all_the_way(law, u):
     if 1e-20 < u < 1:  # nearer to 0 the slope is below the 60 digits of the 1 it is taken from
         assert digits(law, exact(u), piece_at(law, u)).s1 > 0
-    assert law.formula(maths.FLOAT, u, piece_at(law, u)).s1 >= 0
+    assert law.formula(systems.FLOAT, u, piece_at(law, u)).s1 >= 0
 
 
 @every_law
@@ -214,7 +214,7 @@ def test_velocity_integrates_to_the_rise_and_acceleration_to_rest(law):
     for piece, (begin, end) in enumerate(zip(ends(law), ends(law)[1:], strict=False)):
         half = float(end - begin) / 2
         u = float(begin) + half * (1 + nodes)
-        found = law.formula(maths.numpy(), u, np.full(u.shape, float(piece)))
+        found = law.formula(systems.numpy(), u, np.full(u.shape, float(piece)))
         totals += [half * weights @ np.broadcast_to(value, u.shape) for value in (found.s1, found.s2)]
     assert totals == pytest.approx([1, 0], rel=0, abs=1e-13)
 
@@ -239,7 +239,7 @@ def test_peaks_are_those_in_print(name):
 @REPEATABLE
 def test_floats_keep_1e_15_of_each_peak(law, u):
     piece = piece_at(law, u)
-    found, known = law.formula(maths.FLOAT, u, piece), digits(law, exact(u), piece)
+    found, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
     assert abs(found.s - known.s) < 1e-15
     for order in (1, 2, 3):
         assert abs(found[order] - known[order]) < 4e-15 * PEAKS[law.name][order - 1]
@@ -250,7 +250,7 @@ def test_floats_keep_1e_15_of_each_peak(law, u):
 @REPEATABLE
 def test_floats_keep_1e_15_at_both_ends(law, rest):
     for u, piece in ((rest, 0.0), (1 - rest, float(len(law.breaks)))):
-        found, known = law.formula(maths.FLOAT, u, piece), digits(law, exact(u), piece)
+        found, known = law.formula(systems.FLOAT, u, piece), digits(law, exact(u), piece)
         for order in (0, 1, 2):
             assert abs(found[order] - known[order]) < 1e-15 * max(1, abs(known[order]))
 
@@ -259,15 +259,15 @@ def test_floats_keep_1e_15_at_both_ends(law, rest):
 def test_every_number_system_gives_the_same_numbers(law):
     places = np.array([0.0, 0.06, 0.125, 0.2, 0.375, 0.45, 0.5, 0.6, 0.625, 0.8, 0.875, 0.93, 1.0])
     pieces = np.array([piece_at(law, u) for u in places])
-    arrays = law.formula(maths.numpy(), places, pieces)
+    arrays = law.formula(systems.numpy(), places, pieces)
     u, piece = ca.SX.sym("u"), ca.SX.sym("piece")
-    symbols = ca.Function("law", [u, piece], [ca.vertcat(*law.formula(maths.casadi(), u, piece))])
+    symbols = ca.Function("law", [u, piece], [ca.vertcat(*law.formula(systems.casadi(), u, piece))])
     for k, (place, number) in enumerate(zip(places.tolist(), pieces.tolist(), strict=True)):
         known = [float(value) for value in digits(law, exact(place), number)]
-        constant = ca.Function("law", [u], [ca.vertcat(*law.formula(maths.casadi(), u, number))])
-        sympy = law.formula(maths.sympy(), maths.sympy().number(place), number)
+        constant = ca.Function("law", [u], [ca.vertcat(*law.formula(systems.casadi(), u, number))])
+        sympy = law.formula(systems.sympy(), systems.sympy().number(place), number)
         for found in (
-            law.formula(maths.FLOAT, place, number),
+            law.formula(systems.FLOAT, place, number),
             [np.broadcast_to(value, places.shape)[k] for value in arrays],
             np.array(symbols(place, number)).ravel(),
             np.array(constant(place)).ravel(),

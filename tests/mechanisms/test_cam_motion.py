@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import cam_spline
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_motion import (

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import DIP, cycloid_like, mirrored, spline, tabulated
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
-MP = maths.mpmath(50)
-NUMPY = maths.numpy()
+MP = systems.mpmath(50)
+NUMPY = systems.numpy()
 GRID = np.linspace(0, 1, 241)
 
 accelerations = st.lists(st.floats(-20, 20), min_size=2, max_size=14)
@@ -45,7 +45,7 @@ def uneven_rises(draw):
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_is_the_one_scipy_puts_through_its_knots(values):
-    found = spline(maths.FLOAT, values)
+    found = spline(systems.FLOAT, values)
     knots = np.array([0, *found.breaks, 1], dtype=float)
     known = CubicSpline(knots, found.s, bc_type=((1, 0.0), (1, found.end[1])))
     u = np.setdiff1d(GRID, knots)
@@ -56,21 +56,21 @@ def test_the_spline_is_the_one_scipy_puts_through_its_knots(values):
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_has_the_given_second_derivatives_at_its_knots_from_either_side(values):
-    found = spline(maths.FLOAT, values)
+    found = spline(systems.FLOAT, values)
     n = found.intervals
     assert found.a == tuple(values)
     assert len(found.breaks) == n - 1
     for k in range(n + 1):
         known = (found.s[k], found.v[k], found.a[k])
         for piece in {max(k - 1, 0), min(k, n - 1)}:
-            here = found.at(maths.FLOAT, k / n, float(piece))
+            here = found.at(systems.FLOAT, k / n, float(piece))
             assert here[:3] == pytest.approx(known, rel=0, abs=1e-13)
 
 
 @given(accelerations)
 @REPEATABLE
 def test_the_spline_starts_at_rest_and_ends_at_the_integrals_of_its_second_derivative(values):
-    found = spline(maths.FLOAT, values)
+    found = spline(systems.FLOAT, values)
     nodes, weights = np.polynomial.legendre.leggauss(4)
     u = np.concatenate([(k + (1 + nodes) / 2) / found.intervals for k in range(found.intervals)])
     parts = np.tile(weights / 2 / found.intervals, found.intervals)
@@ -94,19 +94,19 @@ def test_each_derivative_of_the_spline_is_that_of_the_one_before_in_50_digits(n)
 @REPEATABLE
 def test_the_spline_of_symbols_is_the_spline_of_numbers(values):
     a, u, piece = ca.SX.sym("a", len(values)), ca.SX.sym("u"), ca.SX.sym("piece")
-    symbolic = spline(maths.casadi(), ca.vertsplit(a))
-    at = ca.Function("at", [a, u, piece], [ca.vertcat(*symbolic.at(maths.casadi(), u, piece))])
-    known = sampled(spline(maths.FLOAT, values))
+    symbolic = spline(systems.casadi(), ca.vertsplit(a))
+    at = ca.Function("at", [a, u, piece], [ca.vertcat(*symbolic.at(systems.casadi(), u, piece))])
+    known = sampled(spline(systems.FLOAT, values))
     found = np.array(at(values, GRID[None, :], pieces(symbolic)[None, :]))
     assert found == pytest.approx(known, rel=0, abs=1e-12 * len(values) ** 2)
-    fixed = ca.Function("at", [a, u], [ca.vertcat(*symbolic.at(maths.casadi(), u, 0.0))])
+    fixed = ca.Function("at", [a, u], [ca.vertcat(*symbolic.at(systems.casadi(), u, 0.0))])
     assert np.array(fixed(values, 0.0)).ravel() == pytest.approx(known[:, 0], rel=0, abs=1e-12 * len(values) ** 2)
 
 
 def test_the_spline_is_linear_in_its_accelerations():
     a, u = ca.SX.sym("a", 9), ca.SX.sym("u")
-    found = spline(maths.casadi(), ca.vertsplit(a))
-    at = found.at(maths.casadi(), u, 5.0)
+    found = spline(systems.casadi(), ca.vertsplit(a))
+    at = found.at(systems.casadi(), u, 5.0)
     rows = ca.vertcat(*found.end, *at)
     assert not ca.depends_on(ca.jacobian(rows, a), a)
     assert ca.jacobian(at.s2, a).nnz() == 2, "the second derivative depends on the two knots beside it alone"
@@ -114,7 +114,7 @@ def test_the_spline_is_linear_in_its_accelerations():
 
 def test_the_spline_of_symbols_differentiates_to_its_own_derivatives():
     a, u, piece = ca.SX.sym("a", 7), ca.SX.sym("u"), ca.SX.sym("piece")
-    found = spline(maths.casadi(), ca.vertsplit(a)).at(maths.casadi(), u, piece)
+    found = spline(systems.casadi(), ca.vertsplit(a)).at(systems.casadi(), u, piece)
     by_ad = ca.vertcat(*(ca.jacobian(value, u) for value in found[:3]))
     both = ca.Function("both", [a, u, piece], [by_ad, ca.vertcat(*found[1:])])
     for k in range(6):
@@ -124,7 +124,7 @@ def test_the_spline_of_symbols_differentiates_to_its_own_derivatives():
 
 def test_the_spline_keeps_exact_numbers_exact():
     a = sp.symbols("a0:5")
-    height, slope = spline(maths.sympy(), a).end
+    height, slope = spline(systems.sympy(), a).end
     assert sp.expand(96 * height - (11 * a[0] + 18 * a[1] + 12 * a[2] + 6 * a[3] + a[4])) == 0
     assert sp.expand(8 * slope - (a[0] + 2 * a[1] + 2 * a[2] + 2 * a[3] + a[4])) == 0
 
@@ -132,7 +132,7 @@ def test_the_spline_keeps_exact_numbers_exact():
 @given(st.lists(st.floats(-20, 20), min_size=1, max_size=8))
 @REPEATABLE
 def test_a_mirrored_spline_is_its_own_mirror_image_and_ends_at_rest(half):
-    found = spline(maths.FLOAT, mirrored(half))
+    found = spline(systems.FLOAT, mirrored(half))
     height, slope = found.end
     assert found.intervals == 2 * len(half)
     assert slope == pytest.approx(0, abs=1e-13)
@@ -147,17 +147,17 @@ def test_mirroring_works_on_symbols():
     a, b, c = sp.symbols("a b c")
     assert mirrored([a, b, c]) == (a, b, c, 0, -c, -b, -a)
     halves = ca.SX.sym("a", 4)
-    height, slope = spline(maths.casadi(), mirrored(ca.vertsplit(halves))).end
+    height, slope = spline(systems.casadi(), mirrored(ca.vertsplit(halves))).end
     found = ca.Function("end", [halves], [height, slope])([0, 5, 6, 5])
     assert [float(value) for value in found] == pytest.approx(
-        spline(maths.FLOAT, mirrored([0, 5, 6, 5])).end, abs=1e-14
+        spline(systems.FLOAT, mirrored([0, 5, 6, 5])).end, abs=1e-14
     )
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 7, 8, 16, 33, 64, 128])
 def test_the_start_rises_from_rest_to_rest(n):
     found = cycloid_like(n)
-    law = spline(maths.FLOAT, found)
+    law = spline(systems.FLOAT, found)
     assert law.intervals == n
     assert law.end == pytest.approx((1, 0), rel=0, abs=1e-14)
     assert (found[0], found[-1]) == (0, 0)
@@ -168,7 +168,7 @@ def test_the_start_rises_from_rest_to_rest(n):
 
 def test_the_start_tends_to_the_cycloid_at_second_order():
     known = LAWS["cycloidal"].formula(NUMPY, GRID, 0.0 * GRID)
-    errors = [np.abs(sampled(spline(maths.FLOAT, cycloid_like(n)))[0] - known.s).max() for n in (16, 32, 64)]
+    errors = [np.abs(sampled(spline(systems.FLOAT, cycloid_like(n)))[0] - known.s).max() for n in (16, 32, 64)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (orders > 1.9).all()
     assert errors[-1] < 1e-3
@@ -199,7 +199,7 @@ def test_the_table_meets_its_points_from_either_side_with_one_slope_and_one_seco
     found = tabulated(u, s)
     for k, place in enumerate(u.tolist()):
         for piece in {max(k - 1, 0), min(k, len(u) - 2)}:
-            here = found.at(maths.FLOAT, place, float(piece))
+            here = found.at(systems.FLOAT, place, float(piece))
             assert here.s == pytest.approx(s[k], rel=0, abs=1e-14)
             assert here.s1 == pytest.approx(found.v[k], rel=0, abs=1e-12)
             assert here.s2 == pytest.approx(found.a[k], rel=0, abs=1e-10)
@@ -225,13 +225,13 @@ def test_a_table_tends_to_its_law_at_fourth_order(lean):
 def test_every_number_system_reads_the_same_table(points):
     found = tabulated(*points)
     u, piece = ca.SX.sym("u"), ca.SX.sym("piece")
-    symbols = ca.Function("at", [u, piece], [ca.vertcat(*found.at(maths.casadi(), u, piece))])
+    symbols = ca.Function("at", [u, piece], [ca.vertcat(*found.at(systems.casadi(), u, piece))])
     known = sampled(found)
     scale = np.abs(known).max(axis=1)
     for k in range(0, len(GRID), 12):
         place, number = float(GRID[k]), float(pieces(found)[k])
         for values in (
-            found.at(maths.FLOAT, place, number),
+            found.at(systems.FLOAT, place, number),
             found.at(MP, MP.number(place), number),
             np.array(symbols(place, number)).ravel(),
         ):

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
 from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 
@@ -95,7 +95,7 @@ def assert_few_ulp(found, reference, data, ulps):
 @given(linkages(), angles)
 @REPEATABLE
 def test_psi_and_its_derivatives_to_four_ulp_times_condition(lengths, phi):
-    pose = Pose(maths.FLOAT, lengths, phi)
+    pose = Pose(systems.FLOAT, lengths, phi)
     found = (pose.psi, pose.psi_1, pose.psi_2)
     assert_few_ulp(found, motion(lengths.side), [*numbers(lengths), phi], 4)
 
@@ -103,7 +103,7 @@ def test_psi_and_its_derivatives_to_four_ulp_times_condition(lengths, phi):
 @given(linkages(), angles)
 @REPEATABLE
 def test_closed_forms_to_twenty_digits(lengths, phi):
-    system = maths.mpmath(60)
+    system = systems.mpmath(60)
     exact = [MP.mpf(x) for x in (*numbers(lengths), phi)]
     l1, l2, l3, l4, angle = exact
     pose = Pose(system, Lengths(l1, l2, l3, l4, lengths.side), angle)
@@ -115,7 +115,7 @@ def automatic():
     """Return ψ' and ψ'' by AD of ψ alone, both as closed forms, and the sizes of both: |f| + Σ|x ∂f/∂x|."""
     data, side = ca.SX.sym("x", 5), ca.SX.sym("side")
     l1, l2, l3, l4, phi = ca.vertsplit(data)
-    pose = Pose(maths.casadi(), Lengths(l1, l2, l3, l4, side), phi)
+    pose = Pose(systems.casadi(), Lengths(l1, l2, l3, l4, side), phi)
     first = ca.jacobian(pose.psi, phi)
     closed = ca.vertcat(pose.psi_1, pose.psi_2)
     size = ca.fabs(closed) + ca.mtimes(ca.fabs(ca.jacobian(closed, data)), ca.fabs(data))
@@ -139,7 +139,7 @@ def test_both_dead_centres_to_eight_ulp_times_condition(crank):
     @given(linkages(crank))
     @REPEATABLE
     def check(lengths):
-        centres = dead_centres(maths.FLOAT, lengths)
+        centres = dead_centres(systems.FLOAT, lengths)
         found = [getattr(centres, name) for name in CENTRES]
         assert_few_ulp(found, triangles(lengths.side), numbers(lengths), 8)
 
@@ -150,7 +150,7 @@ def test_a_difference_of_two_angles_has_no_digits_left_for_a_tiny_crank():
     worst, naive = 0, 0
     for l2 in np.linspace(0.65, 0.9, 9):
         lengths = Lengths(1e-9, float(l2), 0.8, 1.0)
-        centres = dead_centres(maths.FLOAT, lengths)
+        centres = dead_centres(systems.FLOAT, lengths)
         theta, swing = triangles(1)(*(MP.mpf(x) for x in numbers(lengths)))[2:4]
         worst = max(worst, abs(centres.theta / theta - 1), abs(centres.swing / swing - 1))
         difference = centres.psi_rear - centres.psi_front
@@ -166,8 +166,8 @@ SCANNED = [PAPER, Lengths(0.3, 0.95, 0.6, 1.0), Lengths(0.1, 0.3, 0.85, 1.0), Le
 def test_dead_centres_are_the_extremes_of_a_dense_scan(lengths, side):
     lengths = lengths._replace(side=side)
     phi, step = np.linspace(0, 2 * math.pi, 200_000, endpoint=False, retstep=True)
-    psi = side * Pose(maths.numpy(), lengths, phi).psi
-    centres = dead_centres(maths.FLOAT, lengths)
+    psi = side * Pose(systems.numpy(), lengths, phi).psi
+    centres = dead_centres(systems.FLOAT, lengths)
     front, rear = int(np.argmin(psi)), int(np.argmax(psi))
     for place, angle, extreme, bend in (
         (front, centres.beta, side * centres.psi_front, centres.psi_2_front),
@@ -182,21 +182,21 @@ def test_dead_centres_are_the_extremes_of_a_dense_scan(lengths, side):
 @REPEATABLE
 def test_the_closed_form_at_front_dead_centre_is_the_general_one_there(lengths):
     """ψ'' there is the limit of the general formula, and [Yuan24]'s l1(l1+l2)/(l2 l3 sin μ)."""
-    system = maths.mpmath(60)
+    system = systems.mpmath(60)
     exact = Lengths(*[*map(MP.mpf, numbers(lengths)), lengths.side])
     centres = dead_centres(system, exact)
     for angle, value in ((centres.beta, centres.psi_2_front), (MP.pi + centres.beta_r, centres.psi_2_rear)):
         pose = Pose(system, exact, angle)
         assert abs(pose.psi_1) <= MP.mpf(10) ** -45
         assert abs(pose.psi_2 - value) <= MP.mpf(10) ** -45 * abs(value)
-    pose = Pose(maths.FLOAT, lengths, dead_centres(maths.FLOAT, lengths).beta)
+    pose = Pose(systems.FLOAT, lengths, dead_centres(systems.FLOAT, lengths).beta)
     size = AUTOMATIC([*numbers(lengths), pose.phi], lengths.side)[2]
     assert abs(pose.psi_2 - float(centres.psi_2_front)) <= 8 * EPS * float(size[1])
     assert abs(pose.psi_1) <= 8 * EPS * float(size[0])
 
 
 def test_psi_2_of_the_papers_machine_at_front_dead_centre():
-    assert dead_centres(maths.FLOAT, PAPER).psi_2_front == pytest.approx(0.300280, abs=5e-7)
+    assert dead_centres(systems.FLOAT, PAPER).psi_2_front == pytest.approx(0.300280, abs=5e-7)
 
 
 @given(linkages())
@@ -205,8 +205,8 @@ def test_transmission_angles_are_the_extremes_of_a_dense_scan(lengths):
     phi = np.linspace(0, 2 * math.pi, 20_001)
     square = lengths.l1**2 + lengths.l4**2 - 2 * lengths.l1 * lengths.l4 * np.cos(phi)
     mu = np.arccos((lengths.l2**2 + lengths.l3**2 - square) / (2 * lengths.l2 * lengths.l3))
-    near = crank_rocker.transmission_angle_near(maths.FLOAT, lengths)
-    far = crank_rocker.transmission_angle_far(maths.FLOAT, lengths)
+    near = crank_rocker.transmission_angle_near(systems.FLOAT, lengths)
+    far = crank_rocker.transmission_angle_far(systems.FLOAT, lengths)
     assert np.min(mu) == pytest.approx(near, rel=1e-10)
     assert math.pi - np.max(mu) == pytest.approx(far, rel=1e-10)
     assert np.min(np.minimum(mu, math.pi - mu)) == pytest.approx(min(near, far), rel=1e-10)
@@ -224,7 +224,7 @@ def test_synthesis_gives_the_angles_it_was_asked_for(theta, beta, swing, l4):
     except ValueError:
         assume(False)
     assume(min(crank_rocker.assembly_margins(lengths).values()) > 0.02 * l4)
-    centres = dead_centres(maths.FLOAT, lengths)
+    centres = dead_centres(systems.FLOAT, lengths)
     assert (centres.theta, centres.beta, centres.swing) == pytest.approx((theta, beta, swing), rel=0, abs=1e-12)
 
 
@@ -237,7 +237,7 @@ def test_synthesis_gives_what_was_asked_for_or_refuses(theta, beta, swing):
         lengths = crank_rocker_synthesis.synthesise(theta, beta, swing, 1.0)
     except ValueError:
         return
-    centres = dead_centres(maths.FLOAT, lengths)
+    centres = dead_centres(systems.FLOAT, lengths)
     assume(min(crank_rocker.assembly_margins(lengths).values()) > 1e-4)
     assert (centres.theta, centres.beta, centres.swing) == pytest.approx((theta, beta, swing), rel=0, abs=1e-6)
 
@@ -249,7 +249,7 @@ def test_synthesis_is_the_papers_eq_13_to_15_with_l1_plus_l2(theta, beta):
     l1 = -half * MP.cos(sweep / 2 + beta) / MP.sin((sweep - swing) / 2)
     l2 = half * MP.sin(sweep / 2 + beta) / MP.cos((sweep - swing) / 2)
     l3 = MP.sqrt((l1 + l2) ** 2 - 2 * (l1 + l2) * MP.cos(beta) + 1)
-    found = crank_rocker_synthesis.synthesis(maths.FLOAT, float(theta), float(beta), float(swing))
+    found = crank_rocker_synthesis.synthesis(systems.FLOAT, float(theta), float(beta), float(swing))
     assert found == pytest.approx([float(l1), float(l2), float(l3)], rel=1e-14)
 
 
@@ -279,10 +279,10 @@ def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
     Those of the dead centres are made of two.
     """
     scaled = Lengths(*[*(length * 2.0**power for length in numbers(lengths)), lengths.side])
-    first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, scaled, phi)
+    first, second = Pose(systems.FLOAT, lengths, phi), Pose(systems.FLOAT, scaled, phi)
     assert (first.psi_1, first.psi_2) == (second.psi_1, second.psi_2)
     assert first.psi == pytest.approx(second.psi, rel=EPS, abs=0)
-    one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, scaled)
+    one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, scaled)
     for name in CENTRES:
         assert getattr(one, name) == pytest.approx(getattr(two, name), rel=2 * EPS, abs=0)
 
@@ -291,15 +291,15 @@ def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
 @REPEATABLE
 def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
     mirrored = lengths._replace(side=-lengths.side)
-    first, second = Pose(maths.FLOAT, lengths, phi), Pose(maths.FLOAT, mirrored, -phi)
+    first, second = Pose(systems.FLOAT, lengths, phi), Pose(systems.FLOAT, mirrored, -phi)
     assert (second.psi, second.psi_1, second.psi_2) == (-first.psi, first.psi_1, -first.psi_2)
-    one, two = dead_centres(maths.FLOAT, lengths), dead_centres(maths.FLOAT, mirrored)
+    one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, mirrored)
     signs = {"swing": 1}
     assert [getattr(two, name) for name in CENTRES] == [signs.get(n, -1) * getattr(one, n) for n in CENTRES]
 
 
 def test_curves_are_the_poses_whatever_the_shape_and_the_chunk():
     phi = np.linspace(-7, 7, 60).reshape(3, 4, 5)
-    pose = Pose(maths.numpy(), PAPER, phi)
+    pose = Pose(systems.numpy(), PAPER, phi)
     for found, whole in zip(crank_rocker.curves(PAPER, phi, chunk=7), (pose.psi, pose.psi_1, pose.psi_2), strict=True):
         assert found == pytest.approx(whole, rel=1e-14)

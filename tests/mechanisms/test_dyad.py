@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.dyad import Vector
 
@@ -48,7 +48,7 @@ def area_and_condition(base, r1, r2):
 @REPEATABLE
 def test_links_have_their_lengths_and_meet_at_one_point(triangle):
     base, r1, r2, side = triangle
-    found, size = dyad.close(maths.FLOAT, base, r1, r2, side), r1 + r2
+    found, size = dyad.close(systems.FLOAT, base, r1, r2, side), r1 + r2
     assert math.hypot(found.link1.x, found.link1.y) == pytest.approx(r1, rel=0, abs=4 * EPS * size)
     assert math.hypot(found.link2.x, found.link2.y) == pytest.approx(r2, rel=0, abs=4 * EPS * size)
     assert found.link1.x - found.link2.x == pytest.approx(base.x, rel=0, abs=2 * EPS * size)
@@ -60,17 +60,17 @@ def test_links_have_their_lengths_and_meet_at_one_point(triangle):
 def test_the_area_is_exact_to_four_ulp_times_its_condition(triangle):
     base, r1, r2, side = triangle
     area, condition = area_and_condition(base, r1, r2)
-    found = dyad.close(maths.FLOAT, base, r1, r2, side)
+    found = dyad.close(systems.FLOAT, base, r1, r2, side)
     assert abs(MP.mpf(found.area4) - side * area) <= 4 * EPS * condition * area
     a = MP.sqrt(MP.mpf(base.x) ** 2 + MP.mpf(base.y) ** 2)
-    assert abs(dyad.heron(maths.mpmath(50), a, MP.mpf(r1), MP.mpf(r2)) - area) <= MP.mpf(10) ** -30 * area
+    assert abs(dyad.heron(systems.mpmath(50), a, MP.mpf(r1), MP.mpf(r2)) - area) <= MP.mpf(10) ** -30 * area
 
 
 @given(triangles())
 @REPEATABLE
 def test_the_area_is_twice_the_cross_product_and_the_joint_lies_on_the_asked_side(triangle):
     base, r1, r2, side = triangle
-    found = dyad.close(maths.FLOAT, base, r1, r2, side)
+    found = dyad.close(systems.FLOAT, base, r1, r2, side)
     left = base.x * found.link1.y - base.y * found.link1.x
     assert 2 * left == pytest.approx(found.area4, rel=0, abs=16 * EPS * (r1 + r2) ** 2)
     assert math.copysign(1, found.area4) == side
@@ -80,8 +80,8 @@ def test_the_area_is_twice_the_cross_product_and_the_joint_lies_on_the_asked_sid
 def test_a_needle_keeps_the_digits_that_the_square_of_its_cosine_loses(gap):
     """Sides 1 and 1 over a base of `gap`: exact while sqrt(1 − cos²) has nothing left."""
     exact = MP.sqrt(4 - MP.mpf(gap) ** 2) * MP.mpf(gap)
-    assert dyad.heron(maths.FLOAT, gap, 1.0, 1.0) == pytest.approx(float(exact), rel=4 * EPS)
-    found = dyad.close(maths.FLOAT, Vector(gap, 0.0), 1.0, 1.0, 1)
+    assert dyad.heron(systems.FLOAT, gap, 1.0, 1.0) == pytest.approx(float(exact), rel=4 * EPS)
+    found = dyad.close(systems.FLOAT, Vector(gap, 0.0), 1.0, 1.0, 1)
     assert found.area4 == pytest.approx(float(exact), rel=4 * EPS)
     cosine = 1 - gap**2 / 2
     naive = 2 * math.sqrt(1 - cosine**2)
@@ -93,14 +93,14 @@ def test_heron_knows_the_textbook_triangles_in_every_order(sides):
     half = sum(sides) / 2
     area = math.sqrt(half * math.prod(half - side for side in sides))
     for turn in range(3):
-        assert dyad.heron(maths.FLOAT, *sides[turn:], *sides[:turn]) == pytest.approx(4 * area, rel=4 * EPS)
+        assert dyad.heron(systems.FLOAT, *sides[turn:], *sides[:turn]) == pytest.approx(4 * area, rel=4 * EPS)
 
 
 def test_a_triangle_that_does_not_close_is_no_number():
     with pytest.raises(ValueError, match=r"math domain|nonnegative"):
-        dyad.close(maths.FLOAT, Vector(3.0, 0.0), 1.0, 1.0, 1)
+        dyad.close(systems.FLOAT, Vector(3.0, 0.0), 1.0, 1.0, 1)
     with np.errstate(invalid="ignore"):
-        assert np.isnan(dyad.close(maths.numpy(), Vector(np.array([3.0]), 0.0), 1.0, 1.0, 1).area4)
+        assert np.isnan(dyad.close(systems.numpy(), Vector(np.array([3.0]), 0.0), 1.0, 1.0, 1).area4)
 
 
 def rates_by_differentiation():
@@ -109,7 +109,7 @@ def rates_by_differentiation():
     x0, y0, x1, y1, x2, y2, r1, r2 = ca.vertsplit(constants)
     side = ca.SX.sym("side")
     base = Vector(x0 + x1 * t + x2 * t**2 / 2, y0 + y1 * t + y2 * t**2 / 2)
-    found = dyad.close(maths.casadi(), base, r1, r2, side)
+    found = dyad.close(systems.casadi(), base, r1, r2, side)
     rates = dyad.rates(found, Vector(x1 + x2 * t, y1 + y2 * t))
     closed = [*rates, *dyad.second_rates(found, Vector(x2, y2), *rates, r1, r2)]
     angles = [ca.atan2(link.y, link.x) for link in (found.link1, found.link2)]

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -33,8 +33,8 @@ GIVEN = Dimensions(
 
 @pytest.fixture(scope="module")
 def layout():
-    sley = Sley(maths.FLOAT, GIVEN)
-    return rapier_drive.construct(maths.FLOAT, GIVEN, GIVEN.phi30 - sley.centres.swing, math.radians(24.35))
+    sley = Sley(systems.FLOAT, GIVEN)
+    return rapier_drive.construct(systems.FLOAT, GIVEN, GIVEN.phi30 - sley.centres.swing, math.radians(24.35))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def built(layout):
 
 def poses(dimensions, phi1, system=None, **turned):
     """Return the pose at phi1, and the driving link's direction at front dead centre."""
-    system = system or maths.numpy()
+    system = system or systems.numpy()
     stand = Sley(system, dimensions, **turned).stand
     return Pose(system, dimensions, stand, phi1), Pose(system, dimensions, stand, 0 * phi1).relative
 
@@ -62,7 +62,7 @@ def test_the_layout_of_the_drawing_comes_out_of_the_closed_form(layout):
 
 
 def test_the_sley_swings_and_its_dead_centres_stand_as_the_lengths_say():
-    centres = Sley(maths.FLOAT, GIVEN).centres
+    centres = Sley(systems.FLOAT, GIVEN).centres
     assert math.degrees(centres.swing) == pytest.approx(13.00562, abs=5e-6)
     assert 180 - math.degrees(centres.theta) == pytest.approx(185.58, abs=5e-3)
 
@@ -92,7 +92,7 @@ def test_peak_acceleration_and_transmission_angle_of_the_papers_layout(built):
 
 @pytest.mark.parametrize("phi1", [0.1, 1.7, 3.19, 4.4, 6.0])
 def test_derivatives_agree_with_differences_at_sixty_digits(built, phi1):
-    system = maths.mpmath(60)
+    system = systems.mpmath(60)
     exact = Dimensions(*(system.number(value) for value in dataclasses.astuple(built)))
     step, front = system.number(10) ** -10, poses(exact, system.number(0), system)[1]
     angles = [poses(exact, system.number(phi1) + k * step, system)[0].phi63(front) for k in range(-2, 3)]

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import rapier_faults
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -44,7 +44,7 @@ def drives(draw, wide):
 
 
 def pose(d, degrees):
-    return Pose(maths.numpy(), d, Sley(maths.FLOAT, d).stand, np.radians(degrees))
+    return Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.radians(degrees))
 
 
 def opens(d, degrees):

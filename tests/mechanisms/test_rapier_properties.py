@@ -11,7 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import rapier_faults
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
@@ -23,7 +23,7 @@ ANGLES, PLACES = ("phi30", "alpha", "phi40"), ("C0x", "C0y")
 FIVE_BAR = ("l3p", "l4", "l5", "l6", *PLACES)
 SLEY = ("l1", "l2", "l3", "l71")
 PHI = np.linspace(0.0, 2 * np.pi, 73)
-DIGITS = maths.mpmath(40)
+DIGITS = systems.mpmath(40)
 MARGIN = 1.01
 """How much farther than needed links l5 and l6 reach: what a random drive must have to be near no singularity."""
 
@@ -47,7 +47,7 @@ def drives(draw):
 
 
 def pose_of(d, phi=PHI, system=None, **turned):
-    system = system or maths.numpy()
+    system = system or systems.numpy()
     return Pose(system, d, Sley(system, d, **turned).stand, phi)
 
 
@@ -133,7 +133,7 @@ def test_the_whole_machine_turned_about_the_rocking_shaft_is_the_same_drive(d, t
 def automatic():
     """Return a CasADi function of (dimensions, φ1): φ63 and its first three derivatives by AD."""
     phi, numbers = ca.SX.sym("phi"), ca.SX.sym("d", len(NAMES))
-    system = maths.casadi()
+    system = systems.casadi()
     d = Dimensions(*ca.vertsplit(numbers))
     stand = Sley(system, d).stand
     angle = Pose(system, d, stand, phi).phi63(Pose(system, d, stand, 0).relative)
@@ -160,7 +160,7 @@ def exact(d):
 def test_float64_is_forty_digits_to_rounding(d):
     for phi in PHI[1::9]:
         many = [float(value) for value in curves(exact(d), DIGITS.number(float(phi)), DIGITS)]
-        few = [float(value) for value in curves(d, float(phi), maths.FLOAT)]
+        few = [float(value) for value in curves(d, float(phi), systems.FLOAT)]
         for one, other in zip(few, many, strict=True):
             assert one == pytest.approx(other, rel=1e-12, abs=1e-12 * condition(d))
 
@@ -194,4 +194,4 @@ def test_positions_are_those_of_the_law_of_cosines(d, phi):
     now, mp = angle_by_the_law_of_cosines(many, DIGITS.number(phi))
     front, _ = angle_by_the_law_of_cosines(many, DIGITS.number(0.0))
     expected = mp.arg(mp.expj(now - front))
-    assert curves(d, phi, maths.FLOAT)[0] == pytest.approx(float(expected), abs=1e-12 * condition(d))
+    assert curves(d, phi, systems.FLOAT)[0] == pytest.approx(float(expected), abs=1e-12 * condition(d))

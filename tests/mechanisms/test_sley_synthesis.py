@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import crank_rocker
 from loomopt.mechanisms.sley_synthesis import sley
 

@@ -12,8 +12,8 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
@@ -170,7 +170,7 @@ def test_stress_is_bound_to_stretch_surge_and_material(coil, stretch):
 
 def test_the_bound_is_an_identity():
     d, D, n, G, rho, x = sp.symbols("d D n G rho x", positive=True)
-    coil, system = Coil(d, D, n, G, rho, 0, 2 * G), maths.sympy()
+    coil, system = Coil(d, D, n, G, rho, 0, 2 * G), systems.sympy()
     bound = 2 * coil.wahl * x * coil.surge_frequency(system) * sp.sqrt(2 * G * rho)
     assert sp.simplify(coil.shear_stress(system, coil.rate * x) - bound) == 0
     assert sp.simplify(coil.wahl - (4 * D - d) / (4 * D - 4 * d) - sp.Rational(615, 1000) * d / D) == 0
@@ -238,16 +238,16 @@ def test_every_number_system_gives_the_same_figures(coil, force):
     data = [*dataclasses.astuple(coil), force, coil.diameter / 3]
     reference = figures(FLOAT, coil, force, coil.diameter / 3)
     for system, convert in (
-        (maths.numpy(), lambda x: np.array([x, x])),
-        (maths.mpmath(), maths.mpmath().number),
-        (maths.sympy(), sp.Rational),
+        (systems.numpy(), lambda x: np.array([x, x])),
+        (systems.mpmath(), systems.mpmath().number),
+        (systems.sympy(), sp.Rational),
     ):
         *own, own_force, bend = map(convert, data)
         found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, Coil(*own), own_force, bend))]
         assert found == pytest.approx(reference, rel=1e-12)
     symbols = ca.SX.sym("x", len(data))
     *own, own_force, bend = ca.vertsplit(symbols)
-    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(maths.casadi(), Coil(*own), own_force, bend))])
+    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), Coil(*own), own_force, bend))])
     assert function(data).full().ravel() == pytest.approx(np.array(reference), rel=1e-12)
 
 

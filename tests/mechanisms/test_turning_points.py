@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms.turning_points import crossing, followed, turns
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
@@ -39,7 +39,7 @@ def test_a_step_that_knows_no_bend_would_not_bend_with_them():
 
 
 def test_a_hint_right_in_floats_gives_the_root_in_three_times_as_many_digits():
-    many = maths.mpmath(60)
+    many = systems.mpmath(60)
     found = followed(lambda x: (x**2 - 2, 2 * x, 2), many.number(math.sqrt(2)))
     assert abs(found - many.sqrt(many.number(2))) < 1e-47
 

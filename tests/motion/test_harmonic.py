@@ -8,12 +8,12 @@ import mpmath
 import numpy as np
 import pytest
 
-from loomopt import maths
 from loomopt.balance import Pose
 from loomopt.effects.beatup import resistance
+from loomopt.maths import systems
 from loomopt.motion import harmonic
 
-EXACT = maths.mpmath(50)
+EXACT = systems.mpmath(50)
 MP = mpmath.MPContext()
 MP.dps = 50
 OMEGA, J = 20 * math.pi, 0.625
@@ -79,7 +79,7 @@ def test_the_answer_goes_on_through_the_corners_and_comes_back_after_a_turn(damp
 
 
 @every
-@pytest.mark.parametrize("system", [maths.FLOAT, maths.numpy(), maths.balls()], ids=lambda system: system.name)
+@pytest.mark.parametrize("system", [systems.FLOAT, systems.numpy(), systems.balls()], ids=lambda system: system.name)
 def test_floats_and_balls_are_right_to_twelve_digits(damped, system):
     for phi in (0.3, 1.0, 1.15, 1.3, 2.0, 5.5):
         exact, found = answer(EXACT, damped, EXACT.number(phi)), answer(system, damped, system.number(phi))
@@ -94,8 +94,8 @@ def test_what_is_nearly_critical_goes_over_into_what_is():
     c = 2 * math.sqrt(k * J)
     found = []
     for regime, factor in (("under", 1 - 1e-10), ("critical", 1.0), ("over", 1 + 1e-10)):
-        constants = harmonic.constants(maths.FLOAT, regime, J, c * factor, k, OMEGA)
-        found.append(harmonic.Oscillator(maths.FLOAT, regime, constants).ringing((1e-3, 0.2), 0.01))
+        constants = harmonic.constants(systems.FLOAT, regime, J, c * factor, k, OMEGA)
+        found.append(harmonic.Oscillator(systems.FLOAT, regime, constants).ringing((1e-3, 0.2), 0.01))
     for one, other in itertools.pairwise(found):
         assert other == pytest.approx(one, rel=1e-9)
 
@@ -118,13 +118,13 @@ def test_harmonics_of_what_is_known_in_closed_form():
 
         return sums
 
-    series = harmonic.harmonics(maths.FLOAT, 64, weigh(0.4))
+    series = harmonic.harmonics(systems.FLOAT, 64, weigh(0.4))
     for n in range(64):
         size = (2 if n else 1) * 0.4**n
         assert series.cosines[n] == pytest.approx(size * math.cos(0.7 * n), abs=3e-15)
         assert series.sines[n] == pytest.approx(size * math.sin(0.7 * n), abs=3e-15)
     for phi in (0.0, 1.0, 4.0):
-        assert series.at(maths.FLOAT, phi) == pytest.approx(0.84 / (1 - 0.8 * math.cos(phi - 0.7) + 0.16), rel=1e-13)
-    assert [harmonic.enough(weigh(b), maths.FLOAT) for b in (0.3, 0.5, 0.85)] == [32, 64, 256]
+        assert series.at(systems.FLOAT, phi) == pytest.approx(0.84 / (1 - 0.8 * math.cos(phi - 0.7) + 0.16), rel=1e-13)
+    assert [harmonic.enough(weigh(b), systems.FLOAT) for b in (0.3, 0.5, 0.85)] == [32, 64, 256]
     with pytest.raises(ArithmeticError, match="512 harmonics are too few"):
-        harmonic.enough(weigh(0.97), maths.FLOAT)
+        harmonic.enough(weigh(0.97), systems.FLOAT)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from loomopt.balance import Given
 from loomopt.cycle import TURN, Node
 from loomopt.effects.kinds import Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.kinematics import Arcs, Chain, Group
 from loomopt.program.model import JobModel, Quantity, Row
 from loomopt.program.program import Limit, Objective, Program, Variable

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.program.sampling import Sampler
 
 RAPIER = registry.load("rapier")
@@ -25,7 +25,7 @@ def test_the_dwell_rows_see_their_own_arc_only(drive):
     built, sampled = drive
     for limit in (limit for limit in built.limits if limit.where):
         phi = np.radians(np.linspace(0, 30, 20_001)) * limit.where[1]
-        pose = built.model.instant(maths.numpy(), sampled.given, Node(phi, {})).pose
+        pose = built.model.instant(systems.numpy(), sampled.given, Node(phi, {})).pose
         assert sampled.peak(limit.row, limit.where) == pytest.approx(np.abs(pose.q).max() / 0.006, rel=1e-9)
     assert sampled.peak("dwell_travel") > 100
 
@@ -60,5 +60,5 @@ def test_corners_without_a_formula_move_with_the_design():
         sampled = JOB.sampler(scene, design)
         assert len(sampled.hints) in (2, 4)
         for angle in sampled.given.values["turns"]:
-            pose = sampled.model.instant(maths.FLOAT, sampled.given, Node(angle, {})).pose
+            pose = sampled.model.instant(systems.FLOAT, sampled.given, Node(angle, {})).pose
             assert abs(pose.q1) < 1e-14

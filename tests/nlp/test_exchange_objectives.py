@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from waves import WAVES, model, objective, program
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
 from loomopt.program.sampling import Sampler
@@ -27,7 +27,7 @@ def merit(task, x):
 
     def worth(row):
         if level.form == "peak":
-            values = WAVES[row](maths.numpy(), x, phi)
+            values = WAVES[row](systems.numpy(), x, phi)
             return float(np.max(values if row in task.model.signed else np.abs(values)))
         return abs(sampler.single(row)) if level.form == "magnitude" else sampler.single(row)
 

@@ -8,7 +8,7 @@ import pytest
 from beatup_nlps import EFFECTS, TARGETS, expected_rows, owner_of, program_of, put
 from waves import WAVES, model, objective, program
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Elastic, Settings
@@ -56,7 +56,7 @@ def at_nodes(name, size, nodes, at):
 
 def differences(program, sampler, read):
     """Return slopes (rows, variables, each scaled) of what `read` gives of a design, by differences at 40 digits."""
-    exact = maths.mpmath(40)
+    exact = systems.mpmath(40)
     step = exact.number(10) ** -20
 
     def at(moved):

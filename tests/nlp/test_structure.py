@@ -7,8 +7,8 @@ import pytest
 from beatup_nlps import program_of, put
 from waves import Still, objective, program
 
-from loomopt import maths
 from loomopt.cycle import TURN, split
+from loomopt.maths import systems
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Settings
 from loomopt.nlp.structure import NodeParameters, means, structure
@@ -23,7 +23,7 @@ def test_a_node_on_a_corner_keeps_its_side():
     pulse = int(np.flatnonzero(cycle.on(("resistance", 1.0)))[0])
     before = (pulse - 1) % cycle.pieces
     one, other = node.write(cycle, before, 1.0), node.write(cycle, pulse, 0.0)
-    corners = np.mod([float(angle) for angle in sampler.model.corners(maths.FLOAT, sampler.given)], TURN)
+    corners = np.mod([float(angle) for angle in sampler.model.corners(systems.FLOAT, sampler.given)], TURN)
     angles = [node.read(row, corners).phi % TURN for row in (one, other)]
     assert angles[0] == pytest.approx(angles[1], abs=1e-14)
     assert [node.read(row, corners).switch["resistance"] for row in (one, other)] == [0.0, 1.0]
@@ -93,7 +93,7 @@ def test_means_are_rows_that_objectives_read(name):
     expected = {"miss": square, "rms": math.sqrt(square), "mean": 0.09 + 0.5, "root": math.sqrt(0.59)}[name]
     assert value == pytest.approx(expected, rel=1e-14)
     assert sampler.single(name) == pytest.approx(expected, rel=1e-14)
-    assert Sampler(task.model, x).read(maths.FLOAT).single(name) == pytest.approx(expected, rel=1e-13)
+    assert Sampler(task.model, x).read(systems.FLOAT).single(name) == pytest.approx(expected, rel=1e-13)
 
 
 def test_only_means_that_something_reads_are_taken():

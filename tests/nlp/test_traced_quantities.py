@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
-from loomopt import maths
 from loomopt.cycle import Node
+from loomopt.maths import systems
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
 
@@ -34,11 +34,11 @@ def value(expression, symbols, lifts, place=None, number=0.0):
 @pytest.mark.parametrize("raised", [0.0, 1.0])
 def test_a_quantity_is_that_of_the_model_at_every_node(name, raised):
     quantities, symbols, model = made()
-    given = model.given(maths.FLOAT, {**X, "raise": 1.25})
+    given = model.given(systems.FLOAT, {**X, "raise": 1.25})
     for k in range(COUNT):
         switch, phi = {"step": float(k), "raised": raised}, 2 * np.pi * (k + 0.3) / COUNT
         here = quantities.at(name, phi, switch)
-        wanted = model.quantity(maths.FLOAT, given, name, Node(phi, switch))
+        wanted = model.quantity(systems.FLOAT, given, name, Node(phi, switch))
         assert value(here, symbols, quantities.lifts) == pytest.approx(wanted, rel=1e-14)
     assert quantities.lifts.defined == [], "a node whose switch is known chooses nothing"
 
@@ -61,8 +61,8 @@ def test_a_node_whose_switch_is_a_parameter_chooses_variables():
     place = ca.SX.sym("place")
     here = quantities.at("wave", 0.4, {"step": place, "raised": 0.0})
     assert len(quantities.lifts.picked) == 2
-    given = model.given(maths.FLOAT, {**X, "raise": 1.25})
-    wanted = model.quantity(maths.FLOAT, given, "wave", Node(0.4, {"step": 7.0, "raised": 0.0}))
+    given = model.given(systems.FLOAT, {**X, "raise": 1.25})
+    wanted = model.quantity(systems.FLOAT, given, "wave", Node(0.4, {"step": 7.0, "raised": 0.0}))
     assert value(here, symbols, quantities.lifts, place, 7.0) == pytest.approx(wanted, rel=1e-14)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.kinematics import Arcs, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.program.program import Limit, Objective, Program, Variable

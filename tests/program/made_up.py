@@ -7,7 +7,7 @@ from loomopt import balance
 from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.kinematics import Arcs, Group
 from loomopt.schema import Table, Values
 

@@ -4,9 +4,9 @@ import casadi as ca
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.nlp import graph
 
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
@@ -48,7 +48,7 @@ def example(scene, name):
 def nodes(scene):
     """Return how many nodes the graph of all whole-cycle figures has."""
     sampler = registry.of(scene).sampler(scene, {})
-    system, model = maths.casadi(), sampler.model
+    system, model = systems.casadi(), sampler.model
     symbols = {name: ca.SX.sym(name) for name in sorted({**sampler.values, **sampler.hints})}
     switches = {name: ca.SX.sym(name) for name in model.switches}
     given, phi = model.given(system, symbols), ca.SX.sym("phi")

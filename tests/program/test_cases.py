@@ -9,8 +9,8 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from scipy.optimize import minimize
 
-from loomopt import maths
 from loomopt.cycle import TURN, Node
+from loomopt.maths import systems
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
 from loomopt.program.model import Integral, JobModel, Quantity, Row, cased
@@ -68,7 +68,7 @@ def test_a_case_is_the_machine_with_its_numbers(case):
 
 
 @pytest.mark.parametrize(
-    ("system", "case"), [(m, k) for m in (maths.FLOAT, maths.mpmath(), maths.numpy()) for k in range(3)]
+    ("system", "case"), [(m, k) for m in (systems.FLOAT, systems.mpmath(), systems.numpy()) for k in range(3)]
 )
 def test_every_number_system_gives_the_same_values_of_a_case(system, case):
     sampler = Sampler(FABRICS, ALL)
@@ -100,7 +100,7 @@ def test_cases_are_part_of_the_structure():
 
 
 def test_a_case_s_derivatives_are_traced_with_its_own_numbers():
-    system = maths.casadi()
+    system = systems.casadi()
     symbols = {name: ca.SX.sym("v") for name in ALL}
     given = FABRICS.given(system, symbols)
     for case in range(3):

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from loomopt import maths
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import model as shedding
+from loomopt.maths import systems
 from loomopt.program.chains import Station, followed, recurrent, station_switches, stations
 from loomopt.program.sampling import Sampler
 
@@ -38,7 +38,7 @@ def test_stations_are_the_knots_of_rise_and_return_by_their_places_among_all_cor
     program = task()
     sampler = Sampler(program.model, {**program.parameters, **program.starts[0]})
     found = stations(program.model, sampler.given, names(program))
-    angles = program.model.corners(maths.FLOAT, sampler.given)
+    angles = program.model.corners(systems.FLOAT, sampler.given)
     rise, back, near = (sampler.given.values[name] for name in ("rise", "return", "begin.near"))
     there = [k / 6 * rise for k in range(1, 6)] + [near - k / 6 * back for k in range(1, 6)]
     assert [angles[station.corner] for station in found] == pytest.approx(there, rel=1e-14)
@@ -55,9 +55,11 @@ def test_several_cases_have_no_chain_in_common():
 def test_what_is_told_to_follow_is_what_the_model_derives(symmetric):
     program = task(symmetric, intervals=12)
     values = {**program.parameters, **program.starts[0]}
-    derived = program.model.given(maths.FLOAT, values).values
+    derived = program.model.given(systems.FLOAT, values).values
     chain = {name: derived[name] for name in recurrent(program.model, names(program))}
-    assert followed(program.model, names(program), maths.FLOAT, {**values, **chain}) == pytest.approx(chain, abs=1e-15)
+    assert followed(program.model, names(program), systems.FLOAT, {**values, **chain}) == pytest.approx(
+        chain, abs=1e-15
+    )
     other = {name: value + 0.01 for name, value in chain.items()}
-    given = program.model.given(maths.FLOAT, {**values, **other}).values
+    given = program.model.given(systems.FLOAT, {**values, **other}).values
     assert {name: given[name] for name in chain} == other

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Load, State
+from loomopt.maths import systems
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import transcribe
@@ -71,7 +71,7 @@ STIFF = JobModel(
 )
 ELASTIC = replace(STIFF, effects=(*STIFF.effects, ARM))
 WITH_ARM = {**NUMBERS, "arm.ratio": 0.5}
-SYSTEMS = {"float": maths.FLOAT, "numpy": maths.numpy(), "mpmath": maths.mpmath()}
+SYSTEMS = {"float": systems.FLOAT, "numpy": systems.numpy(), "mpmath": systems.mpmath()}
 
 
 def by_hand(phi, pressed, ratio=0.5, **changes):
@@ -98,7 +98,7 @@ def test_the_state_s_force_stands_for_what_it_carries(system):
 
 
 def test_the_state_s_force_stands_in_symbols_too():
-    system = maths.casadi()
+    system = systems.casadi()
     symbols = {name: ca.SX.sym("v") for name in WITH_ARM}
     given = ELASTIC.given(system, symbols)
     phi = ca.SX.sym("phi")
@@ -120,7 +120,7 @@ def test_a_rigid_arm_changes_nothing():
 
 def test_carried_loads_keep_their_own_terms_beside_the_state_s():
     sampler = Sampler(ELASTIC, WITH_ARM)
-    terms = ELASTIC.instant(maths.FLOAT, sampler.given, Node(2.8, {"cloth": 1.0})).terms()
+    terms = ELASTIC.instant(systems.FLOAT, sampler.given, Node(2.8, {"cloth": 1.0})).terms()
     assert list(terms) == ["inertia", "spring", "cloth", "drag", "arm"]
     force, _ = by_hand(2.8, True)
     assert terms["arm"] + terms["cloth"] == pytest.approx(force, rel=1e-12)
@@ -189,7 +189,7 @@ def test_rows_of_the_nlp_are_those_of_40_digits():
     nlp.solver(False, Settings())
     x0 = [program.starts[0][v.name] / v.scale for v in program.variables]
     rows, slopes = nlp.jacobian([*x0, 0.0], nlp.structure.vector(program, sampler, [1.0], nodes))
-    exact = maths.mpmath()
+    exact = systems.mpmath()
     step = exact.number(10) ** -20
 
     def at(moved):

@@ -14,11 +14,11 @@ from test_states import ELASTIC, WITH_ARM
 from test_tracing_tape import bits
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.balance import Given
 from loomopt.cycle import Node
-from loomopt.jets import Jet, variables
 from loomopt.jobs import registry
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, variables
 from loomopt.packaged import problem_names
 from loomopt.program import sampling, traced
 from loomopt.program.model import JobModel, Quantity, Row
@@ -109,7 +109,7 @@ def test_arrays_of_all_pieces(name):
     for count in (7, 2000):
         node = sampler.node(*nodes(sampler, count, count))
         node = Node(node.phi, {**node.switch, DATUM: np.linspace(-0.5, 0.5, count)})
-        alike(sampler.model, (maths.FLOAT, maths.numpy()), sampler.given, node, spread(node))
+        alike(sampler.model, (systems.FLOAT, systems.numpy()), sampler.given, node, spread(node))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -119,9 +119,9 @@ def test_several_together_are_each_alone(name):
     node = sampler.node(*nodes(sampler, 20, 5))
     node = Node(node.phi, {**node.switch, DATUM: np.linspace(-0.5, 0.5, 20)})
     recording = traced.recorded(sampler.model, names, tuple(node.switch), sampler.given.known)
-    found = recording.bind((maths.FLOAT, maths.numpy()), sampler.given)(node)
+    found = recording.bind((systems.FLOAT, systems.numpy()), sampler.given)(node)
     for each, value in zip(names, found, strict=True):
-        alone = sampler.model.quantity(maths.numpy(), sampler.given, each, node)
+        alone = sampler.model.quantity(systems.numpy(), sampler.given, each, node)
         assert bits(spread(node)(value)) == bits(spread(node)(alone)), each
 
 
@@ -130,13 +130,13 @@ def test_plain_floats(name):
     sampler = samplers()[name]
     for piece, u in zip(*nodes(sampler, 12, 1), strict=True):
         phi = float(sampler.cycle.angles(np.array([piece]), np.array([u]))[0])
-        alike(sampler.model, (maths.FLOAT, maths.FLOAT), sampler.given, Node(phi, switched(sampler, piece)))
+        alike(sampler.model, (systems.FLOAT, systems.FLOAT), sampler.given, Node(phi, switched(sampler, piece)))
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_forty_digits(name):
     sampler = samplers()[name]
-    reading = sampler.read(maths.mpmath())
+    reading = sampler.read(systems.mpmath())
     for piece, u in zip(*nodes(sampler, 4, 2), strict=True):
         begin, end = reading.starts[piece : piece + 2]
         node = Node(begin + reading.maths.number(float(u)) * (end - begin), switched(sampler, piece))
@@ -150,8 +150,8 @@ def test_series_of_balls(name):
     boxes = Boxes(sampler)
     for (piece, u), half in itertools.product(zip(*nodes(sampler, 4, 3), strict=True), (0.0, 1e-3, 0.5)):
         begin, end = boxes.starts[piece : piece + 2]
-        node = Node(begin + (end - begin) * maths.ball_series(float(u), half), switched(sampler, piece))
-        whole = lambda value: maths.ball_series(0.0, 0.0) * 0 + value  # noqa: E731
+        node = Node(begin + (end - begin) * systems.ball_series(float(u), half), switched(sampler, piece))
+        whole = lambda value: systems.ball_series(0.0, 0.0) * 0 + value  # noqa: E731
         alike(sampler.model, (boxes.maths, boxes.maths), boxes.given, node, whole)
 
 
@@ -163,18 +163,18 @@ def test_jets(name, curved):
     values = {**sampler.values, **sampler.hints}
     free = list(values)[::3]
     moving = variables([values[of] for of in free], np.eye(len(free)), curved)
-    given = sampler.model.given(maths.jets(), {**values, **dict(zip(free, moving, strict=True))})
+    given = sampler.model.given(systems.jets(), {**values, **dict(zip(free, moving, strict=True))})
     node = sampler.node(*nodes(sampler, 9, 4))
     node = Node(node.phi, {**node.switch, DATUM: np.linspace(-0.5, 0.5, 9)})
-    alike(sampler.model, (maths.jets(), maths.jets()), given, node, spread(node))
+    alike(sampler.model, (systems.jets(), systems.jets()), given, node, spread(node))
 
 
 def test_a_formula_that_raises_raises_the_same():
     """A drive whose links do not meet all round: in floats the root of a negative number."""
     sampler = samplers()["rapier"]
-    given = sampler.model.given(maths.FLOAT, {**sampler.values, "l5": 1.4 * sampler.values["l5"]})
+    given = sampler.model.given(systems.FLOAT, {**sampler.values, "l5": 1.4 * sampler.values["l5"]})
     found = [
-        alike(sampler.model, (maths.FLOAT, maths.FLOAT), given, Node(phi, switched(sampler, 0)))
+        alike(sampler.model, (systems.FLOAT, systems.FLOAT), given, Node(phi, switched(sampler, 0)))
         for phi in np.linspace(0.0, 6.0, 40).tolist()
     ]
     assert [ValueError] in [each for of in found for each in of]
@@ -214,7 +214,7 @@ def test_a_quantity_is_recorded_once_after_as_many_evaluations_as_make_it_worth_
 def test_systems_share_a_recording(made, monkeypatch):
     monkeypatch.setattr(traced, "WORTH_IT", 0)
     sampler = Sampler(yoke(), NUMBERS)
-    for system in (maths.FLOAT, maths.mpmath(), maths.jets()):
+    for system in (systems.FLOAT, systems.mpmath(), systems.jets()):
         sampler.read(system).at("torque", 0, system.number(0.25))
     sampler.at("torque", np.array([0]), np.array([0.25]))
     assert made.call_count == 1
@@ -249,8 +249,8 @@ def test_numbers_made_by_hand_are_not_recorded(monkeypatch):
     sampler = Sampler(yoke(), NUMBERS)
     by_hand = Given(sampler.given.values, sampler.given.own)
     node = Node(1.0, {"cloth": 0.0})
-    (found,) = Quantities(sampler.model, (maths.FLOAT, maths.FLOAT), by_hand)(("torque",), node)
-    assert found == sampler.model.quantity(maths.FLOAT, sampler.given, "torque", node)
+    (found,) = Quantities(sampler.model, (systems.FLOAT, systems.FLOAT), by_hand)(("torque",), node)
+    assert found == sampler.model.quantity(systems.FLOAT, sampler.given, "torque", node)
 
 
 def test_recordings_go_with_their_model(monkeypatch):

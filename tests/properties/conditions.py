@@ -5,10 +5,10 @@ derivatives are differences in 40 digits, the data moved by a relative 1e-20. An
 1 rad: it was the difference of larger ones.
 """
 
-from loomopt import maths
+from loomopt.maths import systems
 
 EPS = 2.0**-52
-MANY = maths.mpmath(40)
+MANY = systems.mpmath(40)
 STEP = MANY.number(10) ** -20
 NOTHING = EPS**2
 """What a value of size 1 may be off where it is exactly 0 and stays so to first order."""
@@ -32,7 +32,7 @@ def errors(formulas, data, phi=None, terms=None):
             moved = formulas(MANY, *exact[:k], exact[k] + step, *exact[k + 1 :])
             for name, value in true.items():
                 sizes[name] += abs(moved[name] - value) / STEP
-    found = formulas(maths.FLOAT, *numbers)
+    found = formulas(systems.FLOAT, *numbers)
     return {name: error(found[name], value, sizes[name]) for name, value in true.items()}
 
 

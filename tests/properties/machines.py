@@ -9,8 +9,8 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.mechanisms import cam_follower, crank_rocker_faults, rapier_faults
 from loomopt.mechanisms.cam_follower import Follower
 from loomopt.mechanisms.cam_laws import LAWS
@@ -72,7 +72,7 @@ def drives(draw):
     moved = {name: getattr(TODAY, name) * (1 + widths[name] * draw(st.floats(-1, 1))) for name in NAMES}
     d = Dimensions(**moved)
     assume(rapier_faults.fault(d) == "")
-    base = Pose(maths.numpy(), d, Sley(maths.FLOAT, d).stand, np.linspace(0, TURN, 181)).base
+    base = Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.linspace(0, TURN, 181)).base
     span = np.hypot(base.x, base.y)
     assume(span.max() * ROOM < d.l5 + d.l6 and span.min() > abs(d.l5 - d.l6) * ROOM)
     return d

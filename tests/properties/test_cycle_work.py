@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
 
-from loomopt import maths
 from loomopt.cycle import Node
+from loomopt.maths import systems
 from loomopt.program.sampling import Sampler
 
 POINTS = 4096
@@ -26,7 +26,7 @@ def torque_all_round(model, values):
     """Return the crank torque at evenly spread crank angles."""
     phi = np.arange(POINTS) * TURN / POINTS
     off = dict.fromkeys(model.switches, np.zeros(POINTS))
-    return model.quantity(maths.numpy(), model.given(maths.FLOAT, values), "peak_torque", Node(phi, off))
+    return model.quantity(systems.numpy(), model.given(systems.FLOAT, values), "peak_torque", Node(phi, off))
 
 
 @settings(max_examples=60)
@@ -47,7 +47,7 @@ def test_the_head_and_its_tape_take_no_work(d):
 
 def work(model, values, of):
     """Return the integral of a function of (pose, cam force) over the turn of the cam."""
-    sampler, system = Sampler(model, values), maths.numpy()
+    sampler, system = Sampler(model, values), systems.numpy()
     total = 0.0
     for piece in range(sampler.cycle.pieces):
         begin, end = sampler.cycle.starts[piece : piece + 2]

@@ -24,7 +24,7 @@ from machines import (
     tables,
 )
 
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import cam_spline, crank_rocker, crank_rocker_synthesis, sley_synthesis
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import LAWS, Derivatives
@@ -115,7 +115,7 @@ def test_the_third_derivative_of_a_kite_keeps_its_digits(l4, phi):
 
 @given(crank_rockers(nearest=1e-3))
 def test_lengths_of_a_crank_rocker_from_its_angles(lengths):
-    stands = dead_centres(maths.FLOAT, Lengths(*sides_of(lengths)))
+    stands = dead_centres(systems.FLOAT, Lengths(*sides_of(lengths)))
 
     def formulas(system, *numbers):
         return dict(zip(("l1", "l2", "l3"), crank_rocker_synthesis.synthesis(system, *numbers), strict=True))
@@ -127,7 +127,7 @@ def test_lengths_of_a_crank_rocker_from_its_angles(lengths):
 def test_crank_and_rod_of_a_sley_from_its_angles(lengths):
     """A sley as long as its frame is left out: its angles are then those of any crank (θ is minus half the swing)."""
     assume(abs(lengths.l3 - lengths.l4) > 0.02 * lengths.l4)
-    stands = dead_centres(maths.FLOAT, Lengths(*sides_of(lengths)))
+    stands = dead_centres(systems.FLOAT, Lengths(*sides_of(lengths)))
 
     def formulas(system, *numbers):
         return dict(zip(("l1", "l2"), sley_synthesis.sley(system, *numbers), strict=True))
@@ -137,9 +137,9 @@ def test_crank_and_rod_of_a_sley_from_its_angles(lengths):
 
 @pytest.mark.xfail(reason="0/0 by rounding: a crank of no length is returned", strict=True)
 def test_a_sley_as_long_as_its_frame_is_refused():
-    stands = dead_centres(maths.FLOAT, Lengths(0.2, 1.5, 2.0, 2.0))
+    stands = dead_centres(systems.FLOAT, Lengths(0.2, 1.5, 2.0, 2.0))
     with pytest.raises(ValueError, match="sley"):
-        sley_synthesis.sley(maths.FLOAT, stands.theta, stands.swing, 2.0, 2.0)
+        sley_synthesis.sley(systems.FLOAT, stands.theta, stands.swing, 2.0, 2.0)
 
 
 @settings(max_examples=30)
@@ -252,7 +252,7 @@ def test_tabulated_laws(points, u):
     piece = piece_of(u, table.breaks)
 
     def formulas(system, share, *numbers):
-        if system is maths.FLOAT:
+        if system is systems.FLOAT:
             return table.at(system, share, piece)._asdict()
         return clamped(numbers[:count], numbers[count:], share, piece)._asdict()
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from machines import angles, contacts, crank_rockers, drives, powers
 
 import loomopt as lo
-from loomopt import maths
+from loomopt.maths import systems
 from loomopt.mechanisms import dyad
 from loomopt.mechanisms.cam_follower import Contact
 from loomopt.mechanisms.crank_rocker import Pose, dead_centres
@@ -46,17 +46,17 @@ def assert_alike(found, expected, rel=1e-10):
 @given(crank_rockers(nearest=1e-2), angles, sizes)
 def test_a_crank_rocker_of_another_size_has_the_same_angles(lengths, phi, factor):
     larger = resized(lengths, ("l1", "l2", "l3", "l4"), factor)
-    here, there = (Pose(maths.FLOAT, links, phi) for links in (lengths, larger))
+    here, there = (Pose(systems.FLOAT, links, phi) for links in (lengths, larger))
     assert_alike(read(there, CURVES), read(here, CURVES))
-    stands, others = (dead_centres(maths.FLOAT, links) for links in (lengths, larger))
+    stands, others = (dead_centres(systems.FLOAT, links) for links in (lengths, larger))
     assert_alike(read(others, STANDS), read(stands, STANDS))
 
 
 @given(crank_rockers(), angles)
 def test_a_crank_rocker_in_a_mirror_that_turns_backward_has_the_same_angles_to_the_last_digit(lengths, phi):
     """y → −y: ψ(−φ) of the other side is −ψ(φ); odd derivatives stay, even ones change their sign."""
-    here = read(Pose(maths.FLOAT, lengths, phi), CURVES)
-    there = Pose(maths.FLOAT, lengths._replace(side=-lengths.side), -phi)
+    here = read(Pose(systems.FLOAT, lengths, phi), CURVES)
+    there = Pose(systems.FLOAT, lengths._replace(side=-lengths.side), -phi)
     signs = {"psi": -1, "psi_2": -1, "rod_2": -1, "sin_crank_rod": -1}
     assert read(there, CURVES) == [signs.get(name, 1) * value for name, value in zip(CURVES, here, strict=True)]
 
@@ -65,8 +65,8 @@ def test_a_crank_rocker_in_a_mirror_that_turns_backward_has_the_same_angles_to_t
 @given(drives(), angles, sizes)
 def test_a_rapier_drive_of_another_size_turns_alike_and_travels_in_proportion(d, phi, factor):
     def all_of(dimensions):
-        stand = Sley(maths.FLOAT, dimensions).stand
-        pose, front = (Drive(maths.FLOAT, dimensions, stand, angle) for angle in (phi, 0.0))
+        stand = Sley(systems.FLOAT, dimensions).stand
+        pose, front = (Drive(systems.FLOAT, dimensions, stand, angle) for angle in (phi, 0.0))
         return [*read(pose, DRIVE_CURVES), pose.phi63(front.relative)], dimensions.travel
 
     (turned, travel), (expected, before) = all_of(resized(d, DRIVE_LENGTHS, factor)), all_of(d)
@@ -77,8 +77,8 @@ def test_a_rapier_drive_of_another_size_turns_alike_and_travels_in_proportion(d,
 @settings(max_examples=30)
 @given(drives(), angles)
 def test_a_rapier_drive_run_backward_makes_the_same_motion_backward_to_the_last_digit(d, phi):
-    one, other = (Sley(maths.FLOAT, d, sense=sense).stand for sense in (1, -1))
-    here, there = (Drive(maths.FLOAT, d, stand, sense * phi) for stand, sense in ((one, 1), (other, -1)))
+    one, other = (Sley(systems.FLOAT, d, sense=sense).stand for sense in (1, -1))
+    here, there = (Drive(systems.FLOAT, d, stand, sense * phi) for stand, sense in ((one, 1), (other, -1)))
     signs = (1, -1, 1, -1, -1, 1, -1, 1)
     expected = [sign * value for sign, value in zip(signs, read(here, DRIVE_CURVES), strict=True)]
     assert read(there, DRIVE_CURVES) == expected
@@ -94,7 +94,7 @@ def test_a_dyad_turns_with_its_base_and_knows_no_first_link(drawn, direction, tu
     reach = abs(r1 - r2) + share * (r1 + r2 - abs(r1 - r2))
 
     def closed(angle, *links):
-        return dyad.close(maths.FLOAT, Vector(reach * math.cos(angle), reach * math.sin(angle)), *links)
+        return dyad.close(systems.FLOAT, Vector(reach * math.cos(angle), reach * math.sin(angle)), *links)
 
     here, turned = closed(direction, r1, r2, side), closed(direction + turn, r1, r2, side)
     renamed = closed(direction + math.pi, r2, r1, -side)
@@ -110,7 +110,7 @@ def test_a_dyad_turns_with_its_base_and_knows_no_first_link(drawn, direction, tu
 def test_a_cam_of_another_size_has_the_same_angles_and_its_curvature_in_proportion(contact, theta, factor):
     follower, swing = contact
     larger = resized(follower, ("arm", "centre_distance", "base_radius", "roller_radius"), factor)
-    here, there = (Contact(maths.FLOAT, one, *swing) for one in (follower, larger))
+    here, there = (Contact(systems.FLOAT, one, *swing) for one in (follower, larger))
     unit = follower.centre_distance
     assert_alike(read(there, ("angle", "pressure_angle")), read(here, ("angle", "pressure_angle")))
     assert_alike(there.speed / (factor * unit), here.speed / unit)
@@ -124,7 +124,7 @@ def test_a_cam_of_another_size_has_the_same_angles_and_its_curvature_in_proporti
 @given(contacts(), angles, angles)
 def test_a_cam_that_is_turned_shows_the_same_points_turned_back(contact, theta, turn):
     follower, swing = contact
-    there = Contact(maths.FLOAT, follower, *swing)
+    there = Contact(systems.FLOAT, follower, *swing)
     size = 1e-14 * (follower.arm + follower.centre_distance) * (1 + abs(swing[1]))
     for name in ("centre", "tangent", "profile"):
         point, other = getattr(there, name)(theta), getattr(there, name)(theta + turn)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from shedding_cases import flat, freed, plain
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like
 from loomopt.program.sampling import Sampler
@@ -220,7 +220,7 @@ SCENES["spline"] = FULL.update({"mechanism.law": "spline", "mechanism.law_coeffi
 def test_the_balls_of_a_box_contain_the_values_at_its_points(name, data):
     """Value, and value + slope h + half the curvature h² with the curvature of the whole box."""
     scene, share = SCENES[name], st.floats(0, 1)
-    physics, sampled, system = JOB.model(scene), JOB.sampler(scene, {}), maths.balls()
+    physics, sampled, system = JOB.model(scene), JOB.sampler(scene, {}), systems.balls()
     values = {key: system.number(value) for key, value in {**JOB.numbers(scene), **sampled.hints}.items()}
     exact = physics.given(system, values)
     piece = data.draw(st.integers(0, sampled.cycle.pieces - 1))
@@ -228,14 +228,14 @@ def test_the_balls_of_a_box_contain_the_values_at_its_points(name, data):
     half = data.draw(st.floats(1e-6, 0.25)) * (end - start)
     centre = start + half + data.draw(share) * (end - start - 2 * half)
     switch = {name: float(value) for name, value in sampled.cycle.switch(piece).items()}
-    nothing = maths.ball_series(0, 0) * 0
+    nothing = systems.ball_series(0, 0) * 0
     for row in ROWS:
         wide, narrow = (
-            physics.quantity(system, exact, row, Node(maths.ball_series(centre, r), switch)) + nothing
+            physics.quantity(system, exact, row, Node(systems.ball_series(centre, r), switch)) + nothing
             for r in (half, 0.0)
         )
         for place in (-1.0, 1.0, *(2 * data.draw(share) - 1 for _ in range(3))):
-            value = float(physics.quantity(maths.FLOAT, sampled.given, row, Node(centre + place * half, switch)))
+            value = float(physics.quantity(systems.FLOAT, sampled.given, row, Node(centre + place * half, switch)))
             h = flint.arb(centre + place * half) - flint.arb(centre)
             rounding = flint.arb(0, 1e-12 * max(1.0, abs(value), sampled.peak("cam_force") * (row != ROWS[2])))
             assert (wide[0] + rounding).contains(flint.arb(value)), row

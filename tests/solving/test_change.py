@@ -8,7 +8,7 @@ import toy
 from test_feasible_curve import ROOM
 
 import loomopt as lo
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms.cam_spline import spline
 from loomopt.nlp.point import Settings
 from loomopt.program.program import Move, Wish

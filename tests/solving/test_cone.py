@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from loomopt.solving import cone
-from loomopt.solving.cone import least_on_cone, onto_cone
+from loomopt.maths import nnls
+from loomopt.maths.nnls import least_on_cone, onto_cone
 
 
 def drawn(size, seed):
@@ -36,7 +36,7 @@ def test_what_falls_inside_the_cone_only_takes_many_steps(seed, monkeypatch):
     """The first step from the eigenvectors still rises here."""
     hessian, slopes = drawn(3, 300 + seed)
     assert least_on_cone(hessian, slopes) < -0.03
-    monkeypatch.setattr(cone, "CONE_STEPS", 1)
+    monkeypatch.setattr(nnls, "CONE_STEPS", 1)
     assert least_on_cone(hessian, slopes) > 0.0
 
 
@@ -70,7 +70,7 @@ def test_a_matrix_of_zeros_is_level():
 
 @pytest.mark.parametrize(("left", "is_open"), [(0.9e-9, True), (1.1e-9, False)])
 def test_a_projection_that_leaves_more_than_a_billionth_of_slope_is_none(left, is_open, monkeypatch):
-    monkeypatch.setattr(cone, "nnls", lambda *_: np.array([1 - left]))
+    monkeypatch.setattr(nnls, "nnls", lambda *_: np.array([1 - left]))
     assert (onto_cone(np.array([1.0, -1.0]), np.array([[1.0, 0.0]])) is not None) == is_open
 
 

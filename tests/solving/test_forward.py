@@ -8,10 +8,10 @@ import pytest
 import toy
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
-from loomopt.jets import variables
 from loomopt.jobs import registry
+from loomopt.maths import systems
+from loomopt.maths.jets import variables
 from loomopt.program.sampling import Sampler
 from loomopt.solving.exact import Exact
 from loomopt.solving.forward import Forward
@@ -128,7 +128,7 @@ def test_a_batch_of_designs_is_judged_in_one_pass():
     names = [v.name for v in program.variables]
     shares = 1 + 1e-3 * np.random.default_rng(0).normal(size=(20, len(names)))
     several = {n: np.array([[x[n]]]) * shares[:, k : k + 1] for k, n in enumerate(names)}
-    system, angles = maths.jets(), np.array([0.1, 1.0, 4.0])
+    system, angles = systems.jets(), np.array([0.1, 1.0, 4.0])
 
     def slopes(values):
         of = dict(zip(names, variables(list(values.values()), np.eye(len(names)), curved=True), strict=True))

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import toy
 
-from loomopt import maths
 from loomopt.balance import Given
+from loomopt.maths import systems
 from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8
@@ -191,7 +191,7 @@ def test_equalities_that_depend_on_each_other_get_prices_of_measure():
         certificate = certify(_hs55(), along(t), ACCURACY)
         assert certificate.passed, certificate.reasons
         assert sum(binding.worth for binding in certificate.binding) < 1e2
-        assert _hs55().model.static(maths.FLOAT, Given(along(t), {}), {})["f"] == pytest.approx(least, rel=1e-12)
+        assert _hs55().model.static(systems.FLOAT, Given(along(t), {}), {})["f"] == pytest.approx(least, rel=1e-12)
 
 
 @pytest.mark.parametrize(("t", "reason"), [(0.5, "f can still fall"), (1 - 1e-6, "f can still fall"), (None, "second")])

@@ -6,7 +6,7 @@ import scipy.optimize
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt.solving.nnls import nnls
+from loomopt.maths.nnls import nnls
 
 SHAPES = [(1, 1), (3, 2), (5, 5), (6, 14), (8, 3), (20, 40)]
 

@@ -15,10 +15,10 @@ import pytest
 from shedding_cases import CYCLOID, TRAVELS, flat, freed, lowest, plain, product, programmed
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import MIDDLE, MIDDLE_PIECE
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import spline
 
@@ -53,8 +53,8 @@ OTHER_DIGITS = {
     ("14.5 mm", "uneven"): 30658.78399751,
 }
 """Of 16 intervals."""
-MANY = maths.mpmath(50)
-EXACT = replace(maths.FLOAT, number=Fraction)
+MANY = systems.mpmath(50)
+EXACT = replace(systems.FLOAT, number=Fraction)
 
 
 # The least spring ------------------------------------------------------------------------------------------------
@@ -160,8 +160,8 @@ def test_the_found_law_is_a_cam_law(name):
     assert abs(float(made.v[-1])) <= 1e-13
     assert abs(float(sum(made.a))) <= 1e-12
     for k in range(n):
-        here, u = spline(maths.numpy(), law), np.linspace(k, k + 1, 51) / n
-        s, v, a, _ = here.at(maths.numpy(), u, np.full(51, float(k)))
+        here, u = spline(systems.numpy(), law), np.linspace(k, k + 1, 51) / n
+        s, v, a, _ = here.at(systems.numpy(), u, np.full(51, float(k)))
         assert np.all(v >= -1e-12)
         assert np.all(np.diff(s) >= -1e-12)
         assert np.all(np.abs(a) <= CYCLOID * (1 + 1e-12))
@@ -239,9 +239,9 @@ def slope(sampled, piece, corner):
     found = []
     for away in (0.0, 1e-4):
         node = Node(corner + inside * away * (end - start), switch)
-        pose = sampled.model.instant(maths.FLOAT, sampled.given, node).pose
+        pose = sampled.model.instant(systems.FLOAT, sampled.given, node).pose
         pull = -warp.force(
-            maths.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], switch["warp_tension"]
+            systems.FLOAT, pose, sampled.given.values, sampled.given.own["warp_tension"], switch["warp_tension"]
         )
         found.append((pose.q, pull))
     return (found[1][1] - found[0][1]) / (found[1][0] - found[0][0])

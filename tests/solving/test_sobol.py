@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from loomopt.solving.sobol import BITS, POLYNOMIALS, points
+from loomopt.maths.sobol import BITS, POLYNOMIALS, points
 
 
 def unshifted(monkeypatch, count, dimensions):

@@ -16,7 +16,7 @@ from loomopt.cycle import Node
 from loomopt.effects.kinds import Motion
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
 from loomopt.program.kinematics import Arcs, Group

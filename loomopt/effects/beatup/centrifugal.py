@@ -6,7 +6,7 @@ shaking_force = (m4 + m4e) |r| sqrt(ψ˙⁴ + ψ¨²), the whole inertia force o
 
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Check
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Figure, Table, Values
 
 

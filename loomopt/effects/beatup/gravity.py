@@ -9,7 +9,7 @@ from pydantic import Field
 from loomopt.base.quantities import Angle
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665

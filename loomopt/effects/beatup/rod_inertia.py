@@ -13,7 +13,7 @@ from loomopt.base.quantities import Length, PositiveInertia, PositiveMass
 from loomopt.base.units import QuantityError
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Table, Values
 
 

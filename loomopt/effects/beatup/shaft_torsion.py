@@ -14,7 +14,7 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
 from loomopt.effects.kinds import Clash, Peak, State
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

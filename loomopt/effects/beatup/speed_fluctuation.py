@@ -12,7 +12,7 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveInertia, PositiveTorque, Share
 from loomopt.effects.kinds import Speed
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.schema import Figure, Table, Values
 
 if TYPE_CHECKING:

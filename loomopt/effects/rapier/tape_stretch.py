@@ -11,7 +11,7 @@ from pydantic import Field
 from loomopt.base.quantities import PositiveStiffness
 from loomopt.base.units import Shown
 from loomopt.effects.kinds import Check, Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Figure, Table, Values
 
 MASS, ACCELERATION = "head_inertia.mass", "S''_stroke"

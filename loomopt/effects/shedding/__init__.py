@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from loomopt.maths import Number
+from loomopt.maths.systems import Number
 
 
 class FramePose(Protocol):

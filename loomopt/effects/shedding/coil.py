@@ -13,7 +13,7 @@ from pydantic import Field
 from loomopt.base.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
 from loomopt.base.units import Shown, usual
 from loomopt.effects.kinds import Axis, Check, Demand
-from loomopt.maths import FLOAT, Maths, Number
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.mechanisms.tension_spring import WIRES, Coil, strength
 from loomopt.schema import Figure, Table, Values
 

@@ -5,7 +5,7 @@ from pydantic import Field
 from loomopt.base.quantities import Mass
 from loomopt.effects.kinds import Load
 from loomopt.effects.shedding import FramePose
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Table, Values
 
 

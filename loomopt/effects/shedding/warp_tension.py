@@ -15,7 +15,7 @@ from pydantic import Field
 from loomopt.base.quantities import Force
 from loomopt.effects.kinds import Load, Place
 from loomopt.effects.shedding import FramePose
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Table, Values
 
 TURN = 6.283185307179586

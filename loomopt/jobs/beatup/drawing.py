@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from loomopt.base.errors import BadInput
 from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import crank_rocker, crank_rocker_faults
 from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.shapes import Arc, Drawing, Point, Primitive

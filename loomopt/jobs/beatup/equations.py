@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from types import SimpleNamespace
 
-from loomopt import balance, maths
+from loomopt import balance
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
@@ -42,14 +43,14 @@ def _geometry() -> list[Equation]:
 def _dead_centres() -> list[Equation]:
     """Run the mechanism's own closed forms on symbols."""
     lengths = crank_rocker.Lengths(*(symbol(name) for name in ("l1", "l2", "l3", "l4")))
-    centres = crank_rocker.DeadCentres(maths.sympy(), lengths)
+    centres = crank_rocker.DeadCentres(systems.sympy(), lengths)
     beta, beta_r, psi = symbol("beta"), symbol("beta_r"), sympy().Function("psi")
     return [
         equation("front dead centre", beta, centres.beta),
         equation("rear dead centre", beta_r, centres.beta_r),
         equation("at front dead centre", symbol("psi''_FDC"), centres.psi_2_front),
         equation("dead centres", symbol("theta"), beta - beta_r),
-        equation("dead centres", symbol("swing"), psi(maths.sympy().pi + beta_r) - psi(beta)),
+        equation("dead centres", symbol("swing"), psi(systems.sympy().pi + beta_r) - psi(beta)),
     ]
 
 

@@ -14,7 +14,7 @@ from loomopt.balance import Given
 from loomopt.base.records import lazy
 from loomopt.cycle import Node, Where
 from loomopt.effects.kinds import Effect, Load, Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms import crank_rocker
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar

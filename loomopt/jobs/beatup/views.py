@@ -7,7 +7,7 @@ from loomopt.cycle import TURN
 from loomopt.effects.kinds import State
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import tops
 from loomopt.scenes import Scene

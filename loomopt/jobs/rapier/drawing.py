@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.base.errors import BadInput
 from loomopt.cycle import TURN, Floats
 from loomopt.jobs.rapier.model import DIMENSIONS
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import rapier_faults, turning_points
 from loomopt.mechanisms.dyad import Vector
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
@@ -42,7 +42,7 @@ class Drive:
 
     def turn(self, phi1: Floats) -> Pose:
         """Return the drive at crank angles, rad."""
-        return Pose(maths.numpy(), self.dimensions, self.sley.stand, phi1)
+        return Pose(systems.numpy(), self.dimensions, self.sley.stand, phi1)
 
     @functools.cached_property
     def front(self) -> Vector:

@@ -1,6 +1,7 @@
 """The equations a rapier scene really uses: both loops, the rapier's travel, each effect's own formula on symbols."""
 
-from loomopt import balance, maths
+from loomopt import balance
+from loomopt.maths import systems
 from loomopt.mechanisms.rapier_drive import Dimensions, Sley
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
@@ -18,7 +19,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
 
 def _sley(d: Dimensions) -> list[Equation]:
     """Run the sley's own closed forms on symbols, and close the loop A0 A B1 B0; phi7: direction of A0→B0 from x."""
-    sp, sley = sympy(), Sley(maths.sympy(), d)
+    sp, sley = sympy(), Sley(systems.sympy(), d)
     phi1, beta, beta_r, phi7, phi2, phi3 = (symbol(name) for name in ("phi1", "beta", "beta_r", "phi7", "phi2", "phi3"))
     crank = phi1 + beta + phi7
     sides = (

@@ -7,7 +7,7 @@ from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.rapier import design as designs
 from loomopt.jobs.rapier import program as programs
 from loomopt.jobs.rapier.scene import SCHEMA
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program

@@ -10,12 +10,12 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from loomopt import maths as systems
 from loomopt.balance import Given
 from loomopt.base.records import lazy
 from loomopt.cycle import Floats, Node
 from loomopt.effects.kinds import Effect, Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms import rapier_drive, turning_points
 from loomopt.mechanisms.dyad import Vector, dot
 from loomopt.program import drive

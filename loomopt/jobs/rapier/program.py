@@ -13,7 +13,7 @@ from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms import rapier_drive, rapier_faults
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from loomopt.cycle import TURN
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes import Scene
 

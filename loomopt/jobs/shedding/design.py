@@ -10,14 +10,15 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.cycle import Floats
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.base import Figures
 from loomopt.jobs.shedding.model import RETURN, RETURN_SPRING, RISE, FramePose, frame
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, LawTarget
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.mechanisms import cam_limit
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import Spline, named_knots
@@ -169,7 +170,7 @@ class Sizes:
         self.sampler = sampler
         given = sampler.given
         pieces, u = sampler.grid()
-        at = sampler.model.instant(maths.numpy(), given, sampler.node(pieces, u))
+        at = sampler.model.instant(systems.numpy(), given, sampler.node(pieces, u))
         acting = {name: term for name, term in at.terms().items() if name != RETURN_SPRING.name}
         parts = [np.broadcast_to(np.asarray(term, dtype=float), u.shape) for term in acting.values()]
         self.travelled: Floats = np.asarray(at.pose.q, dtype=float)
@@ -209,12 +210,12 @@ def least_stiffness(scene: Scene, start: Number) -> Number | None:
     if not alike or set(scene.limits) - {LIMIT} or model.known_in or model.demands:
         return None
     frame = _frame(scene, model)
-    return None if frame is None else cam_limit.least_stiffness(frame, maths.mpmath(cam_limit.DIGITS).number(start))
+    return None if frame is None else cam_limit.least_stiffness(frame, systems.mpmath(cam_limit.DIGITS).number(start))
 
 
 def _frame(scene: Scene, model: JobModel) -> cam_limit.Frame | None:
     """Return the frame that the loads make of it; None where their sum is another."""
-    number, known = maths.mpmath(cam_limit.DIGITS).number, scene.mechanism
+    number, known = systems.mpmath(cam_limit.DIGITS).number, scene.mechanism
     force = _force(scene, model)
     middle, inertia = force(RISE, 0.5, 0.5, 0.0, 0.0), force(RISE, 0.5, 0.5, 0.0, 1.0)
     limit = scene.limits.get(LIMIT)
@@ -237,7 +238,7 @@ def _frame(scene: Scene, model: JobModel) -> cam_limit.Frame | None:
 
 def _force(scene: Scene, model: JobModel) -> Force:
     """Return the sum of all loads but the return spring at a segment, s, u, s' and s''."""
-    system = maths.mpmath(cam_limit.DIGITS)
+    system = systems.mpmath(cam_limit.DIGITS)
     numbers = registry.of(scene).numbers(scene)
     given = model.given(system, {name: system.number(value) for name, value in numbers.items()})
     loads = [load for load in model.loads if load is not RETURN_SPRING]

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import maths, provenance
+from loomopt import provenance
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor, show
 from loomopt.cycle import Floats, Pieces
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
 from loomopt.jobs.shedding.scene import Frame
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_follower import Follower, Stations
 from loomopt.mechanisms.cam_motion import Spline
 from loomopt.picture import tracing
@@ -57,7 +58,7 @@ class Cam:
     def stations(self, pieces: Pieces, u: Floats) -> Stations:
         """Return what stands at nodes (pieces, u) of the sampler's cycle."""
         node = self.sampler.node(pieces, u)
-        pose = self.sampler.model.instant(maths.numpy(), self.sampler.given, node).pose
+        pose = self.sampler.model.instant(systems.numpy(), self.sampler.given, node).pose
         return Stations(node.phi, pose.q, pose.contact(self.follower))
 
     def at(self, theta: Floats) -> Stations:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from loomopt import maths
 from loomopt.balance import Acting, Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Load, Motion
@@ -22,7 +21,8 @@ from loomopt.jobs.shedding.model import (
     FramePose,
     frame,
 )
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.picture import effect_equations
 from loomopt.picture.cam_laws import Unwritten, law
@@ -130,7 +130,7 @@ def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[...
 
 def motion(cam: CamFrame, given: Given) -> list[Equation]:
     """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
-    theta, values, pi = symbol("theta"), given.values, maths.sympy().pi
+    theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
     ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
     spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in cam.segments]
     poses = {SEGMENTS[k]: pose(cam, given, k) for k in cam.segments}
@@ -153,7 +153,7 @@ def motion(cam: CamFrame, given: Given) -> list[Equation]:
 def pose(cam: CamFrame, given: Given, segment: int) -> FramePose:
     """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
     unwritten = dataclasses.replace(cam, law=Unwritten(cam.law))
-    return unwritten.pose(maths.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))
+    return unwritten.pose(systems.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))
 
 
 class _Started(Follower):
@@ -166,7 +166,7 @@ class _Started(Follower):
 
 def follower() -> list[Equation]:
     """Return the follower's equations: swing, roller centre, pressure angle, curvature, profile."""
-    system, theta = maths.sympy(), symbol("theta")
+    system, theta = systems.sympy(), symbol("theta")
     numbers = [symbol(name) for name in FOLLOWER]
     at = Contact(system, _Started(*numbers), symbol("phi"), symbol("phi'"), symbol("phi''"))
     speed = sympy().Symbol("w", positive=True)
@@ -196,4 +196,4 @@ def _profile_curvature(numbers: Sequence[Expression]) -> Expression:
     class Bent(Contact):
         curvature = symbol("curvature")
 
-    return Bent(maths.sympy(), Follower(*numbers), 0, 0, 0).profile_curvature
+    return Bent(systems.sympy(), Follower(*numbers), 0, 0, 0).profile_curvature

@@ -15,7 +15,7 @@ from loomopt.base.records import lazy
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.effects.shedding import FramePose as Frame
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import Derivatives
 from loomopt.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at

@@ -8,7 +8,7 @@ from loomopt.cycle import Node
 from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
-from loomopt.maths import FLOAT, Number
+from loomopt.maths.systems import FLOAT, Number
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
 from loomopt.program.curves import POWER

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from loomopt.boxes import Floats, Interval
+from loomopt.maths.intervals import Floats, Interval
+from loomopt.maths.nnls import nnls
 from loomopt.solving.global_bound.reading import LIMIT, Read, Reader
-from loomopt.solving.nnls import nnls
 from loomopt.tolerances import ACTIVE
 
 WEIGHT = 100.0

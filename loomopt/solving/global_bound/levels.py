@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from loomopt.boxes import Floats
 from loomopt.jobs.base import Job
+from loomopt.maths.intervals import Floats
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale

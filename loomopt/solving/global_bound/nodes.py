@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt import maths
 from loomopt.base.records import lazy
-from loomopt.boxes import PI, Enclosure, Floats, Interval, interval
 from loomopt.cycle import TURN, Node, Where
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.intervals import PI, Enclosure, Floats, Interval, interval
+from loomopt.maths.systems import Number
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.task import Task
 from loomopt.tolerances import SAME_ANGLE
@@ -90,7 +90,7 @@ class Layout:
 
     def worst(self, task: Task, name: str, middles: Floats, where: Where | None = None) -> Spots:
         """Return the node of each box at which its middle's quantity is largest; middles: (names, boxes)."""
-        model, system = task.program.model, maths.numpy()
+        model, system = task.program.model, systems.numpy()
         pieces, grid = self._grid
         on = self.sampler.on(name, where)[pieces]
         with np.errstate(all="ignore"):
@@ -126,7 +126,7 @@ class Layout:
         self, name: str, angle: Number, corners: Sequence[Number], starts: Sequence[Number]
     ) -> NDArray[np.bool_]:
         """Say of each box whether an event stays in the piece that ends at, or holds, it in the sampled design."""
-        here = float(self.sampler.model.event(maths.FLOAT, self.sampler.given, name))
+        here = float(self.sampler.model.event(systems.FLOAT, self.sampler.given, name))
         piece = self.cycle.piece_before(here)
         following = self.cycle.order[(piece + 1) % self.cycle.pieces][0]
         if corners[following] is angle:
@@ -151,7 +151,7 @@ def layouts(task: Task, middles: Floats, known: dict[bytes, Layout | None]) -> I
 
     None where a middle has no real cycle. known: those that were met, by key.
     """
-    model, system = task.program.model, maths.numpy()
+    model, system = task.program.model, systems.numpy()
     with np.errstate(all="ignore"):
         corners = model.corners(system, model.given(system, task.floats(middles)))
     boxes = middles.shape[1]

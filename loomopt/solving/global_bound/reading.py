@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt import maths
-from loomopt.boxes import Enclosure, Floats, Interval, interval
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
+from loomopt.maths.systems import Number
 from loomopt.program.program import Limit, Objective
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.schema import Values
@@ -104,7 +104,7 @@ class Reader:
         if any(row in (mean.name, mean.root) for mean in self.task.program.model.integrals):
             return True
         try:
-            self._sampler.model.static(maths.FLOAT, self._sampler.given, _Nowhere(), (row,))
+            self._sampler.model.static(systems.FLOAT, self._sampler.given, _Nowhere(), (row,))
         except _EventError:
             return True
         return False
@@ -150,7 +150,7 @@ class Reader:
         self, layout: Layout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int, count: int
     ) -> tuple[list[Number], list[Mask]]:
         """Return all rows, each (nodes, boxes), and of which boxes each is sure; None for what nothing is known of."""
-        model, system = self.task.program.model, maths.boxes()
+        model, system = self.task.program.model, systems.boxes()
         given = model.given(system, numbers)
         corners = model.corners(system, given) if layout else ()
         stills, cycle = (layout.stills, layout.cycle) if layout else ({}, None)

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from loomopt import maths
 from loomopt.balance import Given, total
-from loomopt.box_series import Series, along
-from loomopt.boxes import Enclosure, Floats, Interval, interval
 from loomopt.cycle import Cycle, Node
-from loomopt.maths import Maths, Number
+from loomopt.maths import systems
+from loomopt.maths.interval_series import Series, along
+from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.reading import DATUM, Rows
 from loomopt.program.traced import Quantities
@@ -73,7 +73,7 @@ class BoxRows(Rows):
         begin, width, switch = starts[piece], starts[piece + 1] - starts[piece], cycle.switch(piece)
         values = self.quantity(name, begin + interval(middles) * width, switch)
         whole = along(middles - half, middles + half)
-        series = Quantities(self.model, (self.maths, maths.box_series()), self.given)
+        series = Quantities(self.model, (self.maths, systems.box_series()), self.given)
         found = series((name,), Node(begin + whole * width, switch))[0]
         bends = found.terms.bend if isinstance(found, Series) else interval(0.0)
         return _summed(values * (2 * half), count) + _summed(bends * (interval(half) ** 3 * 2.0 / 3.0), count)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import maths
-from loomopt.maths import Number
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.program.program import Move, Program
 from loomopt.program.sampling import Sampler
 
@@ -124,7 +124,7 @@ def _rows(program: Program, sampler: Sampler) -> Iterator[tuple[Number, bool]]:
     """
     if not all(map(math.isfinite, sampler.static.values())):
         raise ValueError("a row has no real value")
-    reading = sampler.read(maths.mpmath())
+    reading = sampler.read(systems.mpmath())
     for limit in program.limits:
         if limit.family == "static":
             yield reading.excess(limit), limit.value == 0.0

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from loomopt import boxes
-from loomopt.boxes import Floats, Interval
-from loomopt.maths import Maths, Number
-from loomopt.maths import boxes as box_system
+from loomopt.maths import intervals
+from loomopt.maths.intervals import Floats, Interval
+from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import boxes as box_system
 from loomopt.program.program import Limit, Program, Variable
 from loomopt.solving.global_bound.rows import BoxRows, OpenError
 from loomopt.solving.global_bound.scale import Scale
@@ -44,12 +44,12 @@ class Task:
     def numbers(self, low: Floats, high: Floats) -> dict[str, Number]:
         """Return all numbers over boxes: variables with their slopes; low, high: (names, boxes), SI."""
         count = len(self.names)
-        own = {name: boxes.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
+        own = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
         return {**self.fixed, **own}
 
     def points(self, at: Floats) -> dict[str, Number]:
         """Return all numbers at points (names, boxes), SI, as intervals without slopes."""
-        return {**self.fixed, **{name: boxes.interval(at[k][None]) for k, name in enumerate(self.names)}}
+        return {**self.fixed, **{name: intervals.interval(at[k][None]) for k, name in enumerate(self.names)}}
 
     def floats(self, at: Floats) -> dict[str, Number]:
         """Return all numbers at points (names, boxes), SI, as plain arrays."""

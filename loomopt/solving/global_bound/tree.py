@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt.boxes import Floats, Interval, interval
+from loomopt.maths.intervals import Floats, Interval, interval
 from loomopt.solving.global_bound.cuts import with_cut
 from loomopt.solving.global_bound.reading import LIMIT, Read, Reader
 from loomopt.tolerances import FEASIBLE

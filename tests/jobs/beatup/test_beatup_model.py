@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.effects.beatup import counterweight_inertia, rod_inertia
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker
+from loomopt.maths import systems
 from loomopt.mechanisms import crank_rocker
 from loomopt.program.model import JobModel
 from loomopt.tolerances import ASSEMBLY_MARGIN
@@ -35,7 +35,7 @@ def figures(scene, design=None):
     return lo.evaluate(scene, design).figures
 
 
-def given_of(scene, system=maths.FLOAT):
+def given_of(scene, system=systems.FLOAT):
     """Return the numbers of a scene in a number system."""
     values = {name: system.number(value) for name, value in JOB.numbers(scene).items()}
     return JOB.model(scene).given(system, values)
@@ -43,7 +43,7 @@ def given_of(scene, system=maths.FLOAT):
 
 def test_q_is_minus_psi_so_that_the_reed_torque_pushes_toward_the_fell():
     given = given_of(BEATUP)
-    pose = CrankRocker().pose(maths.FLOAT, given, Node(2.0, {}))
+    pose = CrankRocker().pose(systems.FLOAT, given, Node(2.0, {}))
     assert (pose.q, pose.q1, pose.q2) == (-pose.joints.psi, -pose.joints.psi_1, -pose.joints.psi_2)
     assert pose.omega == BEATUP.operation["speed"]
     assert given.values["centres"].psi_front < given.values["centres"].psi_rear
@@ -72,8 +72,8 @@ def test_the_figure_at_front_dead_centre_is_the_limit_of_the_curve_from_before(s
 
 def test_the_front_pose_is_the_general_pose_at_front_dead_centre():
     given = given_of(FULL)
-    front = CrankRocker().still(maths.FLOAT, given, FRONT, {})
-    general = CrankRocker().pose(maths.FLOAT, given, Node(given.values["beta"], {}))
+    front = CrankRocker().still(systems.FLOAT, given, FRONT, {})
+    general = CrankRocker().pose(systems.FLOAT, given, Node(given.values["beta"], {}))
     for name in ("phi", "omega", "q", "q2", "acceleration"):
         assert getattr(front, name) == pytest.approx(getattr(general, name), rel=1e-13)
     assert (front.q1, front.velocity, front.omega_dot) == (0, 0, None)
@@ -86,13 +86,13 @@ ROD = ("psi", "rod_1", "rod_2", "psi_2", "cos_crank_rod", "sin_crank_rod")
 @pytest.mark.parametrize("design", [{}, DESIGN, {"l1": 0.001}], ids=["today", "another", "tiny crank"])
 def test_joints_at_front_dead_centre_are_the_limit_of_the_general_pose_in_two_number_systems(design):
     """Near β, 1e-20 rad away in 40 digits; the closed forms themselves to 12 digits of floats."""
-    many = maths.mpmath(40)
+    many = systems.mpmath(40)
     numbers = JOB.numbers_of(FULL, design)
     exact = JOB.model(FULL).given(many, {name: many.number(value) for name, value in numbers.items()})
-    plain = JOB.model(FULL).given(maths.FLOAT, numbers)
+    plain = JOB.model(FULL).given(systems.FLOAT, numbers)
     near = CrankRocker().pose(many, exact, Node(exact.values["beta"] + many.number(10) ** -20, {})).joints
     front = CrankRocker().still(many, exact, FRONT, {}).joints
-    floats = CrankRocker().still(maths.FLOAT, plain, FRONT, {}).joints
+    floats = CrankRocker().still(systems.FLOAT, plain, FRONT, {}).joints
     for name in ROD:
         limit = getattr(near, name)
         assert float(abs(getattr(front, name) - limit)) <= 1e-18 * max(1.0, abs(float(limit))), name
@@ -108,12 +108,12 @@ def test_an_effect_may_read_joints_at_front_dead_centre():
     effects = [of_reed if effect is rod_inertia.EFFECT else effect for effect in rod.active]
     assert of_reed in effects
     model = dataclasses.replace(JOB.model(rod), effects=tuple(effects))
-    given = model.given(maths.FLOAT, JOB.numbers(rod))
-    without = JOB.model(rod).given(maths.FLOAT, JOB.numbers(rod))
+    given = model.given(systems.FLOAT, JOB.numbers(rod))
+    without = JOB.model(rod).given(systems.FLOAT, JOB.numbers(rod))
     stills = JOB.sampler(rod, {}).stills
-    found = model.static(maths.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
-    reed = JOB.model(rod).static(maths.FLOAT, without, stills, ("M3_fdc",))["M3_fdc"]
-    joints = crank_rocker.front_pose(maths.FLOAT, given.values["lengths"], given.values["centres"])
+    found = model.static(systems.FLOAT, given, stills, ("M3_fdc",))["M3_fdc"]
+    reed = JOB.model(rod).static(systems.FLOAT, without, stills, ("M3_fdc",))["M3_fdc"]
+    joints = crank_rocker.front_pose(systems.FLOAT, given.values["lengths"], given.values["centres"])
     own, l1 = given.own["rod_inertia"], BEATUP.mechanism["l1"]
     turn = (own["m2"] * own["s2"] ** 2 + own["JS2"]) * joints.rod_1 * joints.rod_2
     swing = own["m2"] * l1 * own["s2"] * joints.rod_2 * joints.cos_crank_rod
@@ -122,10 +122,10 @@ def test_an_effect_may_read_joints_at_front_dead_centre():
 
 def test_events_of_the_motion_are_both_dead_centres():
     sampled = JOB.sampler(BEATUP, DESIGN)
-    front, rear = (sampled.model.event(maths.FLOAT, sampled.given, name) for name in (FRONT, REAR))
+    front, rear = (sampled.model.event(systems.FLOAT, sampled.given, name) for name in (FRONT, REAR))
     assert (front, rear) == (sampled.given.values["beta"], math.pi + sampled.given.values["beta_r"])
     for angle in (front, rear):
-        assert CrankRocker().pose(maths.FLOAT, sampled.given, Node(angle, {})).q1 == pytest.approx(0, abs=1e-14)
+        assert CrankRocker().pose(systems.FLOAT, sampled.given, Node(angle, {})).q1 == pytest.approx(0, abs=1e-14)
 
 
 def test_static_figures_are_their_formulas():
@@ -168,26 +168,26 @@ def test_an_assembly_row_is_zero_where_the_triangle_closes_with_the_margin_only(
         "assembly: l1 + l3 < l2 + l4": ("l3", (0.167 - 0.031) / 1.001 + 0.065),
     }
     name, edge = ends[row]
-    assert GROUP.rows[row](maths.FLOAT, base) > 0
-    assert GROUP.rows[row](maths.FLOAT, base | {name: edge}) == pytest.approx(0, abs=1e-15)
+    assert GROUP.rows[row](systems.FLOAT, base) > 0
+    assert GROUP.rows[row](systems.FLOAT, base | {name: edge}) == pytest.approx(0, abs=1e-15)
     worse = -1e-3 if row.startswith("assembly: l1 + l4") else 1e-3
-    assert GROUP.rows[row](maths.FLOAT, base | {name: edge + worse}) < 0
+    assert GROUP.rows[row](systems.FLOAT, base | {name: edge + worse}) < 0
 
 
 def test_s_may_stand_for_the_counterweight():
     """Solved in s = m4e r4e², the model gives the same torque as from m4e and r4e."""
     values = JOB.numbers(BEATUP) | DESIGN
     found, node = JOB.model(BEATUP), Node(2.0, {"resistance": 0})
-    by_mass = found.given(maths.FLOAT, values)
-    by_s = found.given(maths.FLOAT, {k: v for k, v in values.items() if k != "m4e"} | {"s": 3.0 * 0.07**2})
+    by_mass = found.given(systems.FLOAT, values)
+    by_s = found.given(systems.FLOAT, {k: v for k, v in values.items() if k != "m4e"} | {"s": 3.0 * 0.07**2})
     for name in ("peak_torque", "M3_square"):
-        assert found.quantity(maths.FLOAT, by_s, name, node) == pytest.approx(
-            found.quantity(maths.FLOAT, by_mass, name, node), rel=1e-15
+        assert found.quantity(systems.FLOAT, by_s, name, node) == pytest.approx(
+            found.quantity(systems.FLOAT, by_mass, name, node), rel=1e-15
         )
     symbols = {name: ca.SX.sym(name) for name in values if name != "m4e"} | {"s": ca.SX.sym("s")}
-    given = found.given(maths.casadi(), symbols)
+    given = found.given(systems.casadi(), symbols)
     pressed = Node(ca.SX.sym("phi"), PRESSED)
-    read = {x.name() for x in ca.symvar(found.quantity(maths.casadi(), given, "peak_torque", pressed))}
+    read = {x.name() for x in ca.symvar(found.quantity(systems.casadi(), given, "peak_torque", pressed))}
     assert "s" in read
     assert not read & {"m4e", "r4e", "m4", "r4"}
 

@@ -12,7 +12,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.beatup import equations as beatup_equations
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.scene import RESISTED
-from loomopt.maths import FLOAT
+from loomopt.maths.systems import FLOAT
 
 BEATUP = declared.of("loomopt.effects.beatup")
 SPEED = 62.83185307179586

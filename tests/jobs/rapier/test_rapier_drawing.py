@@ -9,10 +9,10 @@ import clear
 import numpy as np
 import pytest
 
-from loomopt import maths
 from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier import drawing as rapier_drawing
 from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
+from loomopt.maths import systems
 from loomopt.mechanisms import rapier_drive
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture.drawing import sheet
@@ -27,8 +27,8 @@ def paper():
     printed = {"l1": 0.076385, "l2": 0.275705, "l3": 0.684, "l71": 0.773, "l3p": 0.180, "l4": 0.012, "l6": 0.185}
     printed |= {"phi30": math.radians(80.48), "alpha": math.radians(30), "i1": 300 / 18, "i2": 1.0, "wheel": 0.240}
     given = Dimensions(**printed, l5=math.nan, C0x=math.nan, C0y=math.nan, phi40=math.nan)
-    swing = Sley(maths.FLOAT, given).centres.swing
-    layout = rapier_drive.construct(maths.FLOAT, given, given.phi30 - swing, math.radians(24.35))
+    swing = Sley(systems.FLOAT, given).centres.swing
+    layout = rapier_drive.construct(systems.FLOAT, given, given.phi30 - swing, math.radians(24.35))
     found = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - given.l4, "phi40": layout.phi40}
     return dataclasses.asdict(given) | found
 
@@ -52,9 +52,9 @@ def links(drawn, layer):
 def travel(design, phi1):
     """Return the rapier's travel, m, and its derivative at crank angles."""
     d = Dimensions(*(design[field.name] for field in dataclasses.fields(Dimensions)))
-    stand = Sley(maths.numpy(), d).stand
-    front = Pose(maths.numpy(), d, stand, np.array(0.0)).relative
-    pose = Pose(maths.numpy(), d, stand, phi1)
+    stand = Sley(systems.numpy(), d).stand
+    front = Pose(systems.numpy(), d, stand, np.array(0.0)).relative
+    pose = Pose(systems.numpy(), d, stand, phi1)
     return d.travel * pose.phi63(front), d.travel * pose.phi63_1
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from loomopt import maths
 from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs.rapier import equations as rapier_equations
 from loomopt.jobs.rapier import model as rapier
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 EFFECTS = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
@@ -158,7 +158,7 @@ def test_latex_has_indices_before_primes_so_that_powers_may_follow(geometry):
 
 
 def test_the_drive_of_these_tests_assembles_all_round():
-    d, stand = BUILT, Sley(maths.numpy(), BUILT).stand
-    base = Pose(maths.numpy(), d, stand, np.linspace(0, 2 * np.pi, 721)).base
+    d, stand = BUILT, Sley(systems.numpy(), BUILT).stand
+    base = Pose(systems.numpy(), d, stand, np.linspace(0, 2 * np.pi, 721)).base
     assert np.all(np.hypot(base.x, base.y) < d.l5 + d.l6)
     assert np.all(np.hypot(base.x, base.y) > abs(d.l5 - d.l6))

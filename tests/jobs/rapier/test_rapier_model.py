@@ -8,17 +8,17 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt import maths
 from loomopt.cycle import TURN, Node
 from loomopt.jobs import registry
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, SLEY_MARGINS, RapierDrive
+from loomopt.maths import systems
 from loomopt.program.model import JobModel
 from loomopt.tolerances import ASSEMBLY_MARGIN
 
 SCENE = registry.load("rapier").with_effect("head_inertia").with_effect("tape_friction")
 JOB = registry.of(SCENE)
-MANY = maths.mpmath(60)
+MANY = systems.mpmath(60)
 OTHER = {"l4": 0.018, "phi40": SCENE.mechanism["phi40"] + 0.15, "l5": 0.48}
 DESIGNS = pytest.mark.parametrize("design", [{}, OTHER], ids=["today", "another"])
 
@@ -40,7 +40,7 @@ def test_derivatives_are_those_of_the_travel_in_many_digits(design):
     for phi in np.linspace(0, TURN, 17):
         at = MANY.number(float(phi))
         after, before = pose(MANY, many, at + h), pose(MANY, many, at - h)
-        here, found = pose(MANY, many, at), pose(maths.FLOAT, sampled.given, float(phi))
+        here, found = pose(MANY, many, at), pose(systems.FLOAT, sampled.given, float(phi))
         slopes = [(getattr(after, name) - getattr(before, name)) / (2 * h) for name in ("q", "q1", "q2")]
         rows.append([(found.q, here.q), *zip((found.q1, found.q2, found.q3), slopes, strict=True)])
     values = np.array(rows, dtype=float)
@@ -57,7 +57,7 @@ def test_a_turn_and_both_its_derivatives_are_those_of_implicit_differentiation(k
     sampled = JOB.sampler(SCENE, {})
     symbols = ca.SX.sym("p", len(MOVED))
     numbers = {**sampled.values, **sampled.hints, **dict(zip(MOVED, ca.vertsplit(symbols), strict=True))}
-    turn = sampled.model.given(maths.casadi(), numbers).values["turns"][k]
+    turn = sampled.model.given(systems.casadi(), numbers).values["turns"][k]
     hessian, gradient = ca.hessian(turn, symbols)
     today = [sampled.values[name] for name in MOVED]
     slope, bend = (found.full() for found in ca.Function("t", [symbols], [gradient, hessian])(today))
@@ -85,7 +85,7 @@ def test_a_turn_and_both_its_derivatives_are_those_of_implicit_differentiation(k
 
 def test_turns_are_sought_only_where_an_effect_calls_them_in():
     without = JOB.model(SCENE.without_effect("tape_friction"))
-    given = without.given(maths.FLOAT, JOB.numbers(SCENE))
+    given = without.given(systems.FLOAT, JOB.numbers(SCENE))
     assert "turns" not in given.values
     assert without.hints(given) == {}
     assert list(JOB.sampler(SCENE, {}).hints) == ["turn 0", "turn 1", "turn 2", "turn 3"]
@@ -93,11 +93,11 @@ def test_turns_are_sought_only_where_an_effect_calls_them_in():
 
 def test_events_are_the_sleys_dead_centres():
     sampled = JOB.sampler(SCENE, OTHER)
-    events = RapierDrive().events(maths.FLOAT, sampled.given)
+    events = RapierDrive().events(systems.FLOAT, sampled.given)
     assert list(events) == ["front dead centre", "rear dead centre"]
     for angle in events.values():
-        assert abs(pose(maths.FLOAT, sampled.given, float(angle)).joints.phi3_1) < 1e-14
-    still = RapierDrive().still(maths.FLOAT, sampled.given, "front dead centre", {})
+        assert abs(pose(systems.FLOAT, sampled.given, float(angle)).joints.phi3_1) < 1e-14
+    still = RapierDrive().still(systems.FLOAT, sampled.given, "front dead centre", {})
     assert (float(still.phi), still.q) == (0.0, pytest.approx(0, abs=1e-17))
 
 
@@ -107,12 +107,12 @@ def test_a_span_is_one_where_the_five_bar_closes_with_the_margin_only():
     group = RapierDrive().groups[""]
     assert list(CLOSES.values()) == ["span_far", "span_near"]
     for name, sign in (("span_far", 1), ("span_near", -1)):
-        at = pose(maths.FLOAT, sampled.given, 1.0)
+        at = pose(systems.FLOAT, sampled.given, 1.0)
         base = math.hypot(at.joints.base.x, at.joints.base.y)
         l5 = base * ASSEMBLY_MARGIN - 0.185 if sign > 0 else base / ASSEMBLY_MARGIN + 0.185
         given = sampled.given._replace(values={**sampled.given.values, "l5": l5})
-        stands = functools.partial(pose, maths.FLOAT, sampled.given, 1.0)
-        assert group.quantities[name](maths.FLOAT, given, 1.0, stands) == pytest.approx(1, rel=1e-13)
+        stands = functools.partial(pose, systems.FLOAT, sampled.given, 1.0)
+        assert group.quantities[name](systems.FLOAT, given, 1.0, stands) == pytest.approx(1, rel=1e-13)
 
 
 def test_the_sleys_margins_are_those_of_a_crank_rocker():
@@ -132,8 +132,8 @@ def test_dwells_are_pieces_on_their_own_side_of_front_dead_centre():
             middle = float(sampled.cycle.angles(np.array([piece]), np.array([0.5]))[0])
             assert math.copysign(1, math.remainder(middle, TURN)) == side
     one = rapier.dwells(((AFTER, "dwell_after"),))
-    assert one.corners(maths.FLOAT, sampled.given) == (sampled.given.values["dwell_after"], 0)
-    assert rapier.dwells(()).corners(maths.FLOAT, sampled.given) == ()
+    assert one.corners(systems.FLOAT, sampled.given) == (sampled.given.values["dwell_after"], 0)
+    assert rapier.dwells(()).corners(systems.FLOAT, sampled.given) == ()
 
 
 def test_forces_are_quantities_only_with_loads():
@@ -150,6 +150,6 @@ def test_forces_are_quantities_only_with_loads():
 def test_the_hand_over_is_read_only_where_a_target_speaks_of_it():
     sampled, model = JOB.sampler(SCENE, {}), JOB.program(SCENE, "stroke-dwell").model
     given = sampled.given._replace(values={**sampled.given.values, "phi_stroke": 3.0})
-    rows, at = model.static(maths.FLOAT, given, {}), pose(maths.FLOAT, sampled.given, 3.0)
+    rows, at = model.static(systems.FLOAT, given, {}), pose(systems.FLOAT, sampled.given, 3.0)
     assert (rows["phi_stroke"], rows["rest"], rows["stroke_short"]) == (3.0, at.q1, at.q - 0.85)
     assert not {"phi_stroke", "rest", "stroke_short"} & set(sampled.static)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.rapier import design as rapier_design
+from loomopt.maths import systems
 from loomopt.mechanisms import rapier_faults, turning_points
 from loomopt.mechanisms.rapier_drive import Dimensions
 from loomopt.program.sampling import Sampler
@@ -137,7 +137,7 @@ def test_stroke_and_dwells_are_those_of_thirty_digits(which):
 def test_turning_points_are_those_of_thirty_digits_the_first_onto_its_way_out(which):
     sampled = JOB.sampler(SCENE, design_of(which))
     drive_ = sampled.model.kinematics
-    found = turning_points.turns(lambda phi: drive_.pose(maths.numpy(), sampled.given, Node(phi, {})).q1)
+    found = turning_points.turns(lambda phi: drive_.pose(systems.numpy(), sampled.given, Node(phi, {})).q1)
     exact = drive(which)
     assert np.sort(np.mod(found, TURN)) == pytest.approx([float(phi) for phi in exact.turning], abs=1e-10)
     assert exact.slope(found[0] + 1e-4) > 0 > exact.slope(found[0] - 1e-4)
@@ -213,4 +213,4 @@ def test_the_friction_switch_is_the_sign_of_the_heads_speed(which):
             if min(abs(math.remainder(phi - float(turn), TURN)) for turn in exact.turning) > 1e-6:
                 assert sampled.cycle.switch(piece)["tape_friction"] == MP.sign(exact.slope(MP.mpf(phi)))
     after = Node(sampled.given.values["turns"][0] + 0.01, {})
-    assert sampled.model.kinematics.pose(maths.FLOAT, sampled.given, after).q1 > 0
+    assert sampled.model.kinematics.pose(systems.FLOAT, sampled.given, after).q1 > 0

@@ -7,10 +7,10 @@ import pytest
 import sympy as sp
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing
-from loomopt.maths import FLOAT
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT
 from loomopt.mechanisms.cam_follower import Contact, Follower
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_spline import cycloid_like, spline
@@ -76,7 +76,7 @@ def test_every_named_law_is_printed_as_it_is_computed(name):
                 assert [float(low), float(high)] == edges[piece : piece + 2]
             for share in (0.0, 0.3, 0.8, 1.0):
                 u = edges[piece] + share * (edges[piece + 1] - edges[piece])
-                exact = LAWS[name].formula(maths.mpmath(30), maths.mpmath(30).number(u), piece)[order]
+                exact = LAWS[name].formula(systems.mpmath(30), systems.mpmath(30).number(u), piece)[order]
                 assert value(formula, u=u) == pytest.approx(float(exact), rel=1e-12, abs=1e-13)
 
 
@@ -256,7 +256,7 @@ def test_latex_is_balanced_and_has_the_papers_letters(name):
 
 def test_an_expanded_formula_is_the_same_function():
     u = sp.Symbol("u", real=True)
-    raw = LAWS["freudenstein_13"].formula(maths.sympy(), u, 0)
+    raw = LAWS["freudenstein_13"].formula(systems.sympy(), u, 0)
     for formula in raw[:3]:
         short = cam_laws.expanded(formula, u)
         assert len(str(short)) < len(str(formula))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import maths
 from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FramePose
 from loomopt.jobs.shedding.scene import Frame
+from loomopt.maths import systems
 from loomopt.mechanisms.cam_laws import LAWS
 from loomopt.mechanisms.cam_motion import Spline
 from loomopt.mechanisms.cam_spline import cycloid_like
@@ -23,7 +23,7 @@ ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 EVERY = (*LAWS, "spline", "table")
 RISE, FAR, RETURN, NEAR = range(4)
 HALF = 0.5
-MANY = maths.mpmath(60)
+MANY = systems.mpmath(60)
 
 
 def turned(scene, *degrees):
@@ -82,7 +82,7 @@ def node_at(sampled, piece, share):
 
 def pose_at(sampled, piece, share):
     """Return the pose in floats at a share of a piece."""
-    return sampled.model.kinematics.pose(maths.FLOAT, sampled.given, node_at(sampled, piece, share))
+    return sampled.model.kinematics.pose(systems.FLOAT, sampled.given, node_at(sampled, piece, share))
 
 
 def in_system(scene, system, sampled):
@@ -97,7 +97,7 @@ def test_derivatives_are_those_of_the_displacement_in_many_digits(scene):
     given = in_system(scene, MANY, sampled)
     found, expected = [], []
     for angle, switches in nodes(sampled):
-        here = physics.kinematics.pose(maths.FLOAT, sampled.given, Node(angle, switches))
+        here = physics.kinematics.pose(systems.FLOAT, sampled.given, Node(angle, switches))
         assert isinstance(here, FramePose)
         around = [Node(MANY.number(angle) + step, switches) for step in (h, 0, -h)]
         after, middle, before = (physics.kinematics.pose(MANY, given, node) for node in around)
@@ -114,7 +114,7 @@ def test_derivatives_are_those_casadi_takes(scene):
     sizes, away = np.zeros(3), np.zeros(3)
     for piece in range(sampled.cycle.pieces):
         node = Node(theta, sampled.cycle.switch(piece))
-        pose = physics.kinematics.pose(maths.casadi(), sampled.given, node)
+        pose = physics.kinematics.pose(systems.casadi(), sampled.given, node)
         assert isinstance(pose, FramePose)
         taken = ca.vertcat(*[ca.jacobian(ca.SX(value), theta) for value in (pose.q, pose.q1, pose.q2)])
         both = ca.Function("both", [theta], [taken, ca.vertcat(pose.q1, pose.q2, pose.q3)])
@@ -134,16 +134,16 @@ def test_every_quantity_is_the_same_in_every_number_system(scene):
     many, theta = in_system(scene, MANY, sampled), ca.SX.sym("theta")
     symbols = {name: ca.SX.sym(name) for name in ("K1", "X0", "speed", "travel")}
     values = {**JOB.numbers(scene), **sampled.hints}
-    given = physics.given(maths.casadi(), {**values, **symbols})
+    given = physics.given(systems.casadi(), {**values, **symbols})
     for name in ("lift", *physics.quantities):
         rows = []
         for angle, switches in nodes(sampled, (0.0, 0.37, 1.0)):
-            graph = physics.quantity(maths.casadi(), given, name, Node(theta, switches))
+            graph = physics.quantity(systems.casadi(), given, name, Node(theta, switches))
             function = ca.Function("f", [theta, *symbols.values()], [graph])
             rows.append(
                 [
-                    float(physics.quantity(maths.FLOAT, sampled.given, name, Node(angle, switches))),
-                    float(np.squeeze(physics.quantity(maths.numpy(), sampled.given, name, array(angle, switches)))),
+                    float(physics.quantity(systems.FLOAT, sampled.given, name, Node(angle, switches))),
+                    float(np.squeeze(physics.quantity(systems.numpy(), sampled.given, name, array(angle, switches)))),
                     float(function(angle, *(values[symbol] for symbol in symbols))),
                     float(physics.quantity(MANY, many, name, Node(MANY.number(angle), switches))),
                 ]
@@ -155,7 +155,7 @@ def test_every_quantity_is_the_same_in_every_number_system(scene):
 def test_travel_ends_and_rests_exactly(scene):
     physics, sampled = JOB.model(scene), JOB.sampler(scene, {})
     for angle, switches in nodes(sampled):
-        pose = physics.kinematics.pose(maths.FLOAT, sampled.given, Node(angle, switches))
+        pose = physics.kinematics.pose(systems.FLOAT, sampled.given, Node(angle, switches))
         assert isinstance(pose, FramePose)
         segment = switches["segment"]
         if segment in (FAR, NEAR):
@@ -212,14 +212,14 @@ def test_the_half_open_angle_and_both_its_derivatives_are_those_of_implicit_diff
 
     Halley's step from the hint is exact to second order; Newton's was 2.4 % off.
     """
-    law, many = Spline(intervals), maths.mpmath(40)
+    law, many = Spline(intervals), systems.mpmath(40)
     coefficients = [float(value) for value in lopsided(intervals)]
     scene = FULL.update({"mechanism.law": "spline", "mechanism.law_coefficients": coefficients})
     physics, sampled = JOB.model(scene), JOB.sampler(scene, {})
     names = [f"law_{k}" for k in range(1, intervals)]
     symbols = ca.SX.sym("a", len(names))
     values = {**JOB.numbers(scene), **sampled.hints, **dict(zip(names, ca.vertsplit(symbols), strict=True))}
-    u = physics.given(maths.casadi(), values).values["half_open"][0] / scene.mechanism["rise"]
+    u = physics.given(systems.casadi(), values).values["half_open"][0] / scene.mechanism["rise"]
     hessian, gradient = ca.hessian(u, symbols)
     derivatives = ca.Function("u", [symbols], [gradient, hessian])
     slope, bend = (value.full() for value in derivatives(coefficients[1:-1]))
@@ -288,9 +288,9 @@ def power(sampled, name, nodes_=48):
         start, end = sampled.cycle.starts[piece : piece + 2]
         theta = start + (places + 1) / 2 * (end - start)
         switches = {each: np.full(theta.shape, value) for each, value in sampled.cycle.switch(piece).items()}
-        pose = physics.kinematics.pose(maths.numpy(), sampled.given, Node(theta, switches))
+        pose = physics.kinematics.pose(systems.numpy(), sampled.given, Node(theta, switches))
         values, own = sampled.given.values, sampled.given.own[name]
-        term = load.force(maths.numpy(), pose, values, own, switches.get(name, 0))
+        term = load.force(systems.numpy(), pose, values, own, switches.get(name, 0))
         work += (end - start) / 2 * np.sum(weights * term * pose.q1)
         size += (end - start) / 2 * np.sum(weights * np.abs(term * pose.q1))
     return work, size

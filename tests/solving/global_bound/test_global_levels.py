@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from machines_in_boxes import quietly, solved
 
-from loomopt.boxes import Enclosure
+from loomopt.maths.intervals import Enclosure
 from loomopt.solving.global_bound.levels import HELD, Levels, _Level, loosening
 from loomopt.solving.global_bound.scale import silent
 from loomopt.solving.global_bound.task import reduced

@@ -3,8 +3,8 @@
 import numpy as np
 from machines_in_boxes import designs, solved
 
-from loomopt import maths
-from loomopt.boxes import Interval
+from loomopt.maths import systems
+from loomopt.maths.intervals import Interval
 from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound.nodes import layouts
 
@@ -22,7 +22,7 @@ def test_the_worst_node_of_a_middle_is_close_to_its_true_peak():
         layout = own_layout(task, at)
         spot = layout.worst(task, "peak_torque", at[:, None])
         sampler = Sampler(found.program.model, task.values(at))
-        corners = found.program.model.corners(maths.FLOAT, sampler.given)
+        corners = found.program.model.corners(systems.FLOAT, sampler.given)
         angle = 2 * np.pi * spot.turns[0, 0] + sum(
             float(s[0, 0]) * c for s, c in zip(spot.shares, corners, strict=True)
         )
@@ -51,9 +51,9 @@ def test_an_order_is_certain_only_where_no_corner_can_pass_another():
     at = task.place(found.x)
     layout = own_layout(task, at)
     half = np.array([0.0, 1e-3, 3e-2])[None] * np.ones((4, 1)) * np.array([1.0, 1.0, 1.0, 0.0])[:, None]
-    given = model.given(maths.boxes(), task.numbers(at[:, None] - half, at[:, None] + half))
-    events = {name: model.event(maths.boxes(), given, name) for name in model.events_read}
-    assert layout.certain(model.corners(maths.boxes(), given), events, 3).tolist() == [True, True, False]
+    given = model.given(systems.boxes(), task.numbers(at[:, None] - half, at[:, None] + half))
+    events = {name: model.event(systems.boxes(), given, name) for name in model.events_read}
+    assert layout.certain(model.corners(systems.boxes(), given), events, 3).tolist() == [True, True, False]
 
 
 def test_an_event_that_is_a_corner_is_where_it_always_is():
@@ -61,9 +61,9 @@ def test_an_event_that_is_a_corner_is_where_it_always_is():
     task, model = found.task, found.program.model
     at = task.place(found.x)
     layout = own_layout(task, at)
-    given = model.given(maths.boxes(), task.numbers(at[:, None] - 1e-4, at[:, None] + 1e-4))
-    corners = model.corners(maths.boxes(), given)
-    events = {name: model.event(maths.boxes(), given, name) for name in model.events_read}
+    given = model.given(systems.boxes(), task.numbers(at[:, None] - 1e-4, at[:, None] + 1e-4))
+    corners = model.corners(systems.boxes(), given)
+    events = {name: model.event(systems.boxes(), given, name) for name in model.events_read}
     assert layout.certain(corners, events, 1).all()
     # The same angle as a number of its own could lie on either side of the corner.
     other = {name: Interval(angle.v.low, angle.v.high) for name, angle in events.items()}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import solved
 
-from loomopt import maths
-from loomopt.boxes import Interval, interval
+from loomopt.maths import systems
+from loomopt.maths.intervals import Interval, interval
 from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound.nodes import layouts
 from loomopt.solving.global_bound.reading import Reader
@@ -52,7 +52,7 @@ def test_pieces_of_several_widths_are_weighed():
     at = task.place(found.x)
     ((layout, _),) = layouts(task, at[:, None], {})
     assert layout is not None
-    system = maths.boxes()
+    system = systems.boxes()
     given = model.given(system, task.points(at[:, None]))
     corners = model.corners(system, given)
     mean = BoxRows(model, system, given, layout.stills, layout.cycle, corners).mean(whole)
@@ -63,7 +63,7 @@ def test_pieces_of_several_widths_are_weighed():
 
 def test_a_mean_without_a_cycle_is_refused():
     found = solved("beatup", "pulse")
-    model, system = found.program.model, maths.boxes()
+    model, system = found.program.model, systems.boxes()
     rows = BoxRows(model, system, model.given(system, found.task.points(found.task.low[:, None])), {})
     with pytest.raises(OpenError, match="a cycle that is not known"):
         rows.mean(model.integrals[0])

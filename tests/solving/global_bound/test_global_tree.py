@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from loomopt.boxes import Interval, variable
+from loomopt.maths.intervals import Interval, variable
 from loomopt.solving.global_bound.reading import LIMIT, Read
 from loomopt.solving.global_bound.tree import BATCH, Question, Tree, grown
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from loomopt.balance import Given
 from loomopt.cycle import Node
 from loomopt.effects.kinds import Effect, Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.program.kinematics import Group, Kinematics
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.tolerances import ASSEMBLY_MARGIN

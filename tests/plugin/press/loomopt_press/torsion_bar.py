@@ -5,7 +5,7 @@ from typing import Annotated
 from loomopt.base.quantities import Angle, Quantity
 from loomopt.effects.beatup import ReedPose
 from loomopt.effects.kinds import Load
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.schema import Table, Values
 
 

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from loomopt import balance, maths
+from loomopt import balance
 from loomopt.jobs import registry
+from loomopt.maths import systems
 from loomopt.picture import effect_equations
 from loomopt.picture.drawing import Label, along, place
 from loomopt.picture.equations import Equation, Symbols, equation, symbol
@@ -44,7 +45,7 @@ class PressViews(JobViews):
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations the scene really uses."""
         model, names = registry.of(scene).model(scene), ("q", "q'", "q''")
-        slide = SlidePose(maths.sympy(), symbol("crank"), symbol("rod"), symbol("phi"), symbol("omega"))
+        slide = SlidePose(systems.sympy(), symbol("crank"), symbol("rod"), symbol("phi"), symbol("omega"))
         travel = zip(names, (slide.q, slide.q1, slide.q2), strict=True)
         pose = balance.Pose(slide.phi, slide.omega, *map(symbol, names))
         known = effect_equations.given(model, Symbols())

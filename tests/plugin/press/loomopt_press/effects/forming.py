@@ -2,7 +2,7 @@
 
 from loomopt.base.quantities import Force, PositiveLength
 from loomopt.effects.kinds import Load, Motion
-from loomopt.maths import Maths, Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.mechanisms.dyad import heron
 from loomopt.schema import Table, Values
 

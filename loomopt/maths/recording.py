@@ -5,20 +5,20 @@ not even depend on a design, once for a number system. The operations are the fo
 the last bit [Griewank and Walther, Evaluating Derivatives, 2nd ed., chapter 2: the evaluation trace].
 """
 
+import functools
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
-if TYPE_CHECKING:
-    from loomopt.maths import Maths
+from loomopt.maths.systems import Maths
 
 Number = Any
 """A recorded number, or one of any number system that stands in a formula as it is."""
 Function = Callable[..., tuple[Number, ...]]
 Bind = Callable[[Sequence[Number]], Function]
 """bind(known): the function, with these values of what is known before it is called."""
-Program = Callable[[Sequence["Maths"]], Bind]
+Program = Callable[[Sequence[Maths]], Bind]
 """program(systems): how the function is bound in these number systems; the last is that of its arguments."""
 DEEPEST = 16
 """Operations nested in one expression: far below the 200 brackets at which CPython's parser gives up."""
@@ -294,3 +294,21 @@ class _Written:
             return repr(value) if math.copysign(1.0, value) > 0 else f"({value!r})"
         self.literals[f"k{place}"] = value
         return f"k{place}"
+
+
+def recorded(tape: Tape, system: int = 0) -> Maths:
+    """Numbers that record on a tape what is done with them; system: what they stand for, by its place in `Program`."""
+
+    def function(name: str) -> Callable[..., Number]:
+        return functools.partial(tape.call, system, name)
+
+    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
+        return tape.call(system, "spread", tape.listed(numbers), tape.listed(beside))
+
+    def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
+        found = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)
+        return [tape.record("{0}[{1}]", found, k) for k in range(len(weights))]
+
+    sin, cos, sqrt, atan2, number, exp = map(function, ("sin", "cos", "sqrt", "atan2", "number", "exp"))
+    pi, choose = tape.record(f"pi_{system}"), functools.partial(tape.choose, system)
+    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, choose, exp, spread, weighted)

@@ -5,8 +5,10 @@
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
-from loomopt.cycle import Floats
+Floats = NDArray[np.float64]
+
 
 BITS = 32
 POLYNOMIALS = (

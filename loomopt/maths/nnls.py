@@ -1,13 +1,30 @@
-"""Non-negative least squares (Lawson and Hanson 1974), for multipliers that owe nothing to the solver.
+"""Non-negative least squares (Lawson and Hanson 1974), and the least curvature over the cone that multipliers leave.
 
-The columns in use are held as Q and R⁻¹ of their QR factors, by Gram and Schmidt's method, each column twice [Daniel,
-Gragg, Kaufman and Stewart, Math. Comp. 30 (1976), 772-795]: one more costs two products with Q, not a factorization.
+Multipliers owe nothing to the solver. The columns in use are held as Q and R⁻¹ of their QR factors, by Gram and
+Schmidt's method, each column twice [Daniel, Gragg, Kaufman and Stewart, Math. Comp. 30 (1976), 772-795]: one more costs
+two products with Q, not a factorization.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
-from loomopt.cycle import Floats
-from loomopt.tolerances import NNLS_EXCHANGES, NNLS_GONE, NNLS_PULL, NNLS_RANK
+CONE_STEPS = 30
+"""Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A
+heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
+missed; with one step some are (tests/solving/test_cone.py)."""
+
+
+CONE_OPEN, CONE_TIP = 1e-9, 1e-9
+"""Slope up to which a unit direction does not leave a limit, and length below which a projection is the cone's tip:
+what non-negative least squares leaves of ROUNDING times the condition of a few dozen slopes."""
+
+
+NNLS_PULL, NNLS_GONE, NNLS_RANK, NNLS_EXCHANGES = 1e-13, 1e-15, 1e-14, 10
+"""Non-negative least squares: pull of a column that enters, size of one that leaves, singular value that counts, each
+about a hundred roundings; exchanges allowed per column (Lawson and Hanson need about one)."""
+
+
+Floats = NDArray[np.float64]
 
 
 def nnls(matrix: Floats, target: Floats) -> Floats:
@@ -88,3 +105,39 @@ class _Used:
             found[self.columns] += inverse @ (self.left @ across)
             self.left = self.target - self.matrix @ found
         return found
+
+
+TINY = 1e-300
+"""Keeps the step of a matrix of zeros a number."""
+
+
+def least_on_cone(hessian: Floats, slopes: Floats) -> float:
+    """Return the least d'Hd over unit directions d with slopes d ≤ 0 that was found; infinite without any.
+
+    hessian: (n, n), symmetric; slopes: (m, n). Projected gradients from the eigenvectors: a heuristic, for the
+    problem is NP-hard [Murty and Kabadi, Mathematical Programming 39 (1987), 117-129]. What it returns is reached by
+    a direction of the cone; that there is nothing less is not proven.
+    """
+    values, vectors = np.linalg.eigh(hessian)
+    if not len(slopes):
+        return float(values[0])
+    seeds = [sign * vector for vector in vectors.T for sign in (1.0, -1.0)]
+    pace, least = 1.0 / max(float(np.abs(hessian).sum(axis=0).max()), TINY), np.inf
+    for seed in seeds:
+        direction = onto_cone(seed, slopes)
+        for _ in range(CONE_STEPS):
+            if direction is None:
+                break
+            bend = float(direction @ hessian @ direction)
+            least = min(least, bend)
+            direction = onto_cone(direction - pace * (hessian @ direction - bend * direction), slopes)
+    return float(least)
+
+
+def onto_cone(direction: Floats, slopes: Floats) -> Floats | None:
+    """Return the unit direction of the nearest point of the cone slopes d ≤ 0; None where that is its tip."""
+    kept = direction - slopes.T @ nnls(slopes.T, direction)
+    length = float(np.linalg.norm(kept))
+    if length <= CONE_TIP * max(1.0, float(np.linalg.norm(direction))) or np.any(slopes @ kept > CONE_OPEN * length):
+        return None
+    return np.asarray(kept / length)

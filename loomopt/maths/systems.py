@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from loomopt.tracing import Tape
+    pass
 
 Number = Any
 """A value of any number system: the one type formulas are written over."""
@@ -142,28 +142,10 @@ def numpy() -> Maths:
 @functools.cache
 def jets() -> Maths:
     """Forward derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
-    from loomopt import jets
+    from loomopt.maths import jets
 
     functions = jets.sin, jets.cos, jets.sqrt, jets.atan2
     return Maths("jets", *functions, math.pi, float, jets.chosen, jets.exp, jets.spread, jets.weighted)
-
-
-def recorded(tape: "Tape", system: int = 0) -> Maths:
-    """Numbers that record on a tape what is done with them; system: what they stand for, by its place in `Program`."""
-
-    def function(name: str) -> Callable[..., Number]:
-        return functools.partial(tape.call, system, name)
-
-    def spread(numbers: Sequence[Number], beside: Iterable[Number]) -> Number:
-        return tape.call(system, "spread", tape.listed(numbers), tape.listed(beside))
-
-    def weighted(weights: Sequence[Sequence[Number]], values: Number) -> list[Number]:
-        found = tape.call(system, "weighted", tape.listed([tape.listed(row) for row in weights]), values)
-        return [tape.record("{0}[{1}]", found, k) for k in range(len(weights))]
-
-    sin, cos, sqrt, atan2, number, exp = map(function, ("sin", "cos", "sqrt", "atan2", "number", "exp"))
-    pi, choose = tape.record(f"pi_{system}"), functools.partial(tape.choose, system)
-    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, choose, exp, spread, weighted)
 
 
 @functools.cache
@@ -254,20 +236,24 @@ def _unserved(*operands: Number) -> Number:
 @functools.cache
 def boxes() -> Maths:
     """Intervals rounded outward, and their slopes, over arrays of boxes: every result encloses the true one."""
-    from loomopt import boxes
+    from loomopt.maths import intervals
 
-    functions = boxes.sin, boxes.cos, boxes.sqrt, boxes.atan2
-    return Maths("boxes", *functions, boxes.PI, boxes.interval, boxes.chosen, _unserved, _unserved, _unserved)
+    functions = intervals.sin, intervals.cos, intervals.sqrt, intervals.atan2
+    return Maths(
+        "boxes", *functions, intervals.PI, intervals.interval, intervals.chosen, _unserved, _unserved, _unserved
+    )
 
 
 @functools.cache
 def box_series() -> Maths:
     """Truncated Taylor series along the cycle, over arrays of boxes: every result encloses the true one."""
-    from loomopt import box_series, boxes
+    from loomopt.maths import interval_series, intervals
 
-    own = box_series
+    own = interval_series
     functions = own.sin, own.cos, own.sqrt, own.atan2
-    return Maths("box series", *functions, boxes.PI, boxes.interval, own.chosen, _unserved, _unserved, _unserved)
+    return Maths(
+        "box series", *functions, intervals.PI, intervals.interval, own.chosen, _unserved, _unserved, _unserved
+    )
 
 
 @functools.cache

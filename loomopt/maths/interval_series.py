@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt import boxes
-from loomopt.boxes import Enclosure, Floats, Interval, interval
+from loomopt.maths import intervals
+from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 
-Number = boxes.Number
+Number = intervals.Number
 
 
 class Terms(NamedTuple):
@@ -97,7 +97,7 @@ def _whole(x: Number) -> Terms:
 def _waves(x: Series) -> tuple[Series, Series]:
     """Return sine and cosine."""
     angle, slope, bend = x.terms
-    sine, cosine, half = boxes.sin(angle), boxes.cos(angle), slope * slope / 2
+    sine, cosine, half = intervals.sin(angle), intervals.cos(angle), slope * slope / 2
     return (
         Series(Terms(sine, cosine * slope, cosine * bend - sine * half)),
         Series(Terms(cosine, -sine * slope, -sine * bend - cosine * half)),
@@ -106,19 +106,19 @@ def _waves(x: Series) -> tuple[Series, Series]:
 
 def sin(x: Number) -> Number:
     """Return the sine."""
-    return _waves(x)[0] if isinstance(x, Series) else boxes.sin(x)
+    return _waves(x)[0] if isinstance(x, Series) else intervals.sin(x)
 
 
 def cos(x: Number) -> Number:
     """Return the cosine."""
-    return _waves(x)[1] if isinstance(x, Series) else boxes.cos(x)
+    return _waves(x)[1] if isinstance(x, Series) else intervals.cos(x)
 
 
 def sqrt(x: Number) -> Number:
     """Return the square root."""
     if not isinstance(x, Series):
-        return boxes.sqrt(x)
-    root = boxes.sqrt(x.terms.value)
+        return intervals.sqrt(x)
+    root = intervals.sqrt(x.terms.value)
     slope = x.terms.slope / (root * 2)
     return Series(Terms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
 
@@ -126,20 +126,20 @@ def sqrt(x: Number) -> Number:
 def atan2(y: Number, x: Number) -> Number:
     """Return the angle of (x, y) in (−π, π]."""
     if not isinstance(y, Series) and not isinstance(x, Series):
-        return boxes.atan2(y, x)
+        return intervals.atan2(y, x)
     up, right = _whole(y), _whole(x)
     square = right.value * right.value + up.value * up.value
     slope = (right.value * up.slope - up.value * right.slope) / square
     swell = right.value * right.slope + up.value * up.slope
     bend = (right.value * up.bend - up.value * right.bend - slope * swell) / square
-    return Series(Terms(boxes.atan2(up.value, right.value), slope, bend))
+    return Series(Terms(intervals.atan2(up.value, right.value), slope, bend))
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Return the value at a place that is data: one for all, or one for each node and box."""
     if not any(isinstance(value, Series) for value in values):
-        return boxes.chosen(place, values)
-    return Series(Terms(*(boxes.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
+        return intervals.chosen(place, values)
+    return Series(Terms(*(intervals.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
 
 
 def along(low: Floats, high: Floats) -> Series:
