@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import loomopt as lo
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.studies import front, front_plan, front_read, front_trade, runs
 from loomopt.studies.front_solve import Asking
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
-from loomopt.tolerances import SAME_OBJECTIVE
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
 LARGEST_AREA, CORNER = 34.892414, (7.0, 97.0)

@@ -14,8 +14,8 @@ import numpy as np
 import plain_beatup as plain
 
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
-from loomopt.mechanisms.crank_rocker import Lengths, Pose
+from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose
 
 LENGTHS = (0.031, 0.065, 0.155, 0.167)
 CHUNK = 8192

@@ -17,10 +17,10 @@ from unittest import mock
 
 import harness
 
-from loomopt import tolerances
 from loomopt.jobs import registry
 from loomopt.nlp import exchange, options, transcribe
 from loomopt.nlp.point import Settings, sampler_at
+from loomopt.physics import tolerances
 from loomopt.program import reading
 from loomopt.program.program import Program
 

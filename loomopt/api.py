@@ -8,11 +8,11 @@ from loomopt import designs, results
 from loomopt.base.refusals import refusal
 from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
+from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.results import Answer, Evaluation
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
-from loomopt.tolerances import ACCURACY, SLACK
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -10,7 +10,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Quantity, described, quantity_of
 from loomopt.base.refusals import misread, refusal, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
-from loomopt.owned import label
+from loomopt.physics.effects.kinds import label
 from loomopt.scenes import Scene
 
 LARGEST_FILE = 1_000_000

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from loomopt import designs
 from loomopt.base import records
 from loomopt.base.records import lazy
+from loomopt.physics.tolerances import SLACK
 from loomopt.scenes import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import check_numbers, target_name
-from loomopt.tolerances import SLACK
 
 if TYPE_CHECKING:
     import pandas as pd

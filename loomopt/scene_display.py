@@ -7,11 +7,11 @@ from typing import Any
 from loomopt.base.quantities import misfit, quantity_of, unit_of
 from loomopt.base.refusals import misread, refusal, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
-from loomopt.effects.kinds import Effect
+from loomopt.physics.effects.kinds import Effect
+from loomopt.physics.schema import Table
 from loomopt.scene_document import looked_up
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit, table
-from loomopt.schema import Table
 
 KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
 """Key of [display] → kind of quantity."""

@@ -7,9 +7,9 @@ from typing import Any
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Quantity, quantity_of
 from loomopt.base.refusals import refusal, unknown
-from loomopt.owned import label
+from loomopt.physics.effects.kinds import label
+from loomopt.physics.schema import Table
 from loomopt.scenes import Scene
-from loomopt.schema import Table
 
 WITHOUT_FILES = ("problem", "display")
 """Tables whose texts are never names of files."""

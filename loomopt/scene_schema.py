@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
 from loomopt.base.units import Shown
-from loomopt.effects.kinds import Effect
-from loomopt.schema import Axis, Conflict, Figure, Sense, Table, Target
+from loomopt.physics.effects.kinds import Effect
+from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
 
 if TYPE_CHECKING:
     from loomopt.scenes import Scene

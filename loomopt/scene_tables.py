@@ -9,10 +9,9 @@ from pydantic import ValidationError
 from loomopt.base.quantities import Quantity, quantity_of, unit_of
 from loomopt.base.refusals import invalid, misread, missing, refusal, shown, unknown
 from loomopt.base.units import QuantityError
-from loomopt.effects.kinds import Check, Effect, Event, Load, Speed, instance
-from loomopt.owned import label
+from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label
+from loomopt.physics.schema import Figure, Table
 from loomopt.scene_schema import SceneSchema
-from loomopt.schema import Figure, Table
 
 if TYPE_CHECKING:
     from loomopt.scenes import Jobs
@@ -144,7 +143,7 @@ def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Eff
 
 def _combined(active: Mapping[Effect, Table], origin: str) -> None:
     """Raise BadInput where effects cannot be on together."""
-    from loomopt.effects.combining import faults
+    from loomopt.physics.effects.declared import faults
 
     for fault in faults(active):
         remedy = f"Add [effects.{fault.other}], or take {fault.effect.name} off"

@@ -10,13 +10,12 @@ from loomopt.base.errors import clean
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.refusals import refusal, shown, unknown
 from loomopt.base.units import show
-from loomopt.effects.kinds import Effect
-from loomopt.owned import label, owned
+from loomopt.physics.effects.kinds import Effect, label, owned
+from loomopt.physics.schema import Table
 from loomopt.scene_document import copied, looked_up, removed, replaced
 from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema
 from loomopt.scene_tables import Bound, Limit
-from loomopt.schema import Table
 
 _Own = TypeVar("_Own", bound=Table)
 

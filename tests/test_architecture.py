@@ -9,8 +9,8 @@ import pytest
 
 import loomopt
 from loomopt.base.units import SI_UNIT
-from loomopt.effects import found
 from loomopt.jobs import registry
+from loomopt.physics.effects import declared
 
 PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
@@ -184,7 +184,9 @@ def test_a_job_is_named_in_its_own_files_only(job):
 
 @pytest.mark.parametrize("job", JOBS)
 def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job):
-    for name in set(found.of(f"loomopt.effects.{job}")) - set(SI_UNIT):  # "inertia" is a kind of quantity too
+    for name in set(declared.of(f"loomopt.physics.effects.{job}")) - set(
+        SI_UNIT
+    ):  # "inertia" is a kind of quantity too
         word = re.compile(rf"[\"']{name}[\"']")
         strangers = [n for n, path in modules().items() if word.search(path.read_text("utf-8"))]
         assert set(strangers) <= {*(n for n in modules() if room(n) == "effects"), *(f"jobs.{j}.scene" for j in JOBS)}
@@ -217,12 +219,12 @@ def test_only_maths_and_the_solver_rooms_use_casadi():
 
 def test_every_effect_is_in_a_file_of_its_name():
     files = {job: {p.stem for p in (PACKAGE / "effects" / job).glob("*.py")} - {"__init__"} for job in JOBS}
-    assert files == {job: set(found.of(f"loomopt.effects.{job}")) for job in JOBS}
+    assert files == {job: set(declared.of(f"loomopt.physics.effects.{job}")) for job in JOBS}
 
 
 def test_ranks_of_a_jobs_effects_differ():
     for job in JOBS:
-        ranks = [effect.rank for effect in found.of(f"loomopt.effects.{job}").values()]
+        ranks = [effect.rank for effect in declared.of(f"loomopt.physics.effects.{job}").values()]
         assert len(set(ranks)) == len(ranks), job
 
 

@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from loomopt import balance
-from loomopt.balance import Given, Pose
-from loomopt.effects.beatup.inertia import EFFECT as INERTIA
-from loomopt.effects.beatup.resistance import EFFECT as RESISTANCE
-from loomopt.effects.kinds import Load
 from loomopt.maths import systems
-from loomopt.schema import Table
+from loomopt.physics import balance
+from loomopt.physics.balance import Given, Pose
+from loomopt.physics.effects.beatup.inertia import EFFECT as INERTIA
+from loomopt.physics.effects.beatup.resistance import EFFECT as RESISTANCE
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.schema import Table
 
 POSE = Pose(phi=1.2, omega=60.0, q=-1.7, q1=0.25, q2=-0.3)
 NOTHING = Given({}, {})

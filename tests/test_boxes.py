@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.balance import Given
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import intervals, systems
 from loomopt.maths.intervals import PI, TRIG_ERROR, Enclosure, Interval, chosen, interval, variable
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
 
 M, MP = systems.boxes(), systems.mpmath()
 FORMULAS = {

@@ -15,10 +15,10 @@ import pytest
 from loomopt import api, shell
 from loomopt.base.quantities import read
 from loomopt.cli import run
-from loomopt.effects import found
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.packaged import problem_names
+from loomopt.physics.effects import declared
 from loomopt.solving import search
 from loomopt.solving.certificate import certify
 
@@ -58,7 +58,7 @@ def check_contract(data):
     """Check keys, types and units of an answer."""
     assert list(data)[: len(KEYS)] == KEYS
     assert all(isinstance(data[key], str) for key in KEYS[:5])
-    assert all(name in found.of("loomopt.effects.beatup") for name in data["effects"])
+    assert all(name in declared.of("loomopt.physics.effects.beatup") for name in data["effects"])
     assert list(data["design"]) == ["l1", "l2", "l3", "l4", "m4e", "r4e"]
     assert all(is_number(value) for value in data["design"].values())
     assert set(FIGURES) <= set(data["figures"])

@@ -10,9 +10,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt import cycle
-from loomopt.effects.beatup import resistance
 from loomopt.jobs import registry
+from loomopt.physics import cycle
+from loomopt.physics.effects.beatup import resistance
 
 TURN = 2 * math.pi
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)

@@ -10,7 +10,7 @@ import loomopt
 # What formulas are made of. An `if X is None` asks how the scene is built, not what a number is; everything else that
 # branches, compares, rounds or names a number system is out.
 
-PACKAGE = Path(loomopt.__file__).parent
+PACKAGE = Path(loomopt.__file__).parent / "physics"
 FORBIDDEN_NODES = (
     *(ast.If, ast.IfExp, ast.Compare, ast.BoolOp, ast.While, ast.Try, ast.Assert, ast.Match),
     *(ast.FloorDiv, ast.Mod, ast.Import, ast.ImportFrom),
@@ -20,7 +20,7 @@ FORBIDDEN_NAMES = {
     *("fabs", "copysign", "fmod", "floor", "ceil", "clip", "maximum", "minimum", "fmax", "fmin", "hypot", "norm_2"),
     *("acos", "asin", "arccos", "arcsin", "math", "np", "numpy", "ca", "casadi", "sp", "sympy", "mp", "mpmath"),
 }
-NOT_FORMULAS = {"crank_rocker.py": {"curves"}, "crank_rocker_synthesis.py": {"synthesise"}}
+NOT_FORMULAS = {"crank_rocker.py": {"curves", "fault", "_where_it_stops", "_angle_at"}}
 """Parts of the crank-rocker that talk to people or fill arrays: they run on plain floats only."""
 EFFECT_FILES = sorted(
     f"{path.parent.name}/{path.name}" for path in PACKAGE.glob("effects/*/*.py") if path.name != "__init__.py"

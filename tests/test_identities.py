@@ -14,16 +14,16 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import balance
-from loomopt.effects import found as declared
-from loomopt.effects.kinds import Load
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import ReedPose
 from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics import balance
+from loomopt.physics.effects import declared
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.mechanisms import crank_rocker
 
-BEATUP = declared.of("loomopt.effects.beatup")
+BEATUP = declared.of("loomopt.physics.effects.beatup")
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=30)
 MP = mpmath.MPContext()
 MP.dps = 60

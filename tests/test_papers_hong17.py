@@ -9,14 +9,15 @@ import dataclasses
 import math
 
 import pytest
+from reference import crank_rocker_synthesis
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry, sources
 from loomopt.jobs.rapier.model import HeadPose
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker_synthesis, rapier_drive
-from loomopt.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 
 ROWS = {row.key: row._asdict() for row in sources.read("rapier").figures}
 RAPIER = lo.load("rapier")

@@ -9,8 +9,8 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.effects.shedding import inertia, warp_tension, weight
 from loomopt.jobs import sources
+from loomopt.physics.effects.shedding import inertia, warp_tension, weight
 
 ROWS = {row.key: row._asdict() for row in sources.read("shedding").figures}
 STATIC, MOVING, SHORT = (lo.load(name) for name in ("shedding-static", "shedding", "shedding-printed-travel"))

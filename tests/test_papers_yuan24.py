@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.jobs import registry, sources
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker, crank_rocker_synthesis
+from loomopt.physics.mechanisms import crank_rocker
 
 ROWS = {row.key: row._asdict() for row in sources.read("beatup").figures}
 BEATUP = lo.load("beatup")

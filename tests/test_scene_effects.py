@@ -10,15 +10,14 @@ from together import combined
 from loomopt import scenes
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Length, PositiveMass
-from loomopt.effects.beatup import inertia, rocker_inertia
-from loomopt.effects.kinds import Clash, Load, ranked
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load
-from loomopt.owned import label, owned
+from loomopt.physics.effects.beatup import inertia, rocker_inertia
+from loomopt.physics.effects.kinds import Clash, Load, label, owned, ranked
+from loomopt.physics.schema import Figure, Table
 from loomopt.program import numbers
 from loomopt.scene_tables import Bound, Limit
-from loomopt.schema import Figure, Table
 
 BEATUP = load("beatup")
 

@@ -74,7 +74,7 @@ def test_the_list_reads_heads_of_scenes_and_computes_nothing():
     code, modules = imported("list")
     assert code == 0
     assert packages(modules) <= WORDS | HELPERS
-    assert not {name for name in modules if name.startswith(("loomopt.jobs", "loomopt.scenes", "loomopt.effects"))}
+    assert not {name for name in modules if name.startswith(("loomopt.jobs", "loomopt.scenes", "loomopt.physics"))}
 
 
 def test_only_commands_that_solve_import_casadi():
@@ -87,8 +87,8 @@ def test_motions_that_follow_from_forces_are_imported_by_scenes_that_have_them_o
     for command in (("evaluate", "beatup"), ("solve", "beatup", "--starts", "1"), ("show", "beatup", "--equations")):
         code, modules = imported(*command, *(("--with", "shaft_torsion") if with_it else ()))
         assert code == 0
-        motions = {module for module in modules if module.startswith("loomopt.motion")} | modules & STEADY
-        assert motions == ({"loomopt.motion", "loomopt.motion.harmonic"} | STEADY if with_it else set())
+        motions = {module for module in modules if module.startswith("loomopt.physics.motion")} | modules & STEADY
+        assert motions == ({"loomopt.physics.motion", "loomopt.physics.motion.harmonic"} | STEADY if with_it else set())
 
 
 @pytest.mark.parametrize("name", registry.own_names())
@@ -121,7 +121,7 @@ def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_oth
 
 
 def test_a_motion_of_its_own_is_imported_only_by_the_scenes_that_need_it():
-    own = {"loomopt.motion.turning", "loomopt.program.crank_motion"}
+    own = {"loomopt.physics.motion.turning", "loomopt.program.crank_motion"}
     for arguments, needed in (
         (("evaluate", "beatup"), set()),
         (("evaluate", "beatup", "--with", "speed_fluctuation"), own),
@@ -130,4 +130,4 @@ def test_a_motion_of_its_own_is_imported_only_by_the_scenes_that_need_it():
         assert code == 0
         assert own & modules == needed
     _, solving = imported("solve", "beatup")
-    assert not {name for name in solving if name.startswith("loomopt.motion")}
+    assert not {name for name in solving if name.startswith("loomopt.physics.motion")}

@@ -12,11 +12,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt.cycle import TURN, Node
-from loomopt.effects.combining import faults
-from loomopt.effects.kinds import Check, Event, Load, Speed, State
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.cycle import TURN, Node
+from loomopt.physics.effects.declared import faults
+from loomopt.physics.effects.kinds import Check, Event, Load, Speed, State
 from loomopt.program.crank_motion import PIECE
 from loomopt.program.reading import DATUM
 

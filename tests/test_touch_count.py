@@ -15,11 +15,11 @@ KEPT = ("loomopt", "problems", "results", "tests/data", "tests/conftest.py")
 REFERENCE = "tests/effects/test_effects_reference.py"
 EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
-from loomopt.effects.beatup import ReedPose
-from loomopt.effects.kinds import Load
+from loomopt.physics.effects.beatup import ReedPose
+from loomopt.physics.effects.kinds import Load
 from loomopt.maths.systems import Maths; from loomopt.maths.systems import Number
 from loomopt.base.quantities import Torque
-from loomopt.schema import Table; from loomopt.schema import Values
+from loomopt.physics.schema import Table; from loomopt.physics.schema import Values
 
 
 class Own(Table):
@@ -84,7 +84,7 @@ def copy(tmp_path):
 
 @pytest.mark.slow
 def test_a_new_effect_is_its_file_and_its_reference_rows(copy):
-    copy.write("loomopt/effects/beatup/clock_spring.py", EFFECT)
+    copy.write("loomopt/physics/effects/beatup/clock_spring.py", EFFECT)
     words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", REFERENCE, "-k", "clock_spring")
     missed = copy.python(*words)
     assert missed.returncode == 1
@@ -98,7 +98,7 @@ def test_a_new_effect_is_its_file_and_its_reference_rows(copy):
     assert "M_clock_spring = T" in copy.loomopt(
         "show", "beatup", "--set", "effects.clock_spring.T=3 N*m", "--equations"
     )
-    assert copy.touched() == ["loomopt/effects/beatup/clock_spring.py", "tests/data/effects.csv"]
+    assert copy.touched() == ["loomopt/physics/effects/beatup/clock_spring.py", "tests/data/effects.csv"]
 
 
 @pytest.mark.slow
@@ -107,8 +107,8 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
         place = path.relative_to(PRESS).as_posix()
         if path.suffix not in (".py", ".toml", ".csv") or place == "torsion_bar.py":
             continue
-        text = path.read_text(encoding="utf-8").replace("loomopt_press.effects", "loomopt.effects.press")
-        room = {"effects": "loomopt/effects/press", "problems": "problems", "results": "results"}
+        text = path.read_text(encoding="utf-8").replace("loomopt_press.effects", "loomopt.physics.effects.press")
+        room = {"effects": "loomopt/physics/effects/press", "problems": "problems", "results": "results"}
         folder, _, name = ("effects/slide.py" if place == "slide.py" else place).rpartition("/")
         copy.write(
             f"{room.get(folder, 'loomopt/jobs/press')}/{name}", text.replace("loomopt_press", "loomopt.jobs.press")
@@ -121,5 +121,5 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
     added = {name: name not in copy.before for name in copy.touched() if not name.startswith("mine.")}
     assert all(added.values())
     assert {name.rpartition("/")[0] for name in added} == {
-        *("loomopt/jobs/press", "loomopt/effects/press", "problems", "results")
+        *("loomopt/jobs/press", "loomopt/physics/effects/press", "problems", "results")
     }

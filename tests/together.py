@@ -1,7 +1,7 @@
 """Effects that go together: of two that clash, what changes the motion itself yields."""
 
-from loomopt.effects.combining import faults
-from loomopt.effects.kinds import Check, Load
+from loomopt.physics.effects.declared import faults
+from loomopt.physics.effects.kinds import Check, Load
 
 
 def combined(effects):

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.base.errors import BadInput
 from loomopt.base.units import SI_UNIT
-from loomopt.cycle import Floats
-from loomopt.effects.kinds import Event
+from loomopt.physics.cycle import Floats
+from loomopt.physics.effects.kinds import Event
 from loomopt.picture.job_views import JobViews
 from loomopt.program import drive, numbers
 from loomopt.program.curves import STEPS, Columns, curves, tops

@@ -16,8 +16,8 @@ from loomopt import entry_points, packaged
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
-from loomopt.effects.kinds import Effect, ranked
 from loomopt.jobs.base import Job
+from loomopt.physics.effects.kinds import Effect, ranked
 from loomopt.scene_document import read_document
 from loomopt.scene_paths import Paths
 from loomopt.scene_schema import SceneSchema

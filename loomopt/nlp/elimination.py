@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.nlp.expressions import Expressions
 from loomopt.nlp.lifted import Lifted
+from loomopt.physics.cycle import Floats
 
 
 class Entries:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import TURN, Cycle, Floats
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family
 from loomopt.nlp.follow import follow
@@ -19,9 +18,10 @@ from loomopt.nlp.ipopt import Answer, run
 from loomopt.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.nlp.polish import polish
 from loomopt.nlp.transcribe import Transcription
+from loomopt.physics.cycle import TURN, Cycle, Floats
+from loomopt.physics.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, NEEDED, STANDS
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, NEEDED, STANDS
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""

@@ -4,16 +4,16 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from loomopt.balance import total
 from loomopt.maths.systems import Number
 from loomopt.nlp.families import Family
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
 from loomopt.nlp.structure import NodeParameters, Structure
+from loomopt.physics.balance import total
+from loomopt.physics.schema import Values
 from loomopt.program.chains import followed
 from loomopt.program.model import Integral
 from loomopt.program.reading import Rows
-from loomopt.schema import Values
 
 
 class Expressions(NamedTuple):

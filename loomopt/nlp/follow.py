@@ -11,12 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.pivot import active_by, reach
 from loomopt.nlp.point import Point
-from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import (
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import (
     BINDING,
     FOLLOW_FARTHEST,
     FOLLOW_PATIENCE,
@@ -25,6 +24,7 @@ from loomopt.tolerances import (
     SAME_NODE,
     SETTLED,
 )
+from loomopt.program.sampling import Extreme, Sampler
 
 Nodes = Sequence[Sequence[Extreme]]
 """Nodes of each family."""

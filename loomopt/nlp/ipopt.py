@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.transcribe import Transcription
+from loomopt.physics.cycle import Floats
 from loomopt.program.sampling import Extreme, Sampler, Tally
 
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})

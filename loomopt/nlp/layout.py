@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.cycle import Floats
+from loomopt.physics.cycle import Floats
 
 
 class Layout:

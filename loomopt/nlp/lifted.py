@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.tolerances import FEW_CHOICES
+from loomopt.physics.tolerances import FEW_CHOICES
 
 
 class Lifted(NamedTuple):

@@ -3,7 +3,7 @@
 from typing import Any
 
 from loomopt.nlp.point import Settings
-from loomopt.tolerances import IPOPT_ITERATIONS, IPOPT_SLOPE, IPOPT_TOLERANCE, WARM_BARRIER, WARM_PUSH
+from loomopt.physics.tolerances import IPOPT_ITERATIONS, IPOPT_SLOPE, IPOPT_TOLERANCE, WARM_BARRIER, WARM_PUSH
 
 IPOPT = {
     "tol": IPOPT_TOLERANCE,

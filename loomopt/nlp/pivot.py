@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.cycle import Floats
-from loomopt.tolerances import (
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import (
     PIVOT_CURVED,
     PIVOT_DEPENDENT,
     PIVOT_MET,

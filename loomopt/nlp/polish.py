@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.cycle import Floats
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point
-from loomopt.program.sampling import Extreme, Sampler
-from loomopt.tolerances import (
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import (
     BINDING,
     POLISH_DONE,
     POLISH_FARTHEST,
@@ -24,6 +23,7 @@ from loomopt.tolerances import (
     SETTLED,
     TOUCHING,
 )
+from loomopt.program.sampling import Extreme, Sampler
 
 Nodes = Sequence[Sequence[Extreme]]
 Flags = NDArray[np.bool_]

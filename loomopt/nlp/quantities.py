@@ -4,14 +4,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from loomopt.balance import Given
-from loomopt.cycle import Node
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
 from loomopt.nlp.lifted import Lifts, Options, chosen, identity
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.program.model import JobModel
-from loomopt.schema import Values
-from loomopt.tolerances import FEW_CHOICES
 
 
 class _Choice(NamedTuple):

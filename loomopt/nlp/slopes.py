@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.cycle import Floats
 
 
 def second(

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import Cycle, Floats, Node, node_angle
 from loomopt.maths.systems import Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.layout import Layout
 from loomopt.nlp.stations import Stood, held
+from loomopt.physics.cycle import Cycle, Floats, Node, node_angle
 from loomopt.program.chains import Station, recurrent, stations
 from loomopt.program.model import Integral
 from loomopt.program.program import Program

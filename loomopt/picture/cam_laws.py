@@ -7,11 +7,11 @@ from fractions import Fraction
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
+from loomopt.physics.mechanisms import cam_spline
+from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
+from loomopt.physics.schema import Values
 from loomopt.picture.equations import Equation, Expression, cases, equation, symbol, sympy
-from loomopt.schema import Values
 
 PRIMES = ("s", "s'", "s''")
 

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from loomopt import balance
-from loomopt.balance import Acting, Given
-from loomopt.effects.kinds import Check, Event, Load, Motion, State, Terms
 from loomopt.maths import systems
+from loomopt.physics import balance
+from loomopt.physics.balance import Acting, Given
+from loomopt.physics.effects.kinds import Check, Event, Load, Motion, State, Terms
+from loomopt.physics.schema import Values
 from loomopt.picture.equations import (
     Case,
     Equation,
@@ -26,10 +27,9 @@ from loomopt.picture.equations import (
 )
 from loomopt.program.drive import motor
 from loomopt.program.model import JobModel
-from loomopt.schema import Values
 
 if TYPE_CHECKING:
-    from loomopt.effects.steady import Written
+    from loomopt.physics.effects.kinds import Written
 
 AnyMotion = TypeVar("AnyMotion", bound=Motion)
 SIGNS, ENDS = {-1: ">=", 0: "=", 1: "<="}, {-1: "min", 0: "given", 1: "max"}
@@ -98,7 +98,7 @@ def _written(model: JobModel, load: Acting, pose: Motion, known: Given, letter: 
 
 
 def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Written":
-    from loomopt.effects.steady import Written
+    from loomopt.physics.effects.kinds import Written
 
     return Written((symbol("z"), symbol("z'"), symbol("z''")), pose.omega, inertia, carried)
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt import balance
-from loomopt.balance import Acting
-from loomopt.effects.kinds import Effect, Load, Motion
 from loomopt.maths import systems
-from loomopt.schema import Values
+from loomopt.physics import balance
+from loomopt.physics.balance import Acting
+from loomopt.physics.effects.kinds import Effect, Load, Motion
+from loomopt.physics.schema import Values
 
 Expression = Any
 """A SymPy expression."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from loomopt.cycle import TURN
-from loomopt.motion.flight import Landing
+from loomopt.physics.cycle import TURN
+from loomopt.physics.motion.flight import Landing
 from loomopt.picture.panels import Panel
 from loomopt.program.parting import Parted
 from loomopt.scenes import Scene

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from loomopt.effects.kinds import Load
 from loomopt.maths import systems
+from loomopt.physics.effects.kinds import Load
 from loomopt.program import states
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene

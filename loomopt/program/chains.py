@@ -3,12 +3,12 @@
 from collections.abc import Collection
 from typing import NamedTuple
 
-from loomopt.balance import Given
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.schema import Values
 from loomopt.program.kinematics import Chain
 from loomopt.program.model import JobModel
-from loomopt.schema import Values
 
 
 class Station(NamedTuple):

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.balance import Given
-from loomopt.effects.kinds import Load
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.effects.kinds import Load
 
 if TYPE_CHECKING:
     from loomopt.program.model import JobModel

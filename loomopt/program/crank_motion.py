@@ -6,20 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from loomopt import balance
-from loomopt.balance import Given
 from loomopt.base.refusals import refusal
-from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces
-from loomopt.effects.kinds import Motion, Speed
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.motion.turning import NoTurn, Turning, solved
+from loomopt.physics import balance
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces
+from loomopt.physics.effects.kinds import Motion, Speed
+from loomopt.physics.motion.turning import NoTurn, Turning, solved
+from loomopt.physics.schema import Values
 from loomopt.program import drive
 from loomopt.program.instant import Instant, Row
 from loomopt.program.kinematics import Arcs, Group, Kinematics
 from loomopt.program.sampling import KEPT, Sampler
 from loomopt.scenes import Scene
-from loomopt.schema import Values
 
 FLOATS = ("float", "numpy")
 """Number systems of float64."""

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.balance import Acting
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
-from loomopt.cycle import TURN, Floats, Pieces
 from loomopt.maths import systems
+from loomopt.physics.balance import Acting
+from loomopt.physics.cycle import TURN, Floats, Pieces
+from loomopt.physics.tolerances import SAME_ANGLE, SAME_ROW
 from loomopt.program.drive import motor_power
 from loomopt.program.instant import Formula, Instant
 from loomopt.program.sampling import Sampler
-from loomopt.tolerances import SAME_ANGLE, SAME_ROW
 
 STEPS = 720
 ANGLE = "phi [rad]"

@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Iterable
 
-from loomopt.effects.kinds import Effect, Load, Speed, State
 from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Effect, Load, Speed, State
+from loomopt.physics.schema import Figure
 from loomopt.program.instant import Instant, Quantity
-from loomopt.schema import Figure
 
 TORQUE, POWER = "peak_torque", "peak_power"
 FIGURES = (

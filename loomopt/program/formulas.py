@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-from loomopt.effects.kinds import Check
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Check
+from loomopt.physics.schema import Values
 from loomopt.program.instant import Instant
-from loomopt.schema import Values
 
 
 def of_group(formula: Callable[..., Number], at: Instant) -> Number:

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from loomopt.balance import Acting
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Event, Load, State
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number
-from loomopt.motion.free import Body, Zone
+from loomopt.physics.balance import Acting
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Event, Load, State
+from loomopt.physics.motion.free import Body, Zone
 from loomopt.program.sampling import Sampler
 
 LINEAR = 1e-12

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt import balance
-from loomopt.balance import Given
-from loomopt.cycle import Node, Where
 from loomopt.maths.systems import Maths, Number
-from loomopt.schema import Values
+from loomopt.physics import balance
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node, Where
+from loomopt.physics.schema import Values
 
 if TYPE_CHECKING:
     from loomopt.program.model import JobModel

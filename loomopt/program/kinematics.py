@@ -7,15 +7,15 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from loomopt.balance import Given
 from loomopt.base.records import Frozen
-from loomopt.cycle import Floats, Node
-from loomopt.effects.kinds import Motion
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Floats, Node
+from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR, SINGULAR_SAMPLES, WORTH_A_LOOK
 from loomopt.program import spikes
-from loomopt.schema import Values
-from loomopt.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR, SINGULAR_SAMPLES, WORTH_A_LOOK
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""

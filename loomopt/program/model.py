@@ -10,18 +10,17 @@ from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from loomopt import cycle
-from loomopt.balance import Acting, Given
 from loomopt.base.records import lazy
-from loomopt.cycle import Cycle, Node, Where
-from loomopt.effects.kinds import Check, Demand, Effect, Load, Speed, State
 from loomopt.maths.systems import Maths, Number
-from loomopt.owned import label, owned
+from loomopt.physics import cycle
+from loomopt.physics.balance import Acting, Given
+from loomopt.physics.cycle import Cycle, Node, Where
+from loomopt.physics.effects.kinds import Check, Demand, Effect, Load, Speed, State, label, owned
+from loomopt.physics.schema import Values
 from loomopt.program import formulas
 from loomopt.program.corners import cornered
 from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
 from loomopt.program.kinematics import Arcs, Kinematics, Squares
-from loomopt.schema import Values
 
 __all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
 

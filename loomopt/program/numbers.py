@@ -6,15 +6,14 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from loomopt.base.errors import BadInput
-from loomopt.cycle import Where
-from loomopt.effects.kinds import Check, Load
-from loomopt.owned import label, owned
+from loomopt.physics.cycle import Where
+from loomopt.physics.effects.kinds import Check, Load, label, owned
+from loomopt.physics.tolerances import START_ROOM
 from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.tolerances import START_ROOM
 
 Bounds = Mapping[str, tuple[float, float]]
 """Lower and upper bound of numbers by full name, SI."""
@@ -135,7 +134,7 @@ def settled(scene: Scene, model: JobModel, known: Mapping[str, float], design: M
     """Return the model as its states need it; known: the scene's numbers, design: what differs, SI. Raises BadInput."""
     if not model.states:
         return model
-    from loomopt.effects.steady import UnsteadyError
+    from loomopt.physics.effects.kinds import UnsteadyError
     from loomopt.program import settled
 
     try:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from loomopt.cycle import Floats
+from loomopt.physics.cycle import Floats
 
 
 def inside(values: Floats, margin: Floats) -> Floats:

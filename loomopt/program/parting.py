@@ -9,17 +9,17 @@ import numpy as np
 
 from loomopt.base.refusals import refusal
 from loomopt.base.units import SI_UNIT
-from loomopt.cycle import TURN, Floats, Node
-from loomopt.effects.kinds import Event
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms.turning_points import crossing
-from loomopt.motion.flight import Cam, Course, Stretch
-from loomopt.motion.free import Moving
+from loomopt.maths.turning_points import crossing
+from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.effects.kinds import Event
+from loomopt.physics.motion.flight import Cam, Course, Stretch
+from loomopt.physics.motion.free import Moving
+from loomopt.physics.tolerances import ACCURACY, SAME_ANGLE
 from loomopt.program.curves import ANGLE, POWER, Columns, Rows, columns_at, load_name, rows, split
 from loomopt.program.free_loads import SAMPLES, Forms, UnfollowedError, body, forms, sizes
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.tolerances import ACCURACY, SAME_ANGLE
 
 BEYOND = 1.01
 """Share of the largest sampled acceleration that no acceleration exceeds."""

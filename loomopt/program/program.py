@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from loomopt.base.records import lazy
-from loomopt.cycle import Where
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.cycle import Where
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import FEASIBLE
 from loomopt.program.model import JobModel
-from loomopt.schema import Values
-from loomopt.tolerances import FEASIBLE
 
 
 @dataclass(frozen=True)

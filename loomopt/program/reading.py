@@ -5,15 +5,15 @@ import functools
 
 import numpy as np
 
-from loomopt.balance import Given, total
 from loomopt.base.records import lazy
-from loomopt.cycle import Cycle, Floats, Node, Pieces
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given, total
+from loomopt.physics.cycle import Cycle, Floats, Node, Pieces
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import GAUSS_NODES
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.program import Limit
 from loomopt.program.traced import Quantities
-from loomopt.schema import Values
-from loomopt.tolerances import GAUSS_NODES
 
 DATUM = "datum"
 """The switch that hands a quantity the number that an integral has at each of its own angles."""

@@ -8,18 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.balance import Given
 from loomopt.base.records import lazy
-from loomopt.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
+from loomopt.physics.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
 from loomopt.program import spikes
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.parabolas import inside, vertex
 from loomopt.program.program import Limit, Objective
 from loomopt.program.reading import DATUM, Reading, Rows, quadrature
 from loomopt.program.traced import Quantities
-from loomopt.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""

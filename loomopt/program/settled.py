@@ -5,9 +5,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from loomopt.cycle import TURN
-from loomopt.effects.steady import UnsteadyError
 from loomopt.maths.systems import FLOAT
+from loomopt.physics.cycle import TURN
+from loomopt.physics.effects.kinds import UnsteadyError
 from loomopt.program import states
 from loomopt.program.instant import Integral
 from loomopt.program.model import JobModel

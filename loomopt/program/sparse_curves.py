@@ -5,11 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.cycle import TURN, Floats, Pieces
-from loomopt.program import spikes
-from loomopt.program.curves import ANGLE
-from loomopt.program.sampling import Sampler
-from loomopt.tolerances import (
+from loomopt.physics.cycle import TURN, Floats, Pieces
+from loomopt.physics.tolerances import (
     ROUNDED,
     SAME_ANGLE,
     SPARSE_LEVEL,
@@ -18,6 +15,9 @@ from loomopt.tolerances import (
     SPARSE_ROUNDS,
     SPARSE_STEPS,
 )
+from loomopt.program import spikes
+from loomopt.program.curves import ANGLE
+from loomopt.program.sampling import Sampler
 
 Rows = Callable[[int, Sequence[float]], dict[str, Floats]]
 """rows(steps, also): the curves at equal steps of one turn and at other crank angles, rad."""

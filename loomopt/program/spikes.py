@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from loomopt.cycle import Floats
-from loomopt.tolerances import SPIKE_HALVINGS, SPIKE_SECTIONS, SPIKE_WIDEST
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import SPIKE_HALVINGS, SPIKE_SECTIONS, SPIKE_WIDEST
 
 GOLDEN = (5**0.5 - 1) / 2
 

@@ -3,15 +3,14 @@
 import functools
 from collections.abc import Callable, Mapping, Sequence
 
-from loomopt import balance
-from loomopt.balance import Acting, Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Effect, Event, Load, State
-from loomopt.effects.steady import Carried, Moved
 from loomopt.maths.systems import Maths, Number, arrays
+from loomopt.physics import balance
+from loomopt.physics.balance import Acting, Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Carried, Effect, Event, Load, Moved, State
+from loomopt.physics.schema import Values
 from loomopt.program.instant import Instant, Quantity
 from loomopt.program.kinematics import Kinematics
-from loomopt.schema import Values
 
 
 def eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], found: Given) -> Given:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from loomopt.cycle import TURN
+from loomopt.physics.cycle import TURN
 from loomopt.program.sampling import Sampler
 
 SAMPLES = 3600

@@ -15,11 +15,11 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from loomopt.balance import Given
-from loomopt.cycle import Node
 from loomopt.maths import recording
 from loomopt.maths.recording import Bind, Program, Recorded, Tape
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
 from loomopt.program.model import JobModel
 
 WORTH_IT = 64

@@ -7,9 +7,9 @@ from typing import NamedTuple
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
-from loomopt.effects.kinds import EVALUATED
+from loomopt.physics.effects.kinds import EVALUATED
+from loomopt.physics.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 from loomopt.scenes import Scene
-from loomopt.tolerances import COARSEST, MOST_STARTS, TIGHTEST
 
 GAP, SECONDS = 1e-3, 60.0
 """What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""

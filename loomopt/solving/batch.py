@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from loomopt.cycle import Floats, Node, Pieces
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.program.model import Integral
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.reading import DATUM, Reading, quadrature

@@ -14,14 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.base.records import lazy
-from loomopt.cycle import Where
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.physics.cycle import Where
+from loomopt.physics.tolerances import MEAN_BOXES, MOST_BOXES, NEAR_TOP
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler, Tally
-from loomopt.tolerances import MEAN_BOXES, MOST_BOXES, NEAR_TOP
 
 CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
+from loomopt.physics.tolerances import FARTHEST_SIZE, SAME_SIZE
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
-from loomopt.tolerances import FARTHEST_SIZE, SAME_SIZE
 
 Solve = Callable[[Scene], Solution]
 Tried = tuple[float, Solution]

@@ -12,6 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from loomopt.nlp.point import Settings
+from loomopt.physics.tolerances import (
+    COMPLEMENTARY,
+    DOUBT,
+    FEASIBLE,
+    FLAT,
+    JET_ERROR,
+    LARGEST_PRICE,
+    LARGEST_VARIABLE,
+    POSITIVE,
+    STATIONARY,
+)
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.solving import kkt, second_order
@@ -24,17 +35,6 @@ from loomopt.solving.prices import priced
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Curvature, Local
 from loomopt.solving.verdict import Binding, Certificate, Level
-from loomopt.tolerances import (
-    COMPLEMENTARY,
-    DOUBT,
-    FEASIBLE,
-    FLAT,
-    JET_ERROR,
-    LARGEST_PRICE,
-    LARGEST_VARIABLE,
-    POSITIVE,
-    STATIONARY,
-)
 
 SECOND_ORDER_OPEN = "second order open"
 """The reason of a certificate that neither curvature nor higher orders decide."""

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths.systems import Number
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.program.instant import Instant, Row
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import LEAST_CHANGE
@@ -23,7 +24,6 @@ from loomopt.solving.search import Candidate, Judged, Search, corrected, exact, 
 from loomopt.solving.settle import unchanging, wished
 from loomopt.solving.sizes import CHANGE_WEIGHTS
 from loomopt.solving.verdict import Certificate
-from loomopt.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""

@@ -4,7 +4,7 @@ import abc
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from loomopt.cycle import Floats
+from loomopt.physics.cycle import Floats
 from loomopt.program.program import Program
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.rows import Row

@@ -14,10 +14,10 @@ from loomopt.nlp import exchange
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Elastic, Known, Point, Settings
 from loomopt.nlp.stations import owners
+from loomopt.physics.tolerances import CHEAP, NEEDED, PRICED, SCREENED
 from loomopt.program.program import Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
-from loomopt.tolerances import CHEAP, NEEDED, PRICED, SCREENED
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:

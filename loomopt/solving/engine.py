@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.nlp.point import Point, Settings
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
 from loomopt.scenes import Scene
@@ -17,7 +18,6 @@ from loomopt.solving.asked import Everywhere, check_everywhere, check_numbers, c
 from loomopt.solving.solution import Clash, Evaluation, Solution
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
-from loomopt.tolerances import ACCURACY
 
 if TYPE_CHECKING:
     from loomopt.solving.search import Judged, Search

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import DIGITS, FIRST_STEP, NEWTON_SHIFT, ROUNDED, SECOND_STEP, THIRD_STEP
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
-from loomopt.tolerances import DIGITS, FIRST_STEP, NEWTON_SHIFT, ROUNDED, SECOND_STEP, THIRD_STEP
 
 Vector = Sequence[Number] | Floats
 

@@ -9,17 +9,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from loomopt.base.records import lazy
-from loomopt.cycle import Floats, Pieces
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, stacked, variables
 from loomopt.maths.systems import Number
+from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
 from loomopt.program.model import Integral
 from loomopt.program.program import Program
 from loomopt.program.reading import DATUM, Reading, quadrature
 from loomopt.program.sampling import Sampler
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
-from loomopt.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
 
 
 class JetReading(Reading):

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths.nnls import nnls
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import POSITIVE
 from loomopt.solving.rows import ActiveSet, Groups
-from loomopt.tolerances import POSITIVE
 
 
 @dataclass(frozen=True)

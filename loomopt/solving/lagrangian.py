@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from loomopt.nlp.point import sampler_at
+from loomopt.physics.tolerances import FALL_MARGIN, FALLEN, PROBES
 from loomopt.program.program import Program
-from loomopt.tolerances import FALL_MARGIN, FALLEN, PROBES
 
 
 @dataclass(frozen=True)

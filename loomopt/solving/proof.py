@@ -15,9 +15,10 @@ from loomopt import designs
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Shown
-from loomopt.cycle import Where
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.physics.cycle import Where
+from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.program import states
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
@@ -26,7 +27,6 @@ from loomopt.solving.asked import check_sought, target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
-from loomopt.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 
 RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""

@@ -5,6 +5,7 @@ from typing import Any
 
 from loomopt import designs
 from loomopt.jobs.base import Job
+from loomopt.physics.tolerances import FEASIBLE
 from loomopt.program import numbers
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
@@ -12,7 +13,6 @@ from loomopt.scenes import Scene
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words
-from loomopt.tolerances import FEASIBLE
 
 Today = Callable[[], Evaluation]
 """Evaluates today's machine."""

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths.jets import Jet
 from loomopt.maths.sobol import points
+from loomopt.physics.cycle import Floats
 from loomopt.program.chains import roots
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler

@@ -9,11 +9,7 @@ from dataclasses import dataclass, field, replace
 from loomopt.jobs.base import Job
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, Settings, sampler_at
-from loomopt.program.program import Program
-from loomopt.solving.certificate import certify
-from loomopt.solving.settle import settle
-from loomopt.solving.verdict import Certificate
-from loomopt.tolerances import (
+from loomopt.physics.tolerances import (
     CORRECTIONS,
     FEASIBLE,
     HELD_MARGIN,
@@ -26,6 +22,10 @@ from loomopt.tolerances import (
     STRONGER,
     STRONGEST_PENALTY,
 )
+from loomopt.program.program import Program
+from loomopt.solving.certificate import certify
+from loomopt.solving.settle import settle
+from loomopt.solving.verdict import Certificate
 
 OnStart = Callable[[int, int], None]
 

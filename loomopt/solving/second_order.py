@@ -20,8 +20,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from loomopt.cycle import Floats
 from loomopt.maths.nnls import least_on_cone
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
@@ -31,7 +32,6 @@ from loomopt.solving.kkt import Multipliers, System
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import ActiveSet
 from loomopt.solving.valley import Closed
-from loomopt.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 
 FOLLOWED = 3
 """Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall

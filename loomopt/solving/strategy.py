@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, sampler_at
+from loomopt.physics.tolerances import MORE_STARTS, SAME_OBJECTIVE
 from loomopt.solving.elastic import least
 from loomopt.solving.search import Candidate, OnStart, Search, at, judged, tried
 from loomopt.solving.sizes import BETTER, FLIPS, SCREENED_STARTS
-from loomopt.tolerances import MORE_STARTS, SAME_OBJECTIVE
 
 if TYPE_CHECKING:
     from loomopt.solving.screening import Screening

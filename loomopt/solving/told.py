@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from loomopt.nlp.point import sampler_at
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.prices import figure_of
 from loomopt.solving.search import Candidate, Search, compared
-from loomopt.tolerances import SAME_OBJECTIVE
 
 
 def counts(search: Search) -> dict[str, Any]:

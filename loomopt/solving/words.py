@@ -4,12 +4,12 @@ import math
 
 from loomopt.base.quantities import quantity_of
 from loomopt.base.units import SI_UNIT, factor, show
-from loomopt.owned import label
+from loomopt.physics.effects.kinds import label
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.program.program import Limit
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding
-from loomopt.tolerances import SHOWN_AS_ZERO
 
 SIGNS = {-1: ">=", 0: "=", 1: "<="}
 SIDES = {-1: "min", 1: "max"}

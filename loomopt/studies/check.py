@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from loomopt import packaged, provenance
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import references
-from loomopt.tolerances import ACCURACY
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt.balance import total
-from loomopt.cycle import Floats
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.point import Point
 from loomopt.nlp.stations import Stood, held
+from loomopt.physics.balance import total
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import BINDING
 from loomopt.program.chains import stations
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
@@ -32,7 +33,6 @@ from loomopt.studies.tolerances import (
     REFERENCE_SLOPE,
     REFERENCE_STEP,
 )
-from loomopt.tolerances import BINDING
 
 
 def tiny(system: Maths, decimals: int) -> Number:

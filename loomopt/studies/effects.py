@@ -15,6 +15,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.jobs import registry
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.provenance import versions
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene
@@ -25,7 +26,6 @@ from loomopt.studies.effects_worth import Judge, Worth
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
 from loomopt.studies.sweep import reason
-from loomopt.tolerances import ACCURACY
 
 REFUSED = "refused"
 """The status of what solve does not take."""

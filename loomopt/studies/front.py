@@ -12,13 +12,13 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import read as read_quantity
 from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import SI_UNIT, QuantityError
+from loomopt.physics.schema import Sense
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import Scene
-from loomopt.schema import Sense
 from loomopt.solving.asked import check_numbers, check_sought, target_name
 from loomopt.solving.words import Words
 from loomopt.studies import ranges as texts
 from loomopt.studies.front_trade import POINTS, Trade
-from loomopt.tolerances import ACCURACY
 
 FEWEST = 3
 """Points of a front."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.nlp.point import Settings
+from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.program.axes import Traded
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import sampled
@@ -20,7 +21,6 @@ from loomopt.solving.verdict import Binding, Certificate
 from loomopt.solving.words import Words
 from loomopt.studies import warm
 from loomopt.studies.front_solve import CAPPED, Asking, Reached, Solver
-from loomopt.tolerances import FEASIBLE, SHOWN_AS_ZERO
 
 if TYPE_CHECKING:
     from loomopt.solving.proof import Proofs

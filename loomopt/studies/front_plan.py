@@ -9,8 +9,8 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.studies.rows import Row
-from loomopt.tolerances import ACCURACY
 
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.studies import front_plan
 from loomopt.studies.front_plan import ENDS
 from loomopt.studies.rows import Row
-from loomopt.tolerances import SAME_OBJECTIVE
 
 if TYPE_CHECKING:
     from loomopt.studies.front_trade import Trade

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
+from loomopt.physics.tolerances import FEASIBLE
 from loomopt.program.axes import Asked, Traded, opposite
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
@@ -19,7 +20,6 @@ from loomopt.solving.rows import active_set
 from loomopt.solving.search import Judged, Search, judged, objectives, tried
 from loomopt.solving.strategy import searched, spread, tied
 from loomopt.studies import warm
-from loomopt.tolerances import FEASIBLE
 
 CAPPED = " at most as asked"
 """What the limit on an axis is called, after the axis."""

@@ -14,10 +14,11 @@ from loomopt import designs
 from loomopt.base.errors import BadInput
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
+from loomopt.physics.schema import Sense
+from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
 from loomopt.provenance import versions
 from loomopt.scene_numbers import files
 from loomopt.scenes import Scene
-from loomopt.schema import Sense
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
 from loomopt.studies import front_answer, front_plan, front_read
@@ -26,7 +27,6 @@ from loomopt.studies.front_plan import ENDS, Next, Scale
 from loomopt.studies.front_solve import Asking, Reached, Solver
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row
-from loomopt.tolerances import ACCURACY, SAME_OBJECTIVE
 
 PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""

@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from loomopt.cycle import TURN, Floats, Node
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.nlp import slopes
+from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.program.sampling import Sampler, Tally
 from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
 from loomopt.studies.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
-from loomopt.tolerances import SAME_ANGLE
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.units import SI_UNIT, factor
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.provenance import provenance
 from loomopt.solving.words import Words, grouped
 from loomopt.studies.findings import SceneStudy
 from loomopt.studies.rows import Row, parts
-from loomopt.tolerances import SHOWN_AS_ZERO
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt import designs
-from loomopt.balance import Given
-from loomopt.cycle import TURN, Floats, Node, Pieces
-from loomopt.effects.kinds import Motion
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import TURN, Floats, Node, Pieces
+from loomopt.physics.effects.kinds import Motion
 from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler

@@ -14,6 +14,7 @@ from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
 from loomopt.nlp.point import Point
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.provenance import versions
 from loomopt.scene_numbers import files, quantity
 from loomopt.scenes import Scene
@@ -25,7 +26,6 @@ from loomopt.studies.findings import Change, Findings
 from loomopt.studies.lattice import Lattice
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row, parts, priced
-from loomopt.tolerances import ACCURACY
 
 PLAN = 2
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from loomopt.base import files
 from loomopt.base.units import factor, show
-from loomopt.cycle import Floats
+from loomopt.physics.cycle import Floats
 from loomopt.picture.panels import Panel, each
 from loomopt.picture.shapes import plain
 from loomopt.program.curves import ANGLE

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.provenance import provenance
 from loomopt.solving.words import Words
 from loomopt.studies.effects_found import Found
 from loomopt.studies.effects_worth import LIMITS, Worth
-from loomopt.tolerances import SHOWN_AS_ZERO
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:

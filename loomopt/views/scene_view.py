@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from loomopt.base.units import factor
-from loomopt.cycle import Floats
 from loomopt.designs import Design, flat
 from loomopt.jobs import registry
-from loomopt.owned import label, owned
+from loomopt.physics.cycle import Floats
+from loomopt.physics.effects.kinds import label, owned
 from loomopt.scene_display import KINDS
 from loomopt.scenes import Scene, given
 from loomopt.solving.words import Words

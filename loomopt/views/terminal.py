@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 from loomopt.base.quantities import exact
 from loomopt.base.units import factor
 from loomopt.jobs import registry
+from loomopt.physics.tolerances import SLACK
 from loomopt.scenes import Scene
 from loomopt.solving.solution import Evaluation, Solution, remedies
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words
 from loomopt.tables import rows
-from loomopt.tolerances import SLACK
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import pytest
 from plain_flight import Frame
 
 import loomopt as lo
-from loomopt.effects.shedding import separation
 from loomopt.jobs import registry
+from loomopt.physics.effects.shedding import separation
 
 RPM = math.pi / 30
 ON = lo.load("shedding").with_effect("separation")

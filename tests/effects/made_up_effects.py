@@ -4,8 +4,8 @@ import math
 from importlib.metadata import EntryPoint
 
 from loomopt.base.quantities import Coordinate, PositiveLength, PureNumber
-from loomopt.effects.kinds import Axis, Check, Demand, Load, Speed
-from loomopt.schema import Figure, Table
+from loomopt.physics.effects.kinds import Axis, Check, Demand, Load, Speed
+from loomopt.physics.schema import Figure, Table
 
 BEGINS, ENDS = 1.1, 2.6
 """Corners of the made-up loads, rad, which are no job's own."""

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from loomopt.effects.kinds import Check
-from loomopt.effects.shedding import coil
 from loomopt.jobs import registry
 from loomopt.maths import systems
-from loomopt.mechanisms.tension_spring import WIRES
+from loomopt.physics.effects.kinds import Check
+from loomopt.physics.effects.shedding import coil
+from loomopt.physics.mechanisms.tension_spring import WIRES
 from loomopt.program import numbers
 
 SCENE = registry.load("shedding").set("effects.coil", dict(coil.EFFECT.examples[0]))

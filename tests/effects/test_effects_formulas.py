@@ -6,15 +6,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt.balance import Pose
-from loomopt.effects import found as declared
-from loomopt.effects.kinds import Check, Load, Speed
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics.balance import Pose
+from loomopt.physics.effects import declared
+from loomopt.physics.effects.kinds import Check, Load, Speed
+from loomopt.physics.mechanisms import crank_rocker
 
 BEATUP = {
     name: effect
-    for name, effect in declared.of("loomopt.effects.beatup").items()
+    for name, effect in declared.of("loomopt.physics.effects.beatup").items()
     if isinstance(effect, Load | Check | Speed)
 }
 """Those with a formula of an instant; what a state passes on has tests of its own."""

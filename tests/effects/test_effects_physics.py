@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt.balance import Pose
-from loomopt.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
 from loomopt.jobs.beatup.model import ReedPose
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics.balance import Pose
+from loomopt.physics.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
+from loomopt.physics.mechanisms import crank_rocker
 
 MP = mpmath.MPContext()
 MP.dps = 60

@@ -14,10 +14,10 @@ from pathlib import Path
 import plain_effects
 import pytest
 
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Check, Event, Speed
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Check, Event, Speed
 
 ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[1] / "data" / "effects.csv").open())]
 EFFECTS = {

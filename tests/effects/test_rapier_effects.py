@@ -9,12 +9,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt.balance import Pose
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Motion
-from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.balance import Pose
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.effects.rapier import head_inertia, tape_friction
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 RAPIER = lo.load("rapier")

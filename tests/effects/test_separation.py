@@ -9,7 +9,7 @@ from flying_frames import CASES, JOB, ON, RPM, RUBBED, SLOW, SOFT, every, figure
 from plain_flight import MP, Frame, flown, landed
 
 import loomopt as lo
-from loomopt.effects.shedding import inertia, separation
+from loomopt.physics.effects.shedding import inertia, separation
 
 
 @every

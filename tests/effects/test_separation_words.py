@@ -14,8 +14,8 @@ import loomopt as lo
 from loomopt import tables
 from loomopt.base.errors import BadInput
 from loomopt.base.units import factor
-from loomopt.effects.shedding import separation, weight
 from loomopt.jobs import registry
+from loomopt.physics.effects.shedding import separation, weight
 from loomopt.studies import accuracy
 from loomopt.views import scene_view
 
@@ -164,10 +164,11 @@ def test_flight_is_imported_only_where_a_scene_needs_it(words, flown):
     code = (
         "import sys; from loomopt import cli\n"
         f"cli.run(['evaluate', 'shedding', '--json', *{words!r}])\n"
-        "print(sorted(name for name in sys.modules if 'loomopt.motion' in name or 'parting' in name), file=sys.stderr)"
+        "names = [name for name in sys.modules if 'loomopt.physics.motion' in name or 'parting' in name]\n"
+        "print(names, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ("loomopt.motion.flight" in done.stderr) == flown
+    assert ("loomopt.physics.motion.flight" in done.stderr) == flown
     assert flown or done.stderr.strip().endswith("[]")
 
 

@@ -22,11 +22,11 @@ from twisting_shafts import (
 )
 
 import loomopt as lo
-from loomopt.cycle import TURN, Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import FLOAT
+from loomopt.physics.cycle import TURN, Node
 from loomopt.program import states
 
 TABLE = {

@@ -10,9 +10,9 @@ import loomopt as lo
 from loomopt import tables
 from loomopt.base.quantities import exact
 from loomopt.cli import run
-from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.effects.kinds import Load
 from loomopt.program import settled
 from loomopt.program.sampling import Sampler
 
@@ -79,7 +79,7 @@ def test_it_needs_what_it_carries():
 def test_a_load_with_corners_that_no_oscillator_answers_is_not_carried():
     from dataclasses import replace
 
-    from loomopt.effects.combining import faults
+    from loomopt.physics.effects.declared import faults
 
     known = PLAIN.schema.effects
     resistance = known["resistance"]

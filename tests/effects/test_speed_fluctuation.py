@@ -11,12 +11,12 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.cycle import Node
+from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.program.reading import DATUM
 from loomopt.studies import accuracy, front
-from loomopt.tolerances import SAME_ANGLE
 
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)

@@ -9,7 +9,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics.mechanisms import crank_rocker
 from loomopt.program import states
 
 PLAIN = lo.load("beatup")

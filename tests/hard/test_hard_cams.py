@@ -13,7 +13,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_laws import LAWS
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 import plain_shedding as plain

@@ -10,11 +10,12 @@ import re
 import numpy as np
 import pytest
 from hard_digits import MP, TIME_STEP, angle, centres, exact, worst_ulps
+from reference import crank_rocker_synthesis, sley_synthesis
 
 import loomopt as lo
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker_synthesis, rapier_faults, sley_synthesis
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 # Synthesis: θ → 0, K → 1 -----------------------------------------------------------------------------------------
 
@@ -109,7 +110,7 @@ def test_a_five_bar_near_its_singular_position_to_two_ulps_times_condition(side,
 @pytest.mark.parametrize("gap", [-1e-3, -1e-6, -1e-9])
 def test_a_five_bar_that_locks_by_a_hair_is_refused_with_the_angle(side, gap):
     d, place = nearly_singular(side, gap)
-    begin, end = map(float, re.search(r"from (\S+) deg to (\S+) deg", rapier_faults.fault(d)).groups())
+    begin, end = map(float, re.search(r"from (\S+) deg to (\S+) deg", rapier_drive.fault(d)).groups())
     assert begin - 0.1 <= math.degrees(place) <= end + 0.1
     with pytest.raises(lo.BadInput, match=r"the five-bar locks: C and B2 are (farther|closer)"):
         lo.load("rapier").set("mechanism.l5", f"{d.l5!r} m")

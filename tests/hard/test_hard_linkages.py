@@ -11,10 +11,10 @@ import pytest
 from hard_digits import CENTRES, EPS, MP, centres, exact, motion, transmission, turns, worst_ulps
 
 import loomopt as lo
-from loomopt.effects.beatup import inertia
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker, dyad
-from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from loomopt.physics.effects.beatup import inertia
+from loomopt.physics.mechanisms import crank_rocker, dyad
+from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 
 DRAWS = 25
 

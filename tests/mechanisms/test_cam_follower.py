@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_follower import Contact, Follower, fault
-from loomopt.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower, fault
+from loomopt.physics.mechanisms.cam_laws import LAWS
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 MP = systems.mpmath(60)

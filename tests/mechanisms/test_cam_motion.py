@@ -6,9 +6,9 @@ from fractions import Fraction
 import pytest
 
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_motion import (
+from loomopt.physics.mechanisms import cam_spline
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_motion import (
     Column,
     Named,
     Spline,
@@ -21,7 +21,7 @@ from loomopt.mechanisms.cam_motion import (
     piece_at,
     segment_at,
 )
-from loomopt.mechanisms.cam_spline import FALLS, FEWEST, MOST, cycloid_like
+from loomopt.physics.mechanisms.cam_spline import FALLS, FEWEST, MOST, cycloid_like
 
 POINTS = ([0, 0.2, 0.5, 0.8, 1], [0, 0.1, 0.5, 0.9, 1])
 

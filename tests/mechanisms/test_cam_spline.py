@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_spline import DIP, cycloid_like, mirrored, spline, tabulated
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_spline import DIP, cycloid_like, mirrored, spline, tabulated
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 MP = systems.mpmath(50)

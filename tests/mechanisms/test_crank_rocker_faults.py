@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from loomopt.mechanisms.crank_rocker_faults import fault
+from loomopt.physics.mechanisms.crank_rocker import fault
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=300)
 lengths = st.floats(0.02, 1.0)

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
-from loomopt.mechanisms.crank_rocker import Lengths
+from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.mechanisms.crank_rocker import Lengths
 
 MANY = systems.mpmath(40)
 LINKAGES = [(0.031, 0.065, 0.155, 0.167), (1e-4, 0.3, 0.12, 0.31), (0.1, 0.21, 0.2, 0.22), (0.031, 0.034, 0.155, 0.156)]

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.maths import systems
-from loomopt.mechanisms import dyad
-from loomopt.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms import dyad
+from loomopt.physics.mechanisms.dyad import Vector
 
 EPS = 2.0**-52
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=200)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from loomopt.maths import systems
-from loomopt.mechanisms import rapier_drive
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 GIVEN = Dimensions(
     l1=0.076385,

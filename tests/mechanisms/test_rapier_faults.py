@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt.maths import systems
-from loomopt.mechanisms import rapier_faults
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 MECHANISM = lo.load("rapier").mechanism
@@ -84,14 +84,14 @@ def assert_stretches_are_where_it_opens(d, message):
 
 
 def test_the_packaged_drive_turns():
-    assert rapier_faults.fault(TODAY) == ""
+    assert rapier_drive.fault(TODAY) == ""
     assert not opens(TODAY, FINE).any()
 
 
 @given(st.one_of(drives(0.03), drives(0.3), drives(1.5)))
 @REPEATABLE
 def test_any_drive_either_turns_or_is_told_why_not(d):
-    message = rapier_faults.fault(d)
+    message = rapier_drive.fault(d)
     if not message:
         span = spans(d)
         assume(span.max() < (d.l5 + d.l6) * (1 - 1e-6) and span.min() > abs(d.l5 - d.l6) * (1 + 1e-6))
@@ -119,7 +119,7 @@ def test_any_drive_either_turns_or_is_told_why_not(d):
 )
 def test_a_five_bar_that_locks_for_part_of_the_turn_names_the_stretches(changes, text):
     d = changed(**changes)
-    message = rapier_faults.fault(d)
+    message = rapier_drive.fault(d)
     assert message.startswith("the five-bar locks: C and B2 are " + text)
     assert stretches(message)
     assert_stretches_are_where_it_opens(d, message)
@@ -136,13 +136,13 @@ def test_stretches_named_are_those_without_a_position(d):
         stuck = dataclasses.replace(d, **lock)
         far, near = span >= stuck.l5 + stuck.l6, span <= abs(stuck.l5 - stuck.l6)
         assume(not (far.any() and near.any()))
-        message = rapier_faults.fault(stuck)
+        message = rapier_drive.fault(stuck)
         assert ("farther" in message) == far.any()
         assert_stretches_are_where_it_opens(stuck, message)
 
 
 def sley_fault(d):
-    return "sley" in rapier_faults.fault(d)
+    return "sley" in rapier_drive.fault(d)
 
 
 @pytest.mark.parametrize("sign", [1, -1], ids=["farther", "closer"])
@@ -153,7 +153,7 @@ def test_a_stretch_across_front_dead_centre_is_one_stretch_that_goes_on_beyond_3
         span = spans(d)
         limit = 0.7 * span[0] + 0.3 * (span.min() if sign > 0 else span.max())
         stuck = dataclasses.replace(d, l5=limit - sign * d.l6)
-        message = rapier_faults.fault(stuck)
+        message = rapier_drive.fault(stuck)
         ((begin, end),) = [stretch for stretch in stretches(message) if stretch[1] > 360]
         assert 0 < begin < 360 < end < begin + 360
         assert_stretches_are_where_it_opens(stuck, message)
@@ -161,7 +161,7 @@ def test_a_stretch_across_front_dead_centre_is_one_stretch_that_goes_on_beyond_3
 
 @pytest.mark.parametrize(("l5", "text"), [(0.9, "closer"), (0.2, "farther apart")])
 def test_a_five_bar_that_never_closes_is_told_so_without_stretches(l5, text):
-    message = rapier_faults.fault(changed(l5=l5))
+    message = rapier_drive.fault(changed(l5=l5))
     assert message.startswith("the five-bar closes at no crank angle") == (text in message) is True
     assert not stretches(message)
     assert opens(changed(l5=l5), FINE).all()
@@ -173,9 +173,9 @@ def test_second_shaft_on_the_path_of_B2(degrees, l4):
     """C0 where B2 is at one crank angle, l5 and l6 nearly alike: no position near the angles where B2 passes."""
     carrier = pose(TODAY, np.array([degrees])).carrier
     on_path = changed(C0x=float(carrier.x[0]), C0y=float(carrier.y[0]), l4=l4)
-    assert "at no crank angle" in rapier_faults.fault(on_path)
+    assert "at no crank angle" in rapier_drive.fault(on_path)
     alike = dataclasses.replace(on_path, l5=on_path.l6 + l4 + 5e-3)
-    message = rapier_faults.fault(alike)
+    message = rapier_drive.fault(alike)
     assert "closer than l5 and l6 differ" in message
     assert distance_to(stretches(message), np.array([degrees]))[0] < 0
     assert_stretches_are_where_it_opens(alike, message)
@@ -191,7 +191,7 @@ def test_second_shaft_on_the_path_of_B2(degrees, l4):
     ],
 )
 def test_a_sley_that_is_no_crank_rocker_is_named_before_the_five_bar(changes, words):
-    message = rapier_faults.fault(changed(**changes, l5=0.9))
+    message = rapier_drive.fault(changed(**changes, l5=0.9))
     assert message.startswith("the sley four-bar is no crank-rocker: " + words)
     assert "l4" not in message
 
@@ -199,18 +199,18 @@ def test_a_sley_that_is_no_crank_rocker_is_named_before_the_five_bar(changes, wo
 @pytest.mark.parametrize("name", ["l1", "l2", "l3", "l71", "l3p", "l4", "l5", "l6", "i1", "i2", "wheel"])
 @pytest.mark.parametrize("value", [0.0, -0.01])
 def test_lengths_and_ratios_must_be_positive(name, value):
-    assert "greater than 0" in rapier_faults.fault(changed(**{name: value}))
+    assert "greater than 0" in rapier_drive.fault(changed(**{name: value}))
 
 
 def test_tiny_cranks_are_no_fault():
     for name in ("l1", "l4"):
         tiny = changed(**{name: 1e-12})
-        assert rapier_faults.fault(tiny) == ""
+        assert rapier_drive.fault(tiny) == ""
         assert not opens(tiny, FINE).any()
 
 
 def test_a_design_that_does_not_name_everything_has_no_fault_yet():
     named = {name: MECHANISM[name] for name in NAMES} | {"l5": 0.9}
-    assert rapier_faults.named(named) == rapier_faults.fault(changed(l5=0.9)) != ""
+    assert rapier_drive.fault_of(named) == rapier_drive.fault(changed(l5=0.9)) != ""
     del named["C0x"]
-    assert rapier_faults.named(named) == ""
+    assert rapier_drive.fault_of(named) == ""

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt.maths import systems
-from loomopt.mechanisms import rapier_faults
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=25)
 MECHANISM = lo.load("rapier").mechanism
@@ -39,7 +39,7 @@ def drives(draw):
         else:
             moved[name] = today + 0.06 * step if name in PLACES else today * math.exp(0.15 * step)
     d = Dimensions(**moved)
-    assume(rapier_faults.fault(d) == "")
+    assume(rapier_drive.fault(d) == "")
     base = pose_of(d).base
     span = np.hypot(base.x, base.y)
     assume(span.max() * MARGIN < d.l5 + d.l6 and span.min() > abs(d.l5 - d.l6) * MARGIN)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.maths import systems
-from loomopt.mechanisms.turning_points import crossing, followed, turns
+from loomopt.maths.turning_points import crossing, followed, turns
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 TURN = 2 * math.pi

@@ -5,7 +5,7 @@ import math
 import mpmath
 import pytest
 
-from loomopt.motion.free import Body, Moving, Piece, Zone, bound, response, safe
+from loomopt.physics.motion.free import Body, Moving, Piece, Zone, bound, response, safe
 
 MP = mpmath.MPContext()
 MP.dps = 120

@@ -8,10 +8,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from loomopt.balance import Pose
-from loomopt.effects.beatup import resistance
 from loomopt.maths import systems
-from loomopt.motion import harmonic
+from loomopt.physics.balance import Pose
+from loomopt.physics.effects.beatup import resistance
+from loomopt.physics.motion import harmonic
 
 EXACT = systems.mpmath(50)
 MP = mpmath.MPContext()

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from loomopt.motion import turning
-from loomopt.motion.turning import NoTurn, solved
+from loomopt.physics.motion import turning
+from loomopt.physics.motion.turning import NoTurn, solved
 
 TURN = 2 * math.pi
 MEAN = 50.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from waves import model, objective, program
 
-from loomopt.cycle import TURN, split
 from loomopt.jobs import registry
 from loomopt.nlp import exchange, ipopt
 from loomopt.nlp.point import Elastic, Settings, sampler_at
+from loomopt.physics.cycle import TURN, split
 from loomopt.program.kinematics import Arcs
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.certificate import certify

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics.cycle import Node
 from loomopt.program.sampling import Sampler
 
 RAPIER = registry.load("rapier")

@@ -13,8 +13,8 @@ from loomopt.nlp.expressions import expressions
 from loomopt.nlp.lifted import Lifts, Options, chosen, identity
 from loomopt.nlp.point import Settings
 from loomopt.nlp.structure import structure
+from loomopt.physics.tolerances import BESIDE_STATIONS, FEW_CHOICES, FIRST_SLOTS, LEADING
 from loomopt.program.program import Variable
-from loomopt.tolerances import BESIDE_STATIONS, FEW_CHOICES, FIRST_SLOTS, LEADING
 
 
 def made(count=FEW_CHOICES + 1):

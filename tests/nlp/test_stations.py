@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from steps import COUNT, program
 
-from loomopt.cycle import TURN
 from loomopt.jobs import registry
 from loomopt.nlp import exchange
 from loomopt.nlp.calls import Calls
@@ -12,6 +11,7 @@ from loomopt.nlp.families import Family, families
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.stations import Stood, held, owners
 from loomopt.nlp.structure import structure
+from loomopt.physics.cycle import TURN
 from loomopt.program.chains import stations
 from loomopt.program.sampling import Extreme
 

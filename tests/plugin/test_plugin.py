@@ -169,7 +169,7 @@ def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribu
 
 def test_an_effect_whose_figure_there_is_already_is_named(loomopt, distribution):
     code = """
-from loomopt.effects.beatup.centrifugal import EFFECT as KNOWN
+from loomopt.physics.effects.beatup.centrifugal import EFFECT as KNOWN
 import dataclasses
 EFFECT = dataclasses.replace(KNOWN, name="wind")
 """

@@ -3,13 +3,13 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from loomopt import balance
-from loomopt.balance import Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Load
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics import balance
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.schema import Table, Values
 from loomopt.program.kinematics import Arcs, Group
-from loomopt.schema import Table, Values
 
 FRONT, REAR = "front", "rear"
 

@@ -4,10 +4,10 @@ import casadi as ca
 import pytest
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.nlp import graph
+from loomopt.physics.cycle import Node
 
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 NODES = {

@@ -9,10 +9,10 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from scipy.optimize import minimize
 
-from loomopt.cycle import TURN, Node
 from loomopt.maths import systems
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
+from loomopt.physics.cycle import TURN, Node
 from loomopt.program.model import Integral, JobModel, Quantity, Row, cased
 from loomopt.program.program import Limit, Objective, Program, Variable
 from loomopt.program.sampling import Sampler

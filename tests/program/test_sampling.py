@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from loomopt.cycle import TURN
 from loomopt.jobs import registry
+from loomopt.physics.cycle import TURN
 from loomopt.program.sampling import CHUNK, Sampler
 
 POINTS = 1_000_000

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Load, State
 from loomopt.maths import systems
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import transcribe
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Load, State
+from loomopt.physics.schema import Table
 from loomopt.program.model import JobModel, Quantity, Row, cased
 from loomopt.program.program import Limit, Objective, Program, Variable
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler
-from loomopt.schema import Table
 
 SAMPLES = 8
 

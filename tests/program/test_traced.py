@@ -14,12 +14,12 @@ from test_states import ELASTIC, WITH_ARM
 from test_tracing_tape import bits
 
 import loomopt as lo
-from loomopt.balance import Given
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.packaged import problem_names
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
 from loomopt.program import sampling, traced
 from loomopt.program.model import JobModel, Quantity, Row
 from loomopt.program.reading import DATUM

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
-from loomopt.mechanisms import cam_follower, crank_rocker_faults, rapier_faults
-from loomopt.mechanisms.cam_follower import Follower
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.crank_rocker import Lengths
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import cam_follower, crank_rocker, rapier_drive
+from loomopt.physics.mechanisms.cam_follower import Follower
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.crank_rocker import Lengths
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 TURN = 2 * math.pi
 NEAREST = 1e-9
@@ -54,7 +54,7 @@ def crank_rockers(draw, nearest=NEAREST):
     l4 = least + share * (most - least) if draw(st.booleans()) else most - share * (most - least)
     size = draw(powers(-2, 1))
     lengths = Lengths(l1 * size, l2 * size, l3 * size, l4 * size, draw(sides))
-    assume(l4 - l1 >= CLOSEST * max(l2, l3) and crank_rocker_faults.fault(*sides_of(lengths)) == "")
+    assume(l4 - l1 >= CLOSEST * max(l2, l3) and crank_rocker.fault(*sides_of(lengths)) == "")
     return lengths
 
 
@@ -71,7 +71,7 @@ def drives(draw):
     widths |= dict.fromkeys(("l5", "C0x", "C0y"), draw(st.sampled_from([0.1, SPREAD])))
     moved = {name: getattr(TODAY, name) * (1 + widths[name] * draw(st.floats(-1, 1))) for name in NAMES}
     d = Dimensions(**moved)
-    assume(rapier_faults.fault(d) == "")
+    assume(rapier_drive.fault(d) == "")
     base = Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.linspace(0, TURN, 181)).base
     span = np.hypot(base.x, base.y)
     assume(span.max() * ROOM < d.l5 + d.l6 and span.min() > abs(d.l5 - d.l6) * ROOM)

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
 
-from loomopt.cycle import Node
 from loomopt.maths import systems
+from loomopt.physics.cycle import Node
 from loomopt.program.sampling import Sampler
 
 POINTS = 4096

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import NAMES, drives, frames, machine, reeds, shares, varied
 
-from loomopt.cycle import Node
+from loomopt.physics.cycle import Node
 from loomopt.program.sampling import Sampler
 
 MOST = 50

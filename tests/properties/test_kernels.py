@@ -23,14 +23,15 @@ from machines import (
     sides_of,
     tables,
 )
+from reference import crank_rocker_synthesis, sley_synthesis
 
 from loomopt.maths import systems
-from loomopt.mechanisms import cam_spline, crank_rocker, crank_rocker_synthesis, sley_synthesis
-from loomopt.mechanisms.cam_follower import Contact, Follower
-from loomopt.mechanisms.cam_laws import LAWS, Derivatives
-from loomopt.mechanisms.crank_rocker import Lengths, Pose, dead_centres
-from loomopt.mechanisms.rapier_drive import Dimensions, Sley
-from loomopt.mechanisms.rapier_drive import Pose as Drive
+from loomopt.physics.mechanisms import cam_spline, crank_rocker
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower
+from loomopt.physics.mechanisms.cam_laws import LAWS, Derivatives
+from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.physics.mechanisms.rapier_drive import Pose as Drive
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|).

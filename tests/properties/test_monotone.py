@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import loomopt as lo
-from loomopt.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_laws import LAWS
 
 shares = st.integers(0, 1000).map(lambda thousandths: thousandths / 1000)
 resistances = st.integers(0, 20000).map(lambda tenths: tenths / 10)

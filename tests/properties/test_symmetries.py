@@ -13,12 +13,12 @@ from machines import angles, contacts, crank_rockers, drives, powers
 
 import loomopt as lo
 from loomopt.maths import systems
-from loomopt.mechanisms import dyad
-from loomopt.mechanisms.cam_follower import Contact
-from loomopt.mechanisms.crank_rocker import Pose, dead_centres
-from loomopt.mechanisms.dyad import Vector
-from loomopt.mechanisms.rapier_drive import Pose as Drive
-from loomopt.mechanisms.rapier_drive import Sley
+from loomopt.physics.mechanisms import dyad
+from loomopt.physics.mechanisms.cam_follower import Contact
+from loomopt.physics.mechanisms.crank_rocker import Pose, dead_centres
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.rapier_drive import Pose as Drive
+from loomopt.physics.mechanisms.rapier_drive import Sley
 
 sizes = powers(-9, 9)
 CURVES = ("psi", "psi_1", "psi_2", "psi_3", "rod_1", "rod_2", "obliquity", "cos_crank_rod", "sin_crank_rod")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from shedding_cases import flat, freed, plain
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.program.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes, judged

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.physics.tolerances import COMPLEMENTARY, LARGEST_PRICE, POSITIVE, STATIONARY
 from loomopt.program.sampling import Sampler
 from loomopt.solving import certificate, kkt, second_order
 from loomopt.solving.certificate import Cycle, JudgedLevel, certified, certify
@@ -16,7 +17,6 @@ from loomopt.solving.kkt import Multipliers
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Curvature, Local
 from loomopt.solving.verdict import Level
-from loomopt.tolerances import COMPLEMENTARY, LARGEST_PRICE, POSITIVE, STATIONARY
 
 NONE = Multipliers(np.zeros(0), 0.0)
 

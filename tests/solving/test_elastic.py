@@ -7,10 +7,10 @@ import toy
 
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Point, Settings
+from loomopt.physics.tolerances import NEEDED
 from loomopt.solving import elastic
 from loomopt.solving.elastic import clash, least
 from loomopt.solving.words import Words
-from loomopt.tolerances import NEEDED
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 

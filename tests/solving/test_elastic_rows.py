@@ -8,9 +8,9 @@ import toy
 from loomopt.jobs import registry
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Point
+from loomopt.physics.tolerances import NEEDED, PRICED
 from loomopt.solving import elastic
 from loomopt.solving.words import Words
-from loomopt.tolerances import NEEDED, PRICED
 
 WAVES = {"w": lambda m, v, phi: v["x"] + m.cos(phi), "z": lambda m, v, phi: v["x"] - 1 + m.cos(phi)}
 LIMITS = (("x", -1, 2.0), ("w", 1, 0.25), ("y", 1, 1.0), ("z", 1, 0.5))

@@ -8,15 +8,15 @@ import pytest
 import toy
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import variables
+from loomopt.physics.cycle import Node
+from loomopt.physics.tolerances import JET_ERROR
 from loomopt.program.sampling import Sampler
 from loomopt.solving.exact import Exact
 from loomopt.solving.forward import Forward
 from loomopt.solving.rows import active_set
-from loomopt.tolerances import JET_ERROR
 
 OPTIMA = [
     ("beatup", "balance"),

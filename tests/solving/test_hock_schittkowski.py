@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import toy
 
-from loomopt.balance import Given
 from loomopt.maths import systems
+from loomopt.physics.balance import Given
 from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8

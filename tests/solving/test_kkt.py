@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt
 from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers, System, replaceable, solved
 from loomopt.solving.rows import active_set
-from loomopt.tolerances import POSITIVE, STATIONARY
 
 
 def at(program, x):

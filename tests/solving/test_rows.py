@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 import toy
 
+from loomopt.physics.tolerances import ACTIVE
 from loomopt.program.sampling import Sampler
 from loomopt.solving.rows import active_set
-from loomopt.tolerances import ACTIVE
 
 
 def active(program, x):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.physics.tolerances import FLAT
 from loomopt.program.program import Move, Wish
 from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt, second_order
@@ -13,7 +14,6 @@ from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers
 from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Critical, Local
-from loomopt.tolerances import FLAT
 
 
 def local_at(program, **x):

@@ -13,7 +13,7 @@ from coil_by_hand import Contact, Steel, hook, length, lightest, mass, rate, she
 from shedding_cases import plain, product
 
 import loomopt as lo
-from loomopt.mechanisms.tension_spring import WIRES
+from loomopt.physics.mechanisms.tension_spring import WIRES
 from loomopt.solving.engine import evaluate
 
 STEEL = Steel()

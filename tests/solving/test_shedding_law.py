@@ -15,12 +15,12 @@ import pytest
 from shedding_cases import CYCLOID, TRAVELS, flat, freed, lowest, plain, product, programmed
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import MIDDLE, MIDDLE_PIECE
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_spline import spline
+from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_spline import spline
 
 study = importlib.import_module("shedding_law")
 PAPER, PRINTED = plain.PAPER, plain.PRINTED

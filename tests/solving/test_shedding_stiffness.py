@@ -8,7 +8,7 @@ import pytest
 from shedding_by_hand import LAWS, RPM, lopsided, plain, product, through
 
 import loomopt as lo
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 
 PAPER, PRINTED, PRESSED = plain.PAPER, plain.PRINTED, plain.PRESSED
 PACKAGED = {"65.6 mm": "shedding", "14.5 mm": "shedding-printed-travel"}

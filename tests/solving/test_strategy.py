@@ -9,11 +9,11 @@ from searches import BAD, certified, empty, solved
 
 import loomopt as lo
 from loomopt.nlp.point import Point, Settings
+from loomopt.physics.tolerances import MORE_STARTS
 from loomopt.solving import strategy
 from loomopt.solving.search import Search
 from loomopt.solving.sizes import BETTER, DESIGNS
 from loomopt.solving.strategy import searched
-from loomopt.tolerances import MORE_STARTS
 
 __all__ = ["certified", "solved"]
 

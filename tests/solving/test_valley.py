@@ -7,6 +7,7 @@ import toy
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.physics.tolerances import PROBES
 from loomopt.solving.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
 from loomopt.solving.exact import Exact
 from loomopt.solving.feasible_curve import FeasibleCurve
@@ -16,7 +17,6 @@ from loomopt.solving.rows import active_set
 from loomopt.solving.second_order import Local
 from loomopt.studies import front
 from loomopt.studies.front_solve import Asking
-from loomopt.tolerances import PROBES
 
 both = pytest.mark.parametrize("derivatives", [Forward, Exact])
 

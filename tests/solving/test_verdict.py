@@ -2,8 +2,8 @@
 
 import pytest
 
+from loomopt.physics.tolerances import ROUNDED
 from loomopt.solving.verdict import Certificate, Level
-from loomopt.tolerances import ROUNDED
 
 
 def certificate(*levels, feasibility=0.0, violation=0.0, **more):

@@ -11,12 +11,13 @@ from typing import Any
 from unittest import mock
 
 from loomopt import scenes
-from loomopt.balance import Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Motion
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Motion
+from loomopt.physics.schema import Figure, Table, Target, Values
 from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import Columns
 from loomopt.program.kinematics import Arcs, Group
@@ -25,7 +26,6 @@ from loomopt.program.program import Limit, Move, Objective, Program, Variable
 from loomopt.program.sampling import Sampler
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target, Values
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 

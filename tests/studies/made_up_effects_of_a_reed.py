@@ -5,10 +5,10 @@ from dataclasses import replace
 
 from loomopt import scenes
 from loomopt.base.quantities import Torque
-from loomopt.effects.kinds import Clash, Load, ranked
 from loomopt.jobs.beatup.scene import SCHEMA
 from loomopt.jobs.registry import load
-from loomopt.schema import Table
+from loomopt.physics.effects.kinds import Clash, Load, ranked
+from loomopt.physics.schema import Table
 
 
 class Own(Table):

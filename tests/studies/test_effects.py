@@ -292,12 +292,3 @@ def test_the_table_has_shares_and_units_and_says_where_it_comes_from(beatup):
     assert set(table.index[table["may go"]]) == {*beatup.left_out, "speed_fluctuation"}
     assert table.attrs["study"] == "effects"
     assert table.attrs["tolerance"] == "0.01"
-
-
-def test_a_function_and_a_room_of_one_name():
-    import loomopt.effects
-    from loomopt.effects import kinds
-
-    assert vars(loomopt.effects)["kinds"] is kinds
-    with pytest.raises(BadInput, match="tolerance is out of range"):
-        loomopt.effects("beatup", tolerance=-1)

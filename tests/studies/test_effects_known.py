@@ -2,7 +2,7 @@
 
 import made_up_effects_of_a_reed as made_up
 
-from loomopt.effects.kinds import Event, Speed, State
+from loomopt.physics.effects.kinds import Event, Speed, State
 from loomopt.studies import effects, effects_known
 
 

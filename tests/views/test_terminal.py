@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from loomopt import api
 from loomopt.base.quantities import read
-from loomopt.effects import found
 from loomopt.jobs.registry import load
+from loomopt.physics.effects import declared
 from loomopt.solving.words import Words
 from loomopt.views import layout, scene_view, terminal
 from loomopt.views.layout import Grid
 
 SCENE = load("beatup-light")
-EFFECTS = found.of("loomopt.effects.beatup")
+EFFECTS = declared.of("loomopt.physics.effects.beatup")
 WORDS = st.text(st.characters(codec="ascii", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 CELLS = st.lists(WORDS, max_size=12).map(" ".join)
 GRID = Grid("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))

@@ -5,12 +5,12 @@ import math
 from loomopt.jobs.base import Figures
 from loomopt.jobs.beatup.model import FRONT
 from loomopt.jobs.beatup.scene import VARIABLES, RetrofitTarget
+from loomopt.physics.tolerances import BALANCED, NO_MASS
 from loomopt.program.axes import opposite
 from loomopt.program.numbers import Bounds
 from loomopt.program.program import Goal, Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.scenes import Scene
-from loomopt.tolerances import BALANCED, NO_MASS
 
 BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
 """What target balance asks, and may find out of reach."""

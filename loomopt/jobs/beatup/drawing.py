@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms import crank_rocker, crank_rocker_faults
+from loomopt.physics.mechanisms import crank_rocker
 from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.shapes import Arc, Drawing, Point, Primitive
 from loomopt.picture.skeleton import Mass, Skeleton
@@ -72,7 +72,7 @@ def of(design: Mapping[str, float]) -> Linkage:
     Raises BadInput when it is none.
     """
     metres = [design[name] for name in LENGTHS]
-    fault = crank_rocker_faults.fault(*metres)
+    fault = crank_rocker.fault(*metres)
     if fault:
         raise BadInput(f"the linkage cannot be drawn: {fault}", key=", ".join(LENGTHS), remedy="Correct them")
     lengths = crank_rocker.Lengths(*metres)

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from types import SimpleNamespace
 
-from loomopt import balance
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics import balance
+from loomopt.physics.mechanisms import crank_rocker
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
 from loomopt.program.model import JobModel

@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from loomopt.base.errors import BadInput
-from loomopt.effects.kinds import Check, Load
 from loomopt.jobs import base
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.design import BALANCE
@@ -13,6 +12,8 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.mechanisms import counterweight
 from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
+from loomopt.physics.effects.kinds import Check, Load
+from loomopt.physics.tolerances import NO_MASS
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.drive import TORQUE
 from loomopt.program.model import JobModel
@@ -21,7 +22,6 @@ from loomopt.program.program import Limit, Move, Numbers, Objective, Program, Va
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene_tables import Limit as Limited
 from loomopt.scenes import Scene
-from loomopt.tolerances import NO_MASS
 
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""

@@ -8,13 +8,13 @@ from pydantic import Field
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.base.units import Shown, usual
-from loomopt.effects import found
 from loomopt.jobs.beatup.model import CrankRocker
-from loomopt.mechanisms import crank_rocker_faults
+from loomopt.physics.effects import declared
+from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.program import drive
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Conflict, Figure, Table, Target
 
 
 class Operation(Table):
@@ -101,7 +101,7 @@ TARGETS = {
 def fault(design: Mapping[str, float], shown: Shown = usual) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
-    return crank_rocker_faults.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
+    return crank_rocker.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
 
 
 def check(scene: Scene) -> None:
@@ -123,7 +123,7 @@ SCHEMA = SceneSchema(
     title="four-bar crank-rocker beat-up: balance the reed torque within the space",
     operation=Operation,
     mechanism=Mechanism,
-    effects=found.of("loomopt.effects.beatup"),
+    effects=declared.of("loomopt.physics.effects.beatup"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,

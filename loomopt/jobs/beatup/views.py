@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from loomopt.cycle import TURN
-from loomopt.effects.kinds import State
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.maths.systems import FLOAT
+from loomopt.physics.cycle import TURN
+from loomopt.physics.effects.kinds import State
 from loomopt.picture.job_views import JobViews
 from loomopt.program.curves import tops
 from loomopt.scenes import Scene

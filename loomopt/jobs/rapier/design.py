@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt.cycle import TURN, Node
 from loomopt.jobs.base import Figures
 from loomopt.jobs.rapier.model import jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, VARIABLES, MatchTarget, match_table
-from loomopt.mechanisms.turning_points import crossing
+from loomopt.maths.turning_points import crossing
+from loomopt.physics.cycle import TURN, Node
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.base.errors import BadInput
-from loomopt.cycle import TURN, Floats
 from loomopt.jobs.rapier.model import DIMENSIONS
-from loomopt.maths import systems
+from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms import rapier_faults, turning_points
-from loomopt.mechanisms.dyad import Vector
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.cycle import TURN, Floats
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.shapes import Drawing, Line, Point, Primitive
 from loomopt.picture.skeleton import Skeleton
@@ -109,7 +109,7 @@ def of(design: Mapping[str, float]) -> Drive:
     Raises BadInput when it does not assemble at every crank angle.
     """
     dimensions = Dimensions(*(design[name] for name in DIMENSIONS))
-    fault = rapier_faults.fault(dimensions)
+    fault = rapier_drive.fault(dimensions)
     if fault:
         key = "l1, l2, l3, l71, l3p, alpha, l4, l5, l6, C0x, C0y, phi40"
         raise BadInput(f"the drive cannot be drawn: {fault}", key=key, remedy="Correct them")

@@ -10,19 +10,19 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from loomopt.balance import Given
 from loomopt.base.records import lazy
-from loomopt.cycle import Floats, Node
-from loomopt.effects.kinds import Effect, Motion
-from loomopt.maths import systems
+from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms import rapier_drive, turning_points
-from loomopt.mechanisms.dyad import Vector, dot
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Floats, Node
+from loomopt.physics.effects.kinds import Effect, Motion
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.dyad import Vector, dot
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Group, four_bar
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
-from loomopt.schema import Values
-from loomopt.tolerances import ASSEMBLY_MARGIN
 
 DIMENSIONS = tuple(entry.name for entry in fields(rapier_drive.Dimensions))
 SLEY = ("l1", "l2", "l3", "l71")

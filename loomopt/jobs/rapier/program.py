@@ -7,14 +7,14 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen
 from loomopt.base.refusals import refusal
-from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.design import follow, read
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms import rapier_drive, rapier_faults
+from loomopt.physics.effects.kinds import Check
+from loomopt.physics.mechanisms import rapier_drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
@@ -256,4 +256,4 @@ def constructed(known: Mapping[str, float]) -> dict[str, float] | None:
     except (ValueError, ZeroDivisionError):
         return None
     found = {"C0x": layout.C0x, "C0y": layout.C0y, "l5": layout.reach - dimensions.l4, "phi40": layout.phi40}
-    return None if rapier_faults.named({**known, **found}) else found
+    return None if rapier_drive.fault_of({**known, **found}) else found

@@ -9,13 +9,13 @@ from loomopt import scene_csv
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.base.refusals import refusal
-from loomopt.effects import found
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
-from loomopt.mechanisms import rapier_faults
+from loomopt.physics.effects import declared
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.program import drive
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Conflict, Figure, Table, Target
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""
@@ -125,7 +125,7 @@ TARGETS = {
 
 def check(scene: Scene) -> None:
     """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
-    fault = rapier_faults.named(scene.mechanism, scene.show)
+    fault = rapier_drive.fault_of(scene.mechanism, scene.show)
     if fault:
         raise BadInput(
             f"today's drive does not turn all round: {fault}",
@@ -159,13 +159,13 @@ SCHEMA = SceneSchema(
     title="rapier drive on the sley: stroke and dwells with the least head acceleration",
     operation=Operation,
     mechanism=Mechanism,
-    effects=found.of("loomopt.effects.rapier"),
+    effects=declared.of("loomopt.physics.effects.rapier"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,
     default_target="stroke-dwell",
     check=check,
-    fault=rapier_faults.named,
+    fault=rapier_drive.fault_of,
     own_axes=AXES,
     conflict=Conflict(("peak_acceleration", "dwell"), "stroke-dwell", ("dwell",)),
     own_margins=dict.fromkeys(SLEY_MARGINS, "length") | dict.fromkeys(CLOSES, "number"),

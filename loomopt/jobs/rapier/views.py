@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from loomopt.cycle import TURN
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.maths.systems import FLOAT
+from loomopt.physics.cycle import TURN
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes import Scene
 

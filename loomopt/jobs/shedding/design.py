@@ -10,18 +10,19 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from loomopt import balance
-from loomopt.cycle import Floats
-from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.base import Figures
 from loomopt.jobs.shedding.model import RETURN, RETURN_SPRING, RISE, FramePose, frame
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, LawTarget
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
-from loomopt.mechanisms import cam_limit
-from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.mechanisms.cam_motion import Spline, named_knots
+from loomopt.physics import balance
+from loomopt.physics.cycle import Floats
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.mechanisms import cam_limit
+from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_motion import Spline, named_knots
+from loomopt.physics.tolerances import ACCURACY
 from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program, Variable
@@ -29,7 +30,6 @@ from loomopt.program.sampling import Extreme, Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
 from loomopt.scenes import Scene
-from loomopt.tolerances import ACCURACY
 
 CYCLE = {
     "contact_min": "lift",

@@ -13,13 +13,14 @@ import numpy as np
 from loomopt import provenance
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor, show
-from loomopt.cycle import Floats, Pieces
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
 from loomopt.jobs.shedding.scene import Frame
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_follower import Follower, Stations
-from loomopt.mechanisms.cam_motion import Spline
+from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.mechanisms.cam_follower import Follower, Stations
+from loomopt.physics.mechanisms.cam_motion import Spline
+from loomopt.physics.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
 from loomopt.picture import tracing
 from loomopt.picture.drawing import Label, along, around, place
 from loomopt.picture.return_spring import ReturnSpring
@@ -29,7 +30,6 @@ from loomopt.picture.symbols import arrow, fixed_pivot
 from loomopt.picture.units import Units, told
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.scenes import Scene
-from loomopt.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"

@@ -4,9 +4,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from loomopt.balance import Acting, Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Load, Motion
 from loomopt.jobs.shedding.model import (
     FAR_DWELL,
     FOLLOWER,
@@ -23,7 +20,10 @@ from loomopt.jobs.shedding.model import (
 )
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms.cam_follower import Contact, Follower
+from loomopt.physics.balance import Acting, Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.picture import effect_equations
 from loomopt.picture.cam_laws import Unwritten, law
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text

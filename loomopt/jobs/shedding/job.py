@@ -8,7 +8,7 @@ from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import contact, moving
 from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
-from loomopt.mechanisms.cam_motion import Spline, knots
+from loomopt.physics.mechanisms.cam_motion import Spline, knots
 from loomopt.program.curves import Columns
 from loomopt.program.instant import Formula
 from loomopt.program.model import JobModel

@@ -10,20 +10,20 @@ from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from loomopt.balance import Given
 from loomopt.base.records import lazy
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Effect, Load, Motion
-from loomopt.effects.shedding import FramePose as Frame
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms.cam_follower import Contact, Follower
-from loomopt.mechanisms.cam_laws import Derivatives
-from loomopt.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
-from loomopt.mechanisms.turning_points import followed
+from loomopt.maths.turning_points import followed
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Effect, Load, Motion
+from loomopt.physics.effects.shedding import FramePose as Frame
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower
+from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
+from loomopt.physics.schema import Table, Values
 from loomopt.program import drive
 from loomopt.program.kinematics import Arcs, Chain, Group
 from loomopt.program.model import Instant, JobModel, Quantity, Row
-from loomopt.schema import Table, Values
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 RISE, FAR_DWELL, RETURN, NEAR_DWELL = range(4)

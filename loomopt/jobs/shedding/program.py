@@ -6,15 +6,15 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from loomopt.base.refusals import refusal
-from loomopt.effects.kinds import Check
 from loomopt.jobs import base
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.design import CONTACT_SPEED, CYCLE, Sizes, contact, survived
 from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, LIFT, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
-from loomopt.mechanisms import cam_spline
-from loomopt.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
-from loomopt.owned import owned
+from loomopt.physics.effects.kinds import Check, owned
+from loomopt.physics.mechanisms import cam_spline
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
+from loomopt.physics.tolerances import START_ROOM
 from loomopt.program import drive
 from loomopt.program import numbers as scene_numbers
 from loomopt.program.model import JobModel
@@ -23,7 +23,6 @@ from loomopt.program.program import Limit, Move, Objective, Program, Variable, W
 from loomopt.program.sampling import sampled
 from loomopt.program.speeds import followed
 from loomopt.scenes import Scene
-from loomopt.tolerances import START_ROOM
 
 SPEED = "operation.speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"

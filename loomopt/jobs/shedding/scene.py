@@ -22,16 +22,16 @@ from loomopt.base.quantities import (
 )
 from loomopt.base.refusals import refusal
 from loomopt.base.units import Shown, usual
-from loomopt.effects import found
 from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
-from loomopt.mechanisms import cam_follower, cam_spline
-from loomopt.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.physics.effects import declared
+from loomopt.physics.mechanisms import cam_follower, cam_spline
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
+from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.program import drive
 from loomopt.program.numbers import check_known
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.tolerances import SAME_ANGLE
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -252,7 +252,7 @@ SCHEMA = SceneSchema(
     title="cam shedding with spring return: the least spring that keeps the roller on the cam",
     operation=Operation,
     mechanism=Mechanism,
-    effects=found.of("loomopt.effects.shedding"),
+    effects=declared.of("loomopt.physics.effects.shedding"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,

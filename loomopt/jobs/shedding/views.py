@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Load
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
 from loomopt.maths.systems import FLOAT, Number
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Load
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
 from loomopt.program.curves import POWER

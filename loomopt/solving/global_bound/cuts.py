@@ -6,8 +6,8 @@ import numpy as np
 
 from loomopt.maths.intervals import Floats, Interval
 from loomopt.maths.nnls import nnls
+from loomopt.physics.tolerances import ACTIVE
 from loomopt.solving.global_bound.reading import LIMIT, Read, Reader
-from loomopt.tolerances import ACTIVE
 
 WEIGHT = 100.0
 """Weight of the sum of an objective's multipliers, which is 1, against slopes of natural size."""

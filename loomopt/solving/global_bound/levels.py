@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from loomopt.jobs.base import Job
 from loomopt.maths.intervals import Floats
+from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.program.program import Limit, Objective, Program
 from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale
@@ -19,7 +20,6 @@ from loomopt.solving.global_bound.rows import OpenError
 from loomopt.solving.global_bound.task import Task, reduced
 from loomopt.solving.global_bound.tree import Question, Tree, grown
 from loomopt.solving.verdict import GlobalLevel, Sense
-from loomopt.tolerances import FEASIBLE, SAME_OBJECTIVE
 
 HELD = SAME_OBJECTIVE
 """What an earlier level's objective may exceed the answer's by, natural size: that much counts as the same optimum."""

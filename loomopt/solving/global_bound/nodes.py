@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base.records import lazy
-from loomopt.cycle import TURN, Node, Where
 from loomopt.maths import systems
 from loomopt.maths.intervals import PI, Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
+from loomopt.physics.cycle import TURN, Node, Where
+from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.task import Task
-from loomopt.tolerances import SAME_ANGLE
 
 Places = NDArray[np.intp]
 

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from loomopt.balance import Given, total
-from loomopt.cycle import Cycle, Node
 from loomopt.maths import systems
 from loomopt.maths.interval_series import Series, along
 from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given, total
+from loomopt.physics.cycle import Cycle, Node
 from loomopt.program.model import Integral, JobModel, Stills
 from loomopt.program.reading import DATUM, Rows
 from loomopt.program.traced import Quantities

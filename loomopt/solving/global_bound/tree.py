@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.maths.intervals import Floats, Interval, interval
+from loomopt.physics.tolerances import FEASIBLE
 from loomopt.solving.global_bound.cuts import with_cut
 from loomopt.solving.global_bound.reading import LIMIT, Read, Reader
-from loomopt.tolerances import FEASIBLE
 
 BATCH = 2048
 """Boxes read at once: enough that a formula's own Python does not count, few enough to stay in cache."""

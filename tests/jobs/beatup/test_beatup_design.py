@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from loomopt.jobs import registry
+from loomopt.physics.tolerances import NO_MASS
 from loomopt.studies import front
-from loomopt.tolerances import NO_MASS
 
 BEATUP = registry.load("beatup")
 JOB = registry.of(BEATUP)

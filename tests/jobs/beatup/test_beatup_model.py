@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.cycle import Node
-from loomopt.effects.beatup import counterweight_inertia, rod_inertia
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker
 from loomopt.maths import systems
-from loomopt.mechanisms import crank_rocker
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.beatup import counterweight_inertia, rod_inertia
+from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 from loomopt.program.model import JobModel
-from loomopt.tolerances import ASSEMBLY_MARGIN
 
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-from loomopt.mechanisms import crank_rocker_synthesis
 from loomopt.picture import shapes
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Point, Text

@@ -13,8 +13,8 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier import drawing as rapier_drawing
 from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
 from loomopt.maths import systems
-from loomopt.mechanisms import rapier_drive
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, figure, svg

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from loomopt.effects.rapier import head_inertia, tape_friction
 from loomopt.jobs.rapier import equations as rapier_equations
 from loomopt.jobs.rapier import model as rapier
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.effects.rapier import head_inertia, tape_friction
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 
 EFFECTS = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
 SPEED = 50.0

@@ -8,13 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from loomopt.cycle import TURN, Node
 from loomopt.jobs import registry
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, SLEY_MARGINS, RapierDrive
 from loomopt.maths import systems
+from loomopt.physics.cycle import TURN, Node
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 from loomopt.program.model import JobModel
-from loomopt.tolerances import ASSEMBLY_MARGIN
 
 SCENE = registry.load("rapier").with_effect("head_inertia").with_effect("tape_friction")
 JOB = registry.of(SCENE)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.rapier import design as rapier_design
-from loomopt.maths import systems
-from loomopt.mechanisms import rapier_faults, turning_points
-from loomopt.mechanisms.rapier_drive import Dimensions
+from loomopt.maths import systems, turning_points
+from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms.rapier_drive import Dimensions
 from loomopt.program.sampling import Sampler
 
 MP = mpmath.MPContext()
@@ -34,7 +34,7 @@ def random_designs():
     widths = {"alpha": 0.3, "phi40": 0.35, "C0x": 0.05, "C0y": 0.05}
     while len(found) < 20:
         design = {name: value + random.uniform(-1, 1) * widths.get(name, 0.25 * value) for name, value in today.items()}
-        if not rapier_faults.named({**SCENE.mechanism, **design}):
+        if not rapier_drive.fault_of({**SCENE.mechanism, **design}):
             found.append(design)
     return found
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from loomopt.jobs import registry
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)

@@ -17,7 +17,7 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import drawing as shedding_drawing
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.views import dxf, svg

@@ -11,9 +11,9 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
-from loomopt.mechanisms.cam_follower import Contact, Follower
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_spline import cycloid_like, spline
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_spline import cycloid_like, spline
 from loomopt.picture import cam_laws
 
 SCENE = lo.load("shedding")

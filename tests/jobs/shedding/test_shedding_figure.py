@@ -7,7 +7,7 @@ import pytest
 
 import loomopt as lo
 from loomopt import designs, tables
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.program.curves import split
 from loomopt.views import figure, outputs, scene_view
 from loomopt.views.layout import Grid

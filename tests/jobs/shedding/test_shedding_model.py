@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.cycle import Node
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FramePose
 from loomopt.jobs.shedding.scene import Frame
 from loomopt.maths import systems
-from loomopt.mechanisms.cam_laws import LAWS
-from loomopt.mechanisms.cam_motion import Spline
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms.cam_laws import LAWS
+from loomopt.physics.mechanisms.cam_motion import Spline
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 JOB = registry.of(FULL)

@@ -10,7 +10,7 @@ import pytest
 import loomopt as lo
 from loomopt import designs
 from loomopt.jobs import registry
-from loomopt.mechanisms.cam_spline import cycloid_like
+from loomopt.physics.mechanisms.cam_spline import cycloid_like
 
 SCENE = lo.load("shedding")
 

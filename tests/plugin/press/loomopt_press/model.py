@@ -4,13 +4,13 @@ import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from loomopt.balance import Given
-from loomopt.cycle import Node
-from loomopt.effects.kinds import Effect, Motion
 from loomopt.maths.systems import Maths, Number
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Effect, Motion
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 from loomopt.program.kinematics import Group, Kinematics
 from loomopt.program.model import Instant, JobModel, Quantity, Row
-from loomopt.tolerances import ASSEMBLY_MARGIN
 
 TOP, BOTTOM = "top dead centre", "bottom dead centre"
 LONGER = "assembly: crank < rod"

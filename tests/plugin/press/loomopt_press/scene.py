@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import Shown
-from loomopt.effects import found
+from loomopt.physics.effects import declared
+from loomopt.physics.schema import Figure, Table, Target
 from loomopt.scene_schema import SceneSchema
 from loomopt.scenes import Scene
-from loomopt.schema import Figure, Table, Target
 from loomopt_press.model import LONGER
 
 
@@ -54,7 +54,7 @@ SCHEMA = SceneSchema(
     title="slider-crank press: the least crank torque",
     operation=Operation,
     mechanism=Mechanism,
-    effects=found.of("loomopt_press.effects"),
+    effects=declared.of("loomopt_press.effects"),
     variables={"crank": "length", "rod": "length"},
     own_figures={figure.name: figure for figure in FIGURES},
     targets={"torque": Target("torque", "the least peak crank torque", Table, needs_effects=("forming",))},

@@ -1,9 +1,9 @@
 """Inertia of the slide and its die: output term m q¨."""
 
 from loomopt.base.quantities import PositiveMass
-from loomopt.effects.kinds import Load, Motion
 from loomopt.maths.systems import Maths, Number
-from loomopt.schema import Table, Values
+from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.physics.schema import Table, Values
 
 
 class Own(Table):

@@ -3,10 +3,10 @@
 from typing import Annotated
 
 from loomopt.base.quantities import Angle, Quantity
-from loomopt.effects.beatup import ReedPose
-from loomopt.effects.kinds import Load
 from loomopt.maths.systems import Maths, Number
-from loomopt.schema import Table, Values
+from loomopt.physics.effects.beatup import ReedPose
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.schema import Table, Values
 
 
 class Own(Table):

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from loomopt import balance
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.physics import balance
 from loomopt.picture import effect_equations
 from loomopt.picture.drawing import Label, along, place
 from loomopt.picture.equations import Equation, Symbols, equation, symbol

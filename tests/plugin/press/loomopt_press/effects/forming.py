@@ -1,10 +1,10 @@
 """Forming of the sheet: output term F from where the slide meets it, `height` above its lowest position."""
 
 from loomopt.base.quantities import Force, PositiveLength
-from loomopt.effects.kinds import Load, Motion
 from loomopt.maths.systems import Maths, Number
-from loomopt.mechanisms.dyad import heron
-from loomopt.schema import Table, Values
+from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.physics.mechanisms.dyad import heron
+from loomopt.physics.schema import Table, Values
 
 
 class Own(Table):

@@ -1,0 +1,172 @@
+"""Torsion of the rocking shaft: the reed swings on a spring and a damper, z = ψ_r − ψ away from the rocker.
+
+    J z¨ + c z˙ + k z = M_R − J ψ¨        in the periodic steady state, at constant speed; linear
+    output term k z + c z˙ instead of the terms of what moves with the reed, whose inertia is J
+
+Carried: reed, counterweight and the resistance of the cloth, M_R(φ), which does not see the twist. The rocker's own
+inertia stays with ψ.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from loomopt.base.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
+from loomopt.maths.systems import FLOAT, Maths, Number
+from loomopt.physics.effects.kinds import Clash, Peak, State
+from loomopt.physics.schema import Figure, Table, Values
+
+if TYPE_CHECKING:
+    from loomopt.physics.effects.kinds import Carried, Motion, Oscillator, Written
+    from loomopt.physics.motion import harmonic
+
+NAME = "shaft_torsion"
+TWIST, TORQUE = f"{NAME}.twist", f"{NAME}.torque"
+QUICKEST = 200
+"""Natural frequency over the crank's speed from which on the shaft is as good as rigid, and ever more samples of a turn
+would show no more than the ringing of a pulse whose corners are assumed."""
+SAMPLES = 24
+"""Samples of one swing of the shaft's own: extremes are refined from them to rounding."""
+
+MOST_DECAYS = 2000
+"""Decays in the time of a radian of the crank beyond which no more samples are taken: what is left of the corners of a
+pulse has faded within 0.1 degrees there."""
+
+
+class Own(Table):
+    """Values of the shaft between rocker and reed."""
+
+    stiffness: PositiveRotaryStiffness = Field(description="torque that twists the reed against the rocker by a radian")
+    damping: PositiveRotaryDamping = Field(
+        description="torque against the speed of the twist; without any the ringing would never end"
+    )
+
+
+def fixed(given: Values, own: Values, carried: "Carried") -> Mapping[str, str]:
+    """Return how the shaft is damped, and how many harmonics its motion needs. Raises UnsteadyError."""
+    from loomopt.physics.effects.kinds import UnsteadyError
+    from loomopt.physics.motion import harmonic
+
+    natural = (own["stiffness"] / carried.inertia) ** 0.5
+    if natural > QUICKEST * given["speed"]:
+        raise UnsteadyError(
+            f"the shaft swings {natural / given['speed']:.4g} times a turn by itself, more than {QUICKEST}: it is as "
+            "good as rigid",
+            "Use the rigid model: take the table out",
+        )
+    try:
+        count = harmonic.enough(carried.weigh, FLOAT, int(own.get("harmonics", harmonic.FEWEST)))
+    except ArithmeticError:
+        raise UnsteadyError(
+            f"the rocker's acceleration is too sharp for {harmonic.MOST} harmonics",
+            "Keep the mechanism farther from where it jams, or use the rigid model",
+        ) from None
+    damped = harmonic.regime(carried.inertia, own["damping"], own["stiffness"])
+    return {"regime": damped, "harmonics": str(count)}
+
+
+def derived(maths: Maths, given: Values, own: Values, carried: "Carried") -> dict[str, Number]:
+    """Return the oscillator's constants, and the harmonics of z, rad, and of k z + c z˙, N·m."""
+    from loomopt.physics.motion import harmonic
+
+    regime, count = own["regime"], int(own["harmonics"])
+    constants = harmonic.constants(maths, regime, carried.inertia, own["damping"], own["stiffness"], given["speed"])
+    force = harmonic.harmonics(maths, count, carried.weigh)
+    twist, torque = harmonic.answered(harmonic.Oscillator(maths, regime, constants), force)
+    return harmonic.named(NAME, constants) | harmonic.named(TWIST, twist) | harmonic.named(TORQUE, torque)
+
+
+def oscillator(maths: Maths, given: Values, own: Values) -> "Oscillator":
+    """Return the shaft with what moves on it."""
+    from loomopt.physics.motion import harmonic
+
+    return harmonic.Oscillator(maths, own["regime"], harmonic.read_constants(NAME, given))
+
+
+def _series(name: str, given: Values, own: Values) -> "harmonic.Series":
+    from loomopt.physics.motion import harmonic
+
+    return harmonic.read_series(name, given, int(own["harmonics"]))
+
+
+def force(maths: Maths, pose: "Motion", given: Values, own: Values, reply: tuple[Number, Number]) -> Number:
+    """Return k z + c z˙, N·m."""
+    return _series(TORQUE, given, own).at(maths, pose.phi) + own["stiffness"] * reply[0] + own["damping"] * reply[1]
+
+
+def coordinate(maths: Maths, pose: "Motion", given: Values, own: Values, reply: tuple[Number, Number]) -> Number:
+    """Return z, rad."""
+    return _series(TWIST, given, own).at(maths, pose.phi) + reply[0]
+
+
+def samples(given: Values, own: Values) -> float:
+    """Return how many samples of a turn show every swing of the shaft, or what decays faster than it would swing."""
+    square = given[f"{NAME}.stiffness"] / given[f"{NAME}.inertia"]
+    half = given[f"{NAME}.damping"] / given[f"{NAME}.inertia"] / 2
+    rate = half + (half**2 - square) ** 0.5 if half**2 > square else square**0.5
+    return float(SAMPLES * min(rate / given["speed"], MOST_DECAYS))
+
+
+def motion(written: "Written", own: Values) -> tuple[Number, Number]:
+    """Return both sides of J z¨ + c z˙ + k z = F."""
+    z, z1, z2 = written.coordinate
+    omega = written.omega
+    return written.inertia * omega**2 * z2 + own["damping"] * omega * z1 + own["stiffness"] * z, written.force
+
+
+def term(written: "Written", own: Values) -> Number:
+    """Return k z + c z˙."""
+    return own["stiffness"] * written.coordinate[0] + own["damping"] * written.omega * written.coordinate[1]
+
+
+def rests(own: Values) -> str:
+    """Say how the steady state is summed."""
+    from loomopt.physics.motion import harmonic
+
+    return (
+        f"the steady state of {NAME} is summed from {own['harmonics']} harmonics of the rocker's motion; that those "
+        f"beyond are below {harmonic.TAIL:g} of the largest is measured at this design, not proven or varied"
+    )
+
+
+EFFECT = State(
+    name=NAME,
+    summary="reed on a rocking shaft that twists",
+    own=Own,
+    letters={"stiffness": "k", "damping": "c"},
+    rank=90,
+    needs=("operation.speed",),
+    beside=("inertia",),
+    clashes=(
+        Clash("gravity", "the weight would act on the reed, which the shaft's steady state does not carry yet"),
+        Clash("bearing_friction", "it would act on the rocker or the reed, which no source tells"),
+        Clash("speed_fluctuation", "the steady state of the shaft is that of a constant speed"),
+    ),
+    carries=("inertia", "counterweight_inertia", "resistance"),
+    derived=derived,
+    oscillator=oscillator,
+    fixed=fixed,
+    samples=samples,
+    force=force,
+    coordinate=coordinate,
+    motion=motion,
+    term=term,
+    between=("psi_r", "psi"),
+    rests=rests,
+    figures=(
+        Figure("shaft_peak", "torque", "peak |reed torque| over the cycle", sides=("max",)),
+        Figure("twist_peak", "angle", "peak |twist| of the reed against the rocker", sides=("max",)),
+        Figure("reed_front", "angle", "least angle of the reed itself, nearest to the fell", sides=("min",)),
+    ),
+    peaks={
+        "shaft_peak": Peak(lambda at: at.force()),
+        "twist_peak": Peak(lambda at: at.coordinate()),
+        "reed_front": Peak(lambda at: at.coordinate() - at.pose.q, least=True),
+    },
+    columns={
+        "psi_r [rad]": lambda at: at.coordinate() - at.pose.q,
+        "twist [rad]": lambda at: at.coordinate(),
+    },
+    examples=({"stiffness": "2 MN*m/rad", "damping": "45 N*m*s/rad"},),
+)

@@ -1,0 +1,416 @@
+"""What an effect may declare. Every job honours every kind, or refuses it by name; nothing else knows an effect's name.
+
+An effect that is absent from a scene is absent from its equations.
+"""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+
+from loomopt.base.units import Shown
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.schema import Figure, Table, Values
+
+if TYPE_CHECKING:
+    # REMOVED
+    from loomopt.physics.motion.flight import Cam, Course
+    from loomopt.physics.motion.free import Body
+    from loomopt.physics.motion.turning import Turning
+
+
+class Motion:
+    """What every pose knows: q, q1, q2 (output and its derivatives with respect to φ) give q˙ and q¨."""
+
+    phi: Number
+    q: Number
+    q1: Number
+    q2: Number
+    omega: Number
+    omega_dot: Number
+
+    @property
+    def velocity(self) -> Number:
+        """q˙ = q' ω."""
+        return self.q1 * self.omega
+
+    @property
+    def acceleration(self) -> Number:
+        """q¨ = q'' ω² + q' ω̇; the second term only where the speed changes."""
+        steady = self.q2 * self.omega**2
+        return steady if self.omega_dot is None else steady + self.q1 * self.omega_dot
+
+
+Pose = TypeVar("Pose", contravariant=True)
+Own = TypeVar("Own", bound=Table)
+Corners = Callable[[Maths, Values, Values], tuple[Number, ...]]
+Place = tuple[str, float]
+"""A switch by name, and its value on the pieces that are meant."""
+
+
+class Force(Protocol[Pose]):
+    """force(maths, pose, given, own, switch): see `Load`."""
+
+    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, switch: Number, /) -> Number:
+        """Return the term, N or N·m."""
+
+
+class Response(Protocol[Pose]):
+    """response(maths, oscillator, pose, given, own, switch): the closed-form answer to a load with corners."""
+
+    def __call__(
+        self, maths: Maths, oscillator: "Oscillator", pose: Pose, given: Values, own: Values, switch: Number, /
+    ) -> tuple[Number, Number]:
+        """Return z, rad or m, and z˙ in the periodic steady state."""
+
+
+class Reading(Protocol[Pose]):
+    """reading(maths, pose, given, own): a value read from the solved motion at one instant."""
+
+    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, /) -> Number:
+        """Return the value, SI."""
+
+
+def constant_switch(angle: float, corners: tuple[float, ...]) -> float:
+    """Return the switch of what has no corners: it is never read."""
+    return 0.0
+
+
+def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
+    """Return no places: what the effect adds is known all over the cycle."""
+    return ()
+
+
+class Clash(NamedTuple):
+    """Another effect that one cannot stand beside, and why; key, words: only while that key of its table says so."""
+
+    effect: str
+    why: str
+    key: str = ""
+    words: tuple[str, ...] = ()
+
+
+class Demand(NamedTuple):
+    """What an effect's row must keep: a value, SI, or that of a key of its table; sign +1 at most, −1 at least, 0 ="""
+
+    row: str
+    sign: int
+    value: float | str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Effect:
+    """What all kinds declare.
+
+    name: the table in a scene that turns it on; an instance of one that there may be many of is "kind.instance".
+    own: model of that table's values. rank: its place among the job's effects, the lowest first.
+    reads: design variables it depends on beside the mechanism's lengths, and events of the motion that it calls in.
+    needs: scene keys that must be given; beside: effects that must be on; clashes: those that must not.
+    examples: tables it may have, as a scene writes them, for tests and templates.
+    letters: keys of its table → their symbols in equations, a key's own name without one.
+    figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
+    many: whether the table holds one table for each of several instances; instance: which of them this is.
+    """
+
+    name: str
+    summary: str
+    own: type[Table]
+    rank: int = 100
+    reads: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    clashes: tuple[Clash, ...] = ()
+    examples: tuple[Mapping[str, str], ...] = ({},)
+    letters: Mapping[str, str] = field(default_factory=dict)
+    figures: tuple[Figure, ...] = ()
+    margins: Mapping[str, str] = field(default_factory=dict)
+    many: bool = False
+    instance: str = ""
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Where its table stands inside [effects]: under its name; of an instance under that of its kind first."""
+        return (self.name.removesuffix(f".{self.instance}"), self.instance) if self.instance else (self.name,)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Load(Effect, Generic[Pose]):
+    """An algebraic effect: one term of the force the output needs, or of the crank torque inside the drive.
+
+    acts: "output" (times q' it reaches the crank) or "drive" (it reaches the crank only).
+    force(maths, pose, given, own, switch): the term, N or N·m. `given` holds the scene's numbers, `own` its table's.
+    corners(maths, given, own): crank angles in rad where the formula changes; switch(angle, corners): which formula
+    holds at a crank angle inside a piece, as a number the force is handed.
+    response: what an oscillator that carries the load makes of it; one with corners cannot be carried without.
+    known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
+    moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
+    symbol: what its column of the curves is called, its name without one.
+    told: switch → where that formula holds, in words for its equation; by its corners without them.
+    """
+
+    acts: Literal["output", "drive"]
+    force: Force[Pose]
+    corners: Corners | None = None
+    switch: Callable[[float, tuple[float, ...]], float] = constant_switch
+    known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
+    moved: Callable[[Values, Values], Number] | None = None
+    response: Response[Pose] | None = None
+    symbol: str = ""
+    told: Mapping[float, str] = field(default_factory=dict)
+
+
+class Axis(NamedTuple):
+    """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
+
+    name: str
+    key: str
+
+
+def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
+    """Return nothing: no number of the effect comes in sizes."""
+    return {}
+
+
+def nothing_remarked(given: Values, own: Values, shown: Shown) -> str:
+    """Return nothing: the figures stand for themselves."""
+    return ""
+
+
+def nothing_explained(
+    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Any, clash: Iterable[str], shown: Shown
+) -> str:
+    """Return nothing: physics has nothing general to say."""
+    return ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Check(Effect, Generic[Pose]):
+    """An effect that takes no part in the balance: figures and rows read from the solved motion, and their demands.
+
+    quantities: name → value(maths, pose, given, own) over the cycle; the figure is the largest |value|.
+    rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
+    on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
+    sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
+    remark(given, own, shown): what to know beside its figures, "" for nothing, in the reader's units.
+    explain(known, bounds, own, clash, shown): what physics says of why the limits `clash` do, in the reader's units.
+    """
+
+    quantities: Mapping[str, Reading[Pose]] = field(default_factory=dict)
+    rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
+    demands: tuple[Demand, ...] = ()
+    least: str = ""
+    axes: tuple[Axis, ...] = ()
+    sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
+    remark: Callable[[Values, Values, Shown], str] = nothing_remarked
+    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str], Shown], str] = (
+        nothing_explained
+    )
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for what no job could keep."""
+        sides = {figure.name: figure.sides for figure in self.figures}
+        faults = [f"quantity {name} is no figure" for name in self.quantities if name not in sides]
+        faults += [f"quantity {name} has no least" for name in self.quantities if "min" in sides.get(name, ())]
+        for demand in self.demands:
+            if demand.row in self.quantities and demand.sign <= 0:
+                faults.append(f"quantity {demand.row} has no least")
+            if demand.row not in {*self.quantities, *self.rows}:
+                faults.append(f"{demand.row} is neither a quantity nor a row")
+            if isinstance(demand.value, str) and demand.value not in self.own.model_fields:
+                faults.append(f"{demand.value} is no key of the table")
+        if self.least and self.least not in self.rows:
+            faults.append(f"{self.least} is no row")
+        if faults:
+            raise ValueError(f"effect {self.name}: {faults[0]}")
+
+
+class Peak(NamedTuple):
+    """A figure of a state: the largest |value| over the cycle, or the least value, of what is read."""
+
+    read: "Callable[[Moved], Number]"
+    least: bool = False
+
+
+def no_oscillator(maths: Maths, given: Values, own: Values) -> "Oscillator":
+    """Raise LookupError: no load with corners is carried."""
+    raise LookupError("the state answers no load with corners")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State(Effect):
+    """One linear coordinate between the output and the loads that move with it; eliminated before a formula reads it.
+
+    carries: names of the loads that move with the coordinate: they leave the output force, and `force` stands there.
+    derived(maths, given, own, carried): values that follow from the scene's numbers, in the steady state.
+    force, coordinate: Q's term, N or N·m, and z itself, of derived values. oscillator(maths, given, own): what loads
+    with corners answer, of derived values too.
+    fixed(given, own, carried): words that choose formulas at a design, in floats; `own` has those of its neighbours, if
+    any, and what serves them is kept. Raises UnsteadyError.
+    samples(given, own): of one turn, from which extremes are refined.
+    peaks: figure → what it is of; columns: of the curves, with unit → what is read.
+    motion(written, own): both sides of its equation of motion; term(written, own): `force` in the same symbols.
+    between: the symbols that z is the difference of, what moves first. rests(own): what neither proofs nor studies of
+    accuracy cover of it, a sentence without its full stop.
+    """
+
+    carries: tuple[str, ...]
+    derived: "Callable[[Maths, Values, Values, Carried], Mapping[str, Number]]"
+    force: "Replied"
+    coordinate: "Replied"
+    motion: "Callable[[Written, Values], tuple[Number, Number]]"
+    term: "Callable[[Written, Values], Number]"
+    between: tuple[str, str]
+    rests: Callable[[Values], str]
+    oscillator: "Callable[[Maths, Values, Values], Oscillator]" = no_oscillator
+    fixed: "Callable[[Values, Values, Carried], Mapping[str, str]]" = lambda given, own, carried: {}
+    samples: Callable[[Values, Values], float] = lambda given, own: 0.0
+    peaks: Mapping[str, Peak] = field(default_factory=dict)
+    columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
+    acts: Literal["output"] = "output"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Speed(Effect):
+    """The crank's own motion: its speed changes over the turn as the motor gives what the crank takes.
+
+    motor(maths, omega, given, own): the motor's torque, N·m, at a speed, rad/s; given["no_load_speed"] is the one that
+    follows from the mean speed over time. flywheel(given, own): inertia, kg·m², of all that turns with the crank.
+    rows: name → value(turning, given, own), SI, of the motion that is solved; most: the one that is the motor's largest
+    torque.
+    """
+
+    motor: Callable[[Maths, Number, Values, Values], Number]
+    flywheel: Callable[[Values, Values], Number]
+    rows: Mapping[str, Callable[["Turning", Values, Values], float]] = field(default_factory=dict)
+    most: str = ""
+
+
+class Rule(NamedTuple):
+    """One line of an effect's own equations: what it is of; left sign right, "=", "<=" or ">="; words that follow."""
+
+    name: str
+    left: Number
+    sign: str
+    right: Number
+    where: str = ""
+
+
+class Terms(NamedTuple):
+    """Symbols of an event's equations: symbol(name); the output's terms in all, what of them is friction, the mass."""
+
+    symbol: Callable[[str], Number]
+    total: Number
+    friction: Number
+    mass: Number
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Event(Effect):
+    """What parts and meets again: contact of the output that is lost. Followed on a given design, never in a program.
+
+    force: the quantity that is the force of contact; least: the one that is largest where that is least.
+    free(given, q, velocity, acceleration, direction): the pose of the output on its own, as its loads read it; one
+    that reads more cannot be followed. direction: of its motion, between −1 and 1 at rest.
+    places(given): event of the motion that loads call in → the output there, m or rad.
+    follow(body, cam, own): its course from contact at crank angle 0 on; read(course): figures, where contact is lost.
+    rules(terms): its equation of motion and what holds when it meets the mechanism again.
+    """
+
+    force: str
+    least: str
+    free: Callable[[Values, float, float, float, float], Motion]
+    places: Callable[[Values], Mapping[str, float]]
+    follow: "Callable[[Body, Cam, Values], Course]"
+    read: "Callable[[Course], Mapping[str, float | None]]"
+    rules: Callable[[Terms], Sequence[Rule]]
+
+    def rests(self, own: Values) -> str:
+        """Return what of it no proof and no study of accuracy covers."""
+        return f"{self.name}, which is simulated ({', '.join(figure.name for figure in self.figures)})"
+
+
+EVALUATED = (Speed,)
+"""Kinds with which a design is evaluated and simulated, but neither sought nor proven."""
+
+
+@functools.cache
+def instance(effect: Effect, name: str) -> Effect:
+    """Return one instance of an effect that there may be many of: the same object for the same name."""
+    return replace(effect, name=f"{effect.name}.{name}", instance=name)
+
+
+def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:
+    """Return effects by name, in the order of their ranks."""
+    return {effect.name: effect for effect in sorted(effects, key=lambda effect: (effect.rank, effect.name))}
+
+
+class Oscillator(Protocol):
+    """What a state is made of, as `motion/harmonic.py` has it: what a load with corners makes of it is read here."""
+
+    @property
+    def turn(self) -> Number:
+        """Time of one turn, s."""
+
+    def steady(self, frequency: Number, /) -> tuple[Number, Number]:
+        """Return A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
+
+    def repeated(self, position: Number, rate: Number, /) -> tuple[Number, Number]:
+        """Return z and z˙ just after a kick of both, once a turn for ever."""
+
+    def ringing(self, after: tuple[Number, Number], elapsed: Number, /) -> tuple[Number, Number]:
+        """Return z and z˙ of the free vibration that begins with `after`; elapsed: time since then, s."""
+
+
+class Carried(NamedTuple):
+    """What moves with a state's coordinate.
+
+    inertia: of it all, kg·m² or kg; weigh(angles, weights): sums Σ weights[k][i] F(angles[i]) at crank angles, rad, of
+    the terms F without corners.
+    """
+
+    inertia: Number
+    weigh: Callable[[Sequence[Number], Sequence[Sequence[Number]]], list[Number]]
+
+
+class UnsteadyError(ArithmeticError):
+    """There is no steady state to trust: the problem, and the remedy, in words."""
+
+    def __init__(self, problem: str, remedy: str) -> None:
+        super().__init__(problem)
+        self.problem, self.remedy = problem, remedy
+
+
+class Moved(NamedTuple):
+    """What is read of a state at one instant; force(): Q, N or N·m; coordinate(): z, the reply of corners included."""
+
+    pose: Number
+    coordinate: Callable[[], Number]
+    force: Callable[[], Number]
+
+
+class Written(NamedTuple):
+    """Symbols in which a state writes its equation of motion: z, z', z'' with respect to φ, and what it answers."""
+
+    coordinate: tuple[Number, Number, Number]
+    omega: Number
+    inertia: Number
+    force: Number
+
+
+class Replied(Protocol):
+    """formula(maths, pose, given, own, reply): of derived values; reply: z and z˙ in answer to loads with corners."""
+
+    def __call__(
+        self, maths: Maths, pose: Number, given: Values, own: Values, reply: tuple[Number, Number], /
+    ) -> Number:
+        """Return the value, SI."""
+
+
+def owned(effect: Effect, key: str) -> str:
+    """Return the full name of a number of an effect's table, unique in a scene."""
+    return f"{effect.name}.{key}"
+
+
+def label(effect: Effect, key: str) -> str:
+    """Return what a designer calls a number of an effect's table; of an instance the label names that too."""
+    return f"{effect.instance}.{key}" if effect.instance else key

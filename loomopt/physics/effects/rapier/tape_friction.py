@@ -1,0 +1,53 @@
+"""Coulomb friction of the tape in its guides.
+
+Output term F sgn S˙: against the motion, so the drive must supply it. It changes its sign wherever the head turns.
+"""
+
+import math
+
+from pydantic import Field
+
+from loomopt.base.quantities import Force
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.physics.schema import Table, Values
+
+
+class Own(Table):
+    """Values of the guides."""
+
+    force: Force = Field(description="friction of tape and head in their guides")
+
+
+def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+    """Return the crank angles where the head turns, rad, the first of them onto its way out."""
+    return tuple(given["turns"])
+
+
+def direction(angle: float, corners: tuple[float, ...]) -> float:
+    """Return +1 where the head moves outward, −1 where it returns, 0 for a head that never turns."""
+    if not corners:
+        return 0.0
+    turn, first = 2 * math.pi, corners[0]
+    passed = sum((corner - first) % turn <= (angle - first) % turn for corner in corners)
+    return 1.0 if passed % 2 else -1.0
+
+
+def force(maths: Maths, pose: Motion, given: Values, own: Values, switch: Number) -> Number:
+    """Return F sgn S˙, N."""
+    return own["force"] * switch
+
+
+EFFECT = Load(
+    name="tape_friction",
+    summary="friction of the tape in its guides",
+    own=Own,
+    rank=20,
+    acts="output",
+    force=force,
+    reads=("turns",),
+    corners=corners,
+    told={1.0: "for S' > 0", -1.0: "for S' < 0"},
+    switch=direction,
+    examples=({"force": "15 N"},),
+)

@@ -1,0 +1,57 @@
+"""Stretch of the tape under the head's inertia at the hand-over: how far the head runs beyond the stroke.
+
+head_overrun = −m S''(φ_stroke) ω²/k, quasi-static: it holds while the head on its tape swings far faster than the shaft
+turns, sqrt(k/m) >= 20 ω. A figure alone: the stretch has no part in the balance.
+"""
+
+import math
+
+from pydantic import Field
+
+from loomopt.base.quantities import PositiveStiffness
+from loomopt.base.units import Shown
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Check, Motion
+from loomopt.physics.schema import Figure, Table, Values
+
+MASS, ACCELERATION = "head_inertia.mass", "S''_stroke"
+"""What it reads of the head: its mass, kg, and its acceleration at the hand-over, m/rad²."""
+SLOW = 20.0
+"""Least natural frequency of the head on its tape over the shaft's speed: below it the stretch lags behind."""
+
+
+class Own(Table):
+    """Values of the tape."""
+
+    stiffness: PositiveStiffness = Field(description="stiffness of the tape between wheel and head")
+
+
+def head_overrun(maths: Maths, given: Values, own: Values) -> Number:
+    """Return how far the head goes beyond its stroke, m."""
+    return -given[MASS] * given[ACCELERATION] * given["speed"] ** 2 / own["stiffness"]
+
+
+def remark(given: Values, own: Values, shown: Shown) -> str:
+    """Say where the stretch is no longer quasi-static."""
+    natural = math.sqrt(own["stiffness"] / given[MASS])
+    if natural >= SLOW * given["speed"]:
+        return ""
+    return (
+        f"the head on its tape swings at {shown(natural, 'angular speed', 4)}, less than {SLOW:g} times the shaft's "
+        "speed: head_overrun, which takes the stretch for quasi-static, is too rough. What helps: a stiffer tape"
+    )
+
+
+EFFECT: Check[Motion] = Check(
+    name="tape_stretch",
+    summary="stretch of the tape at the hand-over",
+    own=Own,
+    rank=30,
+    reads=(ACCELERATION,),
+    needs=("operation.speed",),
+    beside=("head_inertia",),
+    rows={"head_overrun": head_overrun},
+    figures=(Figure("head_overrun", "length", "how far the head runs beyond its stroke", sides=("max",)),),
+    remark=remark,
+    examples=({"stiffness": "100 kN/m"},),
+)

@@ -1,0 +1,35 @@
+"""Coulomb friction of the heald frame in its guides: output term F sgn X˙ [Qiu21, eq 4].
+
+It jumps where the frame starts and stops. In a dwell it is any value in [−F, F]: `pose.worst` says which end is meant,
+−1 for the least cam force, by which contact is judged, +1 for the largest.
+"""
+
+from pydantic import Field
+
+from loomopt.base.quantities import Force
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.shedding import FramePose
+from loomopt.physics.schema import Table, Values
+
+
+class Own(Table):
+    """Values of the guides."""
+
+    F: Force = Field(description="Coulomb friction of the frame in its guides")
+
+
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return F sgn X˙, N; in a dwell its worst value."""
+    return own["F"] * pose.direction
+
+
+EFFECT = Load(
+    name="dry_friction",
+    summary="Coulomb friction of the frame in its guides",
+    own=Own,
+    rank=50,
+    acts="output",
+    force=force,
+    examples=({"F": "20 N"},),
+)

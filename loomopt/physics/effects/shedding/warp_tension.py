@@ -1,0 +1,91 @@
+"""Pull of the warp on the heald frame: output term −T, T positive downward [Qiu21, eq 4 and 8].
+
+T is T1 with the shed open upward (X = 0) and −T2 with it open downward. Between them, by `shape`:
+    linear   in proportion to the shed: T1 (1 − 2X/h) above the middle, −T2 (2X/h − 1) below; a corner where
+             X = h/2, the event half_open
+    step     the cubic STEP of eq 8 over the rise and over the return
+    levels   nothing is said: T is T1 and −T2 in the dwells, and contact is judged there only
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from loomopt.base.quantities import Force
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Load, Place
+from loomopt.physics.effects.shedding import FramePose
+from loomopt.physics.schema import Table, Values
+
+TURN = 6.283185307179586
+
+
+class Own(Table):
+    """Values of the warp."""
+
+    T1: Force = Field(description="pull of the warp with the shed open upward")
+    T2: Force = Field(description="pull of the warp with the shed open downward")
+    shape: Literal["levels", "linear", "step"] = Field("linear", description="how the one pull becomes the other")
+
+
+def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+    """Return the cam angles where the shed is half open, rad, on the rise and on the return; none where none counts."""
+    return tuple(given["half_open"]) if own["shape"] == "linear" else ()
+
+
+def past_middle(angle: float, corners: tuple[float, ...]) -> float:
+    """Return 1 between the angles where the shed is half open, 0 outside and without any."""
+    return float(corners[0] <= angle % TURN < corners[1]) if corners else 0.0
+
+
+def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
+    """Return the dwells where nothing is said of the moves."""
+    return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" else ()
+
+
+def linear(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+    """Return −T, N, in proportion to the shed; switch: 1 past the middle."""
+    return (2 * pose.lowered - 1) * maths.choose(switch, (own["T1"], own["T2"]))
+
+
+def step(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+    """Return −T, N, by the cubic STEP of the law's argument u."""
+    return (own["T1"] + own["T2"]) * pose.u**2 * (3 - 2 * pose.u) - own["T1"]
+
+
+def levels(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
+    """Return −T, N, in the dwells; 0 stands for what is not known between them."""
+    return maths.choose(pose.segment, (0, own["T2"], 0, -own["T1"]))
+
+
+SHAPES: dict[str, Callable[[Maths, FramePose, Values, Number], Number]] = {
+    "linear": linear,
+    "step": step,
+    "levels": levels,
+}
+
+
+def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return −T, N, by the shape the scene names."""
+    return SHAPES[own["shape"]](maths, pose, own, switch)
+
+
+EFFECT = Load(
+    name="warp_tension",
+    summary="pull of the warp on the heald frame",
+    own=Own,
+    rank=20,
+    acts="output",
+    force=force,
+    reads=("half_open",),
+    corners=corners,
+    told={0.0: "for 0 <= X <= travel/2", 1.0: "for travel/2 <= X <= travel"},
+    switch=past_middle,
+    known_in=known_in,
+    examples=(
+        {"T1": "124.545 N", "T2": "83.03 N", "shape": "linear"},
+        {"T1": "124.545 N", "T2": "83.03 N", "shape": "step"},
+        {"T1": "124.545 N", "T2": "83.03 N", "shape": "levels"},
+    ),
+)
