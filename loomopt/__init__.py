@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from loomopt.base.errors import BadInput
     from loomopt.design_study import DesignStudy
     from loomopt.effects_study import EffectsStudy
-    from loomopt.scenes import Scene
+    from loomopt.scene.scene import Scene
     from loomopt.solving.proof import Proofs
 
 __version__ = "0.1.0"
@@ -22,7 +22,7 @@ _HOMES = {
     "EffectsStudy": "loomopt.effects_study",
     "Evaluation": "loomopt.api",
     "Proofs": "loomopt.solving.proof",
-    "Scene": "loomopt.scenes",
+    "Scene": "loomopt.scene.scene",
     "effects": "loomopt.api",
     "evaluate": "loomopt.api",
     "load": "loomopt.api",

@@ -4,13 +4,14 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from loomopt import designs, results
+from loomopt import results
 from loomopt.base.refusals import refusal
-from loomopt.designs import Given as Design
 from loomopt.jobs.registry import load, scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.results import Answer, Evaluation
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.designs import Given as Design
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
 
@@ -230,7 +231,7 @@ def _design(given: Design | solution.Evaluation | None, scene: Scene) -> dict[st
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
     if isinstance(given, solution.Evaluation):
         if given.scene:
-            from loomopt import answers
+            from loomopt.scene import answers
 
             answers.check_job(given.scene.job, scene, "<answer>")
         given = given.design

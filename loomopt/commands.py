@@ -10,8 +10,8 @@ from loomopt.base.errors import BadInput
 from loomopt.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
 
 if TYPE_CHECKING:
-    from loomopt.designs import Design as DesignGiven
-    from loomopt.scenes import Scene
+    from loomopt.scene.designs import Design as DesignGiven
+    from loomopt.scene.scene import Scene
     from loomopt.solving.solution import Evaluation
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
@@ -31,8 +31,8 @@ Target = Annotated[
 
 def remarked(scene: "Scene", design: "DesignGiven") -> None:
     """Say on stderr what a reader of a design's figures should know."""
-    from loomopt import designs
     from loomopt.jobs import registry
+    from loomopt.scene import designs
 
     for text in registry.of(scene).views.remarks(scene, designs.flat(design)):
         remark(f"Remark: {text}.")
@@ -47,7 +47,8 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt import entry_points, packaged
+    from loomopt import entry_points
+    from loomopt.scene import packaged
     from loomopt.views import layout, listing
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()

@@ -11,7 +11,7 @@ from loomopt.base import arguments
 from loomopt.base.records import lazy
 from loomopt.base.refusals import refusal
 from loomopt.results import Answer, solved
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.studies import executors, runs, study_table, workers
 from loomopt.studies.findings import Findings, SceneStudy, counted
 from loomopt.studies.rows import Row, digest
@@ -144,6 +144,6 @@ def who(executor: Executor | workers.Making | None, count: int | None) -> Execut
 
 def told(study: SceneStudy) -> Mapping[str, object]:
     """Return what a store says of a study: what its key is made of, and the scene that makes it again."""
-    from loomopt.scene_document import copied
+    from loomopt.scene.document import copied
 
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import designs
 from loomopt.base import records
 from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine, solution
 from loomopt.solving.asked import check_numbers, target_name
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from loomopt.base.errors import BadInput, clean
 
 if TYPE_CHECKING:
-    from loomopt.scenes import Scene
+    from loomopt.scene.scene import Scene
 
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
@@ -125,8 +125,8 @@ def read_asked(
     if design is None:
         scene, given, name, status = changed(scene, sets, on, off), dict[str, float](), target, None
     else:
-        from loomopt import answers, designs
         from loomopt.base.errors import clean
+        from loomopt.scene import answers, designs
 
         handed = answers.read(design, scene)
         own = answers.changes(scene, handed.scene)

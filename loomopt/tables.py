@@ -5,14 +5,14 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from loomopt import designs
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.physics.effects.kinds import Event
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.provenance import provenance
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.provenance import provenance
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.solving.words import Words
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.base.quantities import exact, read
 from loomopt.base.units import SI_UNIT, QuantityError, parse_unit
+from loomopt.scene import packaged
 
 UNITS = {
     "length": "in",

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import loomopt as lo
-from loomopt import answers
+from loomopt.scene import answers
 from loomopt.views import outputs
 
 SCENE = lo.load("beatup")

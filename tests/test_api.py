@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.packaged import problems
+from loomopt.scene.packaged import problems
 from loomopt.solving import search, solution
 from loomopt.solving.certificate import certify
 

@@ -7,9 +7,9 @@ import os
 
 import pytest
 
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.jobs.registry import load, scene
+from loomopt.scene import packaged
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")

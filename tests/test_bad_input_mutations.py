@@ -7,11 +7,11 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs.registry import load, scene
-from loomopt.scenes import Scene
+from loomopt.scene import packaged
+from loomopt.scene.scene import Scene
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")

@@ -17,8 +17,8 @@ from loomopt.base.quantities import read
 from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
-from loomopt.packaged import problem_names
 from loomopt.physics.effects import declared
+from loomopt.scene.packaged import problem_names
 from loomopt.solving import search
 from loomopt.solving.certificate import certify
 

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.cli import run
+from loomopt.scene import packaged
 from loomopt.views import layout, scene_view, terminal
 
 ezdxf: Any = importlib.import_module("ezdxf")

@@ -8,10 +8,11 @@ import inch
 import pytest
 
 import loomopt as lo
-from loomopt import packaged, tables
+from loomopt import tables
 from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
 from loomopt.cli import run
 from loomopt.jobs import registry
+from loomopt.scene import packaged
 from loomopt.solving.words import Words
 from loomopt.views import layout, scene_view, terminal
 

@@ -68,7 +68,7 @@ def is_stopped(done):
 
 @pytest.mark.parametrize(
     "module",
-    ["loomopt.cli", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job", "loomopt.scenes",
+    ["loomopt.cli", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job", "loomopt.scene.scene",
      "numpy.linalg", "casadi", "numpy", "loomopt.solving.certificate", "rich.table", "loomopt.solving.engine"],
 )  # fmt: skip
 def test_ctrl_c_during_an_import_stops_cleanly(module):

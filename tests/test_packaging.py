@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 import loomopt
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
+from loomopt.scene import packaged
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from together import combined
 
-from loomopt import scenes
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Length, PositiveMass
 from loomopt.jobs import registry
@@ -17,7 +16,8 @@ from loomopt.physics.effects.beatup import inertia, rocker_inertia
 from loomopt.physics.effects.kinds import Clash, Load, label, owned, ranked
 from loomopt.physics.schema import Figure, Table
 from loomopt.program import numbers
-from loomopt.scene_tables import Bound, Limit
+from loomopt.scene import scene
+from loomopt.scene.tables import Bound, Limit
 
 BEATUP = load("beatup")
 
@@ -54,6 +54,9 @@ class Jobs:
     def names(self):
         return ("beatup",)
 
+    def check(self, scene):
+        pass
+
     def schema(self, job, document, effects):
         return self.known
 
@@ -67,7 +70,7 @@ def built(changes, *effects):
         return table
 
     document = merge(copy.deepcopy(dict(BEATUP.document)), changes)
-    return scenes.build(document, Jobs(*(effects or (MASS,))), "beatup.toml")
+    return scene.build(document, Jobs(*(effects or (MASS,))), "beatup.toml")
 
 
 TWO = {"rod": {"m": "1.5 kg", "at": "30 mm"}, "rocker": {"m": "800 g"}}

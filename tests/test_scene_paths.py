@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier.scene import match_table
-from loomopt.scene_paths import Paths
+from loomopt.scene import packaged
+from loomopt.scene.document import Paths
 
 SECRET = "password=correct-horse-battery"
 SHEDDING = packaged.problems()["shedding"].read_text(encoding="utf-8")

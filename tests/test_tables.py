@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt import provenance, tables
+from loomopt import tables
 from loomopt.base.units import factor, parse_unit
+from loomopt.scene import provenance
 from loomopt.views import outputs
 
 SCENE = lo.load("beatup")

@@ -20,8 +20,8 @@ from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.studied import Studied
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -44,6 +44,10 @@ class Job(abc.ABC):
     """Variables that only limits read, and only looser as they grow, wherever the program has another variable too."""
 
     # What every job says.
+
+    @abc.abstractmethod
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's machine is not one that this job can work on."""
 
     @abc.abstractmethod
     def model(self, scene: Scene, design: Mapping[str, float] | None = None) -> JobModel:

@@ -12,16 +12,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import entry_points, packaged
+from loomopt import entry_points
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
 from loomopt.jobs.base import Job
 from loomopt.physics.effects.kinds import Effect, ranked
-from loomopt.scene_document import read_document
-from loomopt.scene_paths import Paths
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene, build
+from loomopt.scene import packaged
+from loomopt.scene.document import Paths, read_document
+from loomopt.scene.scene import Scene, build
+from loomopt.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -118,6 +118,10 @@ class _Registered:
             if effect is not None:
                 schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
         return schema
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's machine is not one that its job can work on."""
+        of(scene).check(scene)
 
 
 def _brought(schema: SceneSchema, name: str) -> Effect | None:

@@ -9,8 +9,8 @@ from loomopt.physics.effects.kinds import Check, Load, Speed, State
 from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name, split
 from loomopt.program.drive import MOTOR, SPEED
 from loomopt.program.drive import POWER as PEAK_POWER
-from loomopt.scene_tables import Limit
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.tables import Limit
 
 EXTREMES = ("peak", "most", "least")
 """What of a curve may be marked: its largest magnitude, its largest and its least value."""

@@ -6,7 +6,7 @@ from loomopt.physics.cycle import TURN
 from loomopt.physics.motion.flight import Landing
 from loomopt.picture.panels import Panel
 from loomopt.program.parting import Parted
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 WIDE = 0.1
 """rad; a flight less wide has no mark of its own: hops after a landing."""

@@ -6,7 +6,7 @@ from loomopt.maths import systems
 from loomopt.physics.effects.kinds import Load
 from loomopt.program import states
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 MOST = 0.1
 """Share of the output's travel from which on a load can no longer be taken for a function of the crank angle."""

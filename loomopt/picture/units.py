@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from loomopt.base import units
 
 if TYPE_CHECKING:
-    from loomopt.scenes import Scene
+    from loomopt.scene.scene import Scene
 
 Unit = Literal["mm", "in"]
 """What a workshop measures in."""

@@ -19,7 +19,7 @@ from loomopt.program import drive
 from loomopt.program.instant import Instant, Row
 from loomopt.program.kinematics import Arcs, Group, Kinematics
 from loomopt.program.sampling import KEPT, Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 FLOATS = ("float", "numpy")
 """Number systems of float64."""

@@ -13,7 +13,7 @@ from loomopt.program import drive
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 Bounds = Mapping[str, tuple[float, float]]
 """Lower and upper bound of numbers by full name, SI."""

@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import ACCURACY, SAME_ANGLE
 from loomopt.program.curves import ANGLE, POWER, Columns, Rows, columns_at, load_name, rows, split
 from loomopt.program.free_loads import SAMPLES, Forms, UnfollowedError, body, forms, sizes
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 BEYOND = 1.01
 """Share of the largest sampled acceleration that no acceleration exceeds."""

@@ -7,7 +7,7 @@ from loomopt.base.records import Frozen
 from loomopt.maths.systems import Number
 
 if TYPE_CHECKING:
-    from loomopt.scenes import Scene
+    from loomopt.scene.scene import Scene
 
 
 class Crossing(NamedTuple):

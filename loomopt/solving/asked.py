@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.physics.effects.kinds import EVALUATED
 from loomopt.physics.tolerances import COARSEST, MOST_STARTS, TIGHTEST
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 GAP, SECONDS = 1e-3, 60.0
 """What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from loomopt.physics.tolerances import FARTHEST_SIZE, SAME_SIZE
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
 

@@ -12,7 +12,7 @@ from loomopt.nlp.point import Point, Settings
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.program.program import Program
 from loomopt.program.sampling import Tally, forget
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving import report
 from loomopt.solving.asked import Everywhere, check_everywhere, check_numbers, check_sought, target_name
 from loomopt.solving.solution import Clash, Evaluation, Solution

@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from loomopt import designs
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Shown
@@ -22,7 +21,8 @@ from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.program import states
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.scene import Scene
 from loomopt.solving.asked import check_sought, target_name
 from loomopt.solving.bounded import Boxes
 from loomopt.solving.solution import Solution

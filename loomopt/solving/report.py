@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from loomopt import designs
 from loomopt.jobs.base import Job
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.program import numbers
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies
 from loomopt.solving.verdict import Certificate
 from loomopt.solving.words import Words

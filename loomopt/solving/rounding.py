@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from loomopt.base.units import factor
 from loomopt.program import numbers
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.solving.words import Words
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from loomopt.base.records import freeze, lazy
-from loomopt.scene_document import copied
+from loomopt.scene.document import copied
 from loomopt.solving.verdict import Certificate, GlobalBound
 
 if TYPE_CHECKING:
-    from loomopt.scenes import Scene
+    from loomopt.scene.scene import Scene
     from loomopt.solving.proof import Proofs
 
 ADVICE = {

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from loomopt import provenance
 from loomopt.jobs import registry
 from loomopt.program import states
-from loomopt.scenes import Scene
+from loomopt.scene import provenance
+from loomopt.scene.scene import Scene
 from loomopt.solving.asked import check_sought
 from loomopt.studies import optima, readings
 from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import packaged, provenance
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scenes import Scene
+from loomopt.scene import packaged, provenance
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import references

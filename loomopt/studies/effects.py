@@ -10,15 +10,15 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import designs
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.provenance import versions
-from loomopt.scene_numbers import files
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.numbers import files
+from loomopt.scene.provenance import versions
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import OMITTED, check_numbers, target_name
 from loomopt.studies import effects_known

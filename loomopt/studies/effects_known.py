@@ -4,15 +4,15 @@ import shlex
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from loomopt import answers
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.physics.effects.declared import Fault, faults
 from loomopt.physics.effects.kinds import Effect, Event, Speed, State
 from loomopt.physics.schema import Table
-from loomopt.scene_document import looked_up, replaced
-from loomopt.scene_tables import effects as read
-from loomopt.scenes import Scene, build
+from loomopt.scene import answers
+from loomopt.scene.document import looked_up, replaced
+from loomopt.scene.scene import Scene, build
+from loomopt.scene.tables import effects as read
 
 YIELDING = (State, Speed, Event)
 """Kinds that yield to any other where both cannot be on together."""

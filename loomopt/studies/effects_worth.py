@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.program.program import Objective, Program
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.studies.rows import Row

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Solution
 from loomopt.studies.plan import Study, Task
 from loomopt.studies.rows import Row

@@ -14,10 +14,10 @@ from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import SI_UNIT, QuantityError
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scenes import Scene
+from loomopt.scene import numbers
+from loomopt.scene.scene import Scene
 from loomopt.solving.asked import check_numbers, check_sought, target_name
 from loomopt.solving.words import Words
-from loomopt.studies import ranges as texts
 from loomopt.studies.front_trade import POINTS, Trade
 
 FEWEST = 3
@@ -56,9 +56,9 @@ def trade(
     if stray:
         remedy = "Name one of them, or trade it."
         raise BadInput(f"{stray[0]} is none of both axes", key=stray[0], allowed=", ".join(axes), remedy=remedy)
-    allowed = f"a whole number from {FEWEST} to {texts.MOST_VALUES}"
+    allowed = f"a whole number from {FEWEST} to {numbers.MOST_VALUES}"
     wanted = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
-    if not FEWEST <= wanted <= texts.MOST_VALUES:
+    if not FEWEST <= wanted <= numbers.MOST_VALUES:
         problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
         raise BadInput(problem, key="points", value=str(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in (ranges or {}).items():
@@ -109,7 +109,7 @@ def _ends(scene: Scene, name: str, given: str | Sequence[float]) -> tuple[float,
         return arguments.number(two[0], name, ENDS, remedy), arguments.number(two[1], name, ENDS, remedy)
     axis = scene.schema.axes.get(name)
     kind = (axis.kind if axis else "") or Words(scene).kind(name)
-    low, high = (_read(text, kind, name) for text in texts.ends(given, name))
+    low, high = (_read(text, kind, name) for text in numbers.range_ends(given, name))
     return low, high
 
 

@@ -13,7 +13,7 @@ from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.program.axes import Traded
 from loomopt.program.program import Limit, Program
 from loomopt.program.sampling import sampled
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine, report
 from loomopt.solving.certificate import certify
 from loomopt.solving.solution import Clash, Evaluation, Finding, Solution

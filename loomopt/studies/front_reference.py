@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from loomopt import provenance
-from loomopt.scenes import Scene
+from loomopt.scene import provenance
+from loomopt.scene.scene import Scene
 from loomopt.solving.words import Words, grouped
 from loomopt.studies import front, front_plan, front_read, front_trade, references, runs
 from loomopt.studies.plan import Task

@@ -13,7 +13,7 @@ from loomopt.physics.tolerances import FEASIBLE
 from loomopt.program.axes import Asked, Traded, opposite
 from loomopt.program.program import Program
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving import change, report
 from loomopt.solving.rows import Row as Touched
 from loomopt.solving.rows import active_set

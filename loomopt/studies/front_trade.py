@@ -10,15 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from loomopt import designs
 from loomopt.base.errors import BadInput
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
-from loomopt.provenance import versions
-from loomopt.scene_numbers import files
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.numbers import files
+from loomopt.scene.provenance import versions
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Solution
 from loomopt.solving.words import Words
 from loomopt.studies import front_answer, front_plan, front_read

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths import systems
@@ -19,7 +18,8 @@ from loomopt.program.program import Program
 from loomopt.program.reading import Reading
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.scenes import Scene
+from loomopt.scene import designs
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import check, digits

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from loomopt import designs
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import misread, refusal
@@ -15,13 +14,14 @@ from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
 from loomopt.nlp.point import Point
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.provenance import versions
-from loomopt.scene_numbers import files, quantity
-from loomopt.scenes import Scene
+from loomopt.scene import designs, numbers
+from loomopt.scene.numbers import files, quantity
+from loomopt.scene.provenance import versions
+from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.asked import check_numbers, check_sought, target_name
 from loomopt.solving.solution import Solution
-from loomopt.studies import ranges, warm
+from loomopt.studies import warm
 from loomopt.studies.findings import Change, Findings
 from loomopt.studies.lattice import Lattice
 from loomopt.studies.plan import Task
@@ -240,9 +240,9 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     for key, texts in listed.items():
         if not texts:
             raise refusal("there is no value to sweep over", scene.origin, key, remedy="Give one at least")
-    if math.prod(map(len, listed.values())) > ranges.MOST_VALUES:
+    if math.prod(map(len, listed.values())) > numbers.MOST_VALUES:
         remedy = "Sweep over fewer values at a time"
-        raise refusal(f"these are more than {ranges.MOST_VALUES} combinations", scene.origin, "over", remedy=remedy)
+        raise refusal(f"these are more than {numbers.MOST_VALUES} combinations", scene.origin, "over", remedy=remedy)
     ends = [{key: texts[k] for key, texts in listed.items()} for k in (0, -1)]
     base = scene.update(ends[0])
     axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
@@ -255,9 +255,9 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
 def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | float]:
     """Return the values of a number that is swept, as a scene would give them. Raises BadInput."""
     if isinstance(given, str):
-        return ranges.values(given, key)
-    remedy = f'Write "{ranges.EXAMPLE}", or the values in a list'
-    return arguments.listed(given, key, f"{ranges.FORM}, or a list of values", remedy)
+        return numbers.range_values(given, key)
+    remedy = f'Write "{numbers.EXAMPLE}", or the values in a list'
+    return arguments.listed(given, key, f"{numbers.FORM}, or a list of values", remedy)
 
 
 def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]) -> Axis:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from loomopt import provenance
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
+from loomopt.scene import provenance
 from loomopt.studies.accuracy import Study, in_time
 from loomopt.studies.ladders import Row, grouped, told
 from loomopt.studies.readings import NUMBERS

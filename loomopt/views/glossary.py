@@ -13,7 +13,7 @@ from loomopt.physics.schema import Figure, Table
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.program.curves import split
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving.words import Words
 from loomopt.tables import PER_SECOND
 from loomopt.views.layout import Grid

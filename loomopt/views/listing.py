@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from loomopt.packaged import Head
+from loomopt.scene.packaged import Head
 from loomopt.views.layout import Grid
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from loomopt.designs import Design
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
-from loomopt.scenes import Scene
+from loomopt.scene.designs import Design
+from loomopt.scene.scene import Scene
 from loomopt.solving.proof import Proofs
 from loomopt.solving.solution import Evaluation, Solution
 from loomopt.views import outputs, scene_view, svg, terminal

@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt import __version__, provenance, tables
+from loomopt import __version__, tables
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
-from loomopt.designs import Design, flat
 from loomopt.jobs import registry
-from loomopt.scenes import Scene
+from loomopt.scene import provenance
+from loomopt.scene.designs import Design, flat
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Evaluation, Solution
 
 if TYPE_CHECKING:

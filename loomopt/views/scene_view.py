@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from loomopt.base.units import factor
-from loomopt.designs import Design, flat
 from loomopt.jobs import registry
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
-from loomopt.scene_display import KINDS
-from loomopt.scenes import Scene, given
+from loomopt.scene.designs import Design, flat
+from loomopt.scene.display import KINDS
+from loomopt.scene.scene import Scene, given
 from loomopt.solving.words import Words
 from loomopt.views.layout import GAP, Grid
 

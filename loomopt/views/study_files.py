@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.files import atomically, check, suffix
 from loomopt.base.units import show
-from loomopt.provenance import csv
+from loomopt.scene.provenance import csv
 from loomopt.studies import study_table
 from loomopt.studies.findings import Change, SceneStudy, counted
 from loomopt.studies.rows import Row

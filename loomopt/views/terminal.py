@@ -7,7 +7,7 @@ from loomopt.base.quantities import exact
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Evaluation, Solution, remedies
 from loomopt.solving.verdict import GlobalBound
 from loomopt.solving.words import Words

@@ -5,9 +5,9 @@ import pickle
 
 import pytest
 
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.scene import packaged
 from loomopt.studies import check
 
 

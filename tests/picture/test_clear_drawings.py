@@ -11,10 +11,10 @@ import pytest
 from reference import crank_rocker_synthesis
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
+from loomopt.scene import packaged
 from loomopt.views import outputs
 
 NAMES = packaged.problem_names()

@@ -17,7 +17,6 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
-from loomopt.packaged import problem_names
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.program import sampling, traced
@@ -25,6 +24,7 @@ from loomopt.program.model import JobModel, Quantity, Row
 from loomopt.program.reading import DATUM
 from loomopt.program.sampling import Sampler
 from loomopt.program.traced import Quantities
+from loomopt.scene.packaged import problem_names
 from loomopt.solving.bounded import Boxes
 
 EFFECTS = {

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from machines import powers
 
 import loomopt as lo
-from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.nlp.point import sampler_at
+from loomopt.scene import designs
 from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8

@@ -5,9 +5,9 @@ import functools
 import pytest
 
 import loomopt as lo
-from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.nlp.point import sampler_at
+from loomopt.scene import designs
 from loomopt.solving.certificate import certify
 
 ACCURACY = 1e-8

@@ -10,7 +10,7 @@ from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.packaged import problem_names
+from loomopt.scene.packaged import problem_names
 from loomopt.solving import bounded
 from loomopt.studies.check import served
 

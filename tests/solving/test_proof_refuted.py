@@ -13,8 +13,8 @@ from shedding_by_hand import product as framed
 from shedding_cases import product
 
 import loomopt as lo
-from loomopt.packaged import problem_names
 from loomopt.program.sampling import Sampler
+from loomopt.scene.packaged import problem_names
 
 
 @pytest.mark.parametrize("name", [name for name in problem_names() if name != "beatup-light"])

@@ -15,7 +15,7 @@ from shedding_cases import CYCLOID, TRAVELS, freed, plain, product, programmed
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.packaged import problems
+from loomopt.scene.packaged import problems
 
 study = importlib.import_module("shedding_law")
 UNEVEN = (100, 70, 130, 60)

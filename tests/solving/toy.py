@@ -10,7 +10,6 @@ from importlib.resources.abc import Traversable
 from typing import Any
 from unittest import mock
 
-from loomopt import scenes
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths.systems import Maths, Number
@@ -24,8 +23,9 @@ from loomopt.program.kinematics import Arcs, Group
 from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
 from loomopt.program.program import Limit, Move, Objective, Program, Variable
 from loomopt.program.sampling import Sampler
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene import scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 
@@ -185,9 +185,11 @@ class ToyJob(Job):
             own_figures={name: Figure(name, "number", name) for name in figures},
             targets={"least": Target("least", "least of all", Nothing)},
             default_target="least",
-            check=lambda scene: None,
             fault=lambda design, shown: "",
         )
+
+    def check(self, scene: Scene) -> None:
+        pass
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         return self.own.model
@@ -232,13 +234,16 @@ class Toys:
     def names(self) -> Collection[str]:
         return (self.job.name,)
 
+    def check(self, scene: Scene) -> None:
+        pass
+
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
         return self.job.schema(document)
 
 
 def scene_of(job: Job) -> Scene:
     """Return a scene of a job that nobody registered."""
-    return scenes.build({"problem": {"name": job.name, "job": job.name, "title": "A toy"}}, Toys(job), "toy.toml")
+    return scene.build({"problem": {"name": job.name, "job": job.name, "title": "A toy"}}, Toys(job), "toy.toml")
 
 
 def solve(toy: Program, starts: int | None = 1, **options: Any) -> Solution:

@@ -3,12 +3,12 @@
 import copy
 from dataclasses import replace
 
-from loomopt import scenes
 from loomopt.base.quantities import Torque
 from loomopt.jobs.beatup.scene import SCHEMA
 from loomopt.jobs.registry import load
 from loomopt.physics.effects.kinds import Clash, Load, ranked
 from loomopt.physics.schema import Table
+from loomopt.scene.scene import build
 
 
 class Own(Table):
@@ -60,6 +60,9 @@ class Jobs:
     def names(self):
         return ("beatup",)
 
+    def check(self, scene):
+        pass
+
     def schema(self, job, document, effects):
         return self.known
 
@@ -70,4 +73,4 @@ def scene(on=(), **available):
     tables = {k: {"T": f"{v} N*m"} if isinstance(v, int | float) else v for k, v in available.items()}
     document["available"] = {name: own for name, own in tables.items() if name not in on}
     document["effects"] |= {name: own for name, own in tables.items() if name in on}
-    return scenes.build(document, Jobs(), "beatup.toml")
+    return build(document, Jobs(), "beatup.toml")

@@ -5,11 +5,11 @@ import shutil
 
 import pytest
 
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
+from loomopt.scene import packaged
 from loomopt.solving import engine
 from loomopt.studies import check as study
 

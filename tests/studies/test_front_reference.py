@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from loomopt import packaged
 from loomopt.jobs.registry import load
+from loomopt.scene import packaged
 from loomopt.studies import check as study
 from loomopt.studies import front_reference, references
 

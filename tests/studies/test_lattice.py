@@ -6,7 +6,7 @@ import math
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.studies import ranges
+from loomopt.scene import numbers
 from loomopt.studies.lattice import COARSE, Lattice
 
 
@@ -54,7 +54,7 @@ def test_neighbours_are_near_by_size_whatever_the_order_of_values():
     ],
 )
 def test_steps_are_exact_and_both_ends_are_there(text, expected):
-    assert ranges.values(text, "key") == expected
+    assert numbers.range_values(text, "key") == expected
 
 
 @pytest.mark.parametrize(
@@ -63,6 +63,6 @@ def test_steps_are_exact_and_both_ends_are_there(text, expected):
 )  # fmt: skip
 def test_a_range_that_is_none_is_refused(text):
     with pytest.raises(BadInput) as told:
-        ranges.values(text, "operation.M0")
+        numbers.range_values(text, "operation.M0")
     assert "LO:HI:STEP UNIT" in str(told.value)
     assert len(str(told.value).splitlines()) == 1

@@ -9,10 +9,11 @@ import pytest
 from matplotlib.text import Text
 
 import loomopt as lo
-from loomopt import packaged, tables
+from loomopt import tables
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.picture.panels import Panel
+from loomopt.scene import packaged
 from loomopt.views import curve_figure, outputs
 from tests import inch
 from tests.views import overlaps

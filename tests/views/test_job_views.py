@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import LAYERS
+from loomopt.scene import packaged
 from loomopt.views import scene_view
 from loomopt.views.layout import Grid
 

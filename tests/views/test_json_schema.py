@@ -11,13 +11,13 @@ import json_walk
 import pytest
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Quantity, foreign, pattern_schema, read
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
 from loomopt.cli import run
 from loomopt.jobs import registry
-from loomopt.scenes import TABLES
+from loomopt.scene import packaged
+from loomopt.scene.scene import TABLES
 from loomopt.views import json_schema
 
 JOBS = registry.own_names()

@@ -3,8 +3,8 @@
 import pytest
 
 import loomopt as lo
-from loomopt import packaged
 from loomopt.cli import run
+from loomopt.scene import packaged
 
 RESULTS = [path.stem.rpartition(".") for path in packaged.results_path().glob("*.csv")]
 

@@ -10,7 +10,7 @@ from loomopt.program.axes import opposite
 from loomopt.program.numbers import Bounds
 from loomopt.program.program import Goal, Numbers, Program
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
 """What target balance asks, and may find out of reach."""

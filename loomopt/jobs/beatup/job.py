@@ -7,14 +7,14 @@ import numpy as np
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.beatup import design as designs
 from loomopt.jobs.beatup import program as programs
-from loomopt.jobs.beatup.scene import SCHEMA
+from loomopt.jobs.beatup.scene import SCHEMA, check
 from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.numbers import bounds
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 
 class Beatup(Job):
@@ -23,6 +23,10 @@ class Beatup(Job):
     name = "beatup"
     own_schema = SCHEMA
     loosening = {"r4e": "s"}  # noqa: RUF012 (never changed)
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's machine is not one that this job can work on."""
+        check(scene)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the crank-rocker with the effects the scene calls for."""

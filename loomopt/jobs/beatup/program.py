@@ -20,8 +20,8 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
 from loomopt.program.program import Limit, Move, Numbers, Objective, Program, Variable, Wish, goals
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.scene_tables import Limit as Limited
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.tables import Limit as Limited
 
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""

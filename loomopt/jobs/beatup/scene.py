@@ -13,8 +13,8 @@ from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.program import drive
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 
 
 class Operation(Table):
@@ -128,7 +128,6 @@ SCHEMA = SceneSchema(
     own_figures=FIGURES,
     targets=TARGETS,
     default_target="balance",
-    check=check,
     fault=fault,
     own_axes=AXES,
     conflict=Conflict(("peak_torque", "m4e"), "balance"),

@@ -17,7 +17,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler, sampled
 from loomopt.program.turning import settled
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 SAMPLES = 720
 TOUCHES = 1e-9

@@ -6,14 +6,14 @@ from collections.abc import Callable, Collection
 from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.rapier import design as designs
 from loomopt.jobs.rapier import program as programs
-from loomopt.jobs.rapier.scene import SCHEMA
+from loomopt.jobs.rapier.scene import SCHEMA, check
 from loomopt.maths.systems import FLOAT
 from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Crossing, Studied
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 
 class Rapier(Job):
@@ -22,6 +22,10 @@ class Rapier(Job):
     name = "rapier"
     own_schema = SCHEMA
     open_boxes = "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's machine is not one that this job can work on."""
+        check(scene)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the drive with the effects the scene calls for."""

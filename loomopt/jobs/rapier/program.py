@@ -20,8 +20,8 @@ from loomopt.program.model import JobModel
 from loomopt.program.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
 from loomopt.program.sampling import Sampler, sampled
-from loomopt.scene_tables import Limit as Limited
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.tables import Limit as Limited
 
 FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}

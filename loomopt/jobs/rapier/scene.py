@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import Field
 
-from loomopt import scene_csv
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.base.refusals import refusal
@@ -14,8 +13,9 @@ from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.program import drive
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene import csv_tables
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""
@@ -148,9 +148,9 @@ def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return crank angles, rad, and head travels, m, of `targets.match.table`. Raises BadInput."""
     given, key = scene.table(MatchTarget).table, "targets.match.table"
     if given is None:
-        remedy = f'Write table = "s.csv" in [targets.match]; the file has the columns {scene_csv.header(MATCHED)}'
+        remedy = f'Write table = "s.csv" in [targets.match]; the file has the columns {csv_tables.header(MATCHED)}'
         raise refusal("target match needs a table of head travel", scene.origin, key, remedy=remedy)
-    (angles, travels), _ = scene_csv.read(scene, given, key, MATCHED)
+    (angles, travels), _ = csv_tables.read(scene, given, key, MATCHED)
     return angles, travels
 
 
@@ -164,7 +164,6 @@ SCHEMA = SceneSchema(
     own_figures=FIGURES,
     targets=TARGETS,
     default_target="stroke-dwell",
-    check=check,
     fault=rapier_drive.fault_of,
     own_axes=AXES,
     conflict=Conflict(("peak_acceleration", "dwell"), "stroke-dwell", ("dwell",)),

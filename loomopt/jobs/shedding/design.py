@@ -29,7 +29,7 @@ from loomopt.program.program import Numbers, Program, Variable
 from loomopt.program.sampling import Extreme, Sampler
 from loomopt.program.speeds import speed_reached
 from loomopt.program.studied import Family
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 CYCLE = {
     "contact_min": "lift",

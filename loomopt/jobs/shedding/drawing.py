@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from loomopt import provenance
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor, show
 from loomopt.jobs import registry
@@ -29,7 +28,8 @@ from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.picture.symbols import arrow, fixed_pivot
 from loomopt.picture.units import Units, told
 from loomopt.program.sampling import Extreme, Sampler
-from loomopt.scenes import Scene
+from loomopt.scene import provenance
+from loomopt.scene.scene import Scene
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"

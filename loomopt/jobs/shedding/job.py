@@ -7,7 +7,7 @@ from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import contact, moving
-from loomopt.jobs.shedding.scene import SCHEMA, LawTarget
+from loomopt.jobs.shedding.scene import SCHEMA, LawTarget, check
 from loomopt.physics.mechanisms.cam_motion import Spline, knots
 from loomopt.program.curves import Columns
 from loomopt.program.instant import Formula
@@ -15,7 +15,7 @@ from loomopt.program.model import JobModel
 from loomopt.program.program import Numbers, Program
 from loomopt.program.sampling import Sampler
 from loomopt.program.studied import Studied
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 
 class Shedding(Job):
@@ -23,6 +23,10 @@ class Shedding(Job):
 
     name = "shedding"
     own_schema = SCHEMA
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's machine is not one that this job can work on."""
+        check(scene)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the frame with the effects the scene calls for, and a design's own law where it has one."""

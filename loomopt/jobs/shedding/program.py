@@ -22,7 +22,7 @@ from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, de
 from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
 from loomopt.program.sampling import sampled
 from loomopt.program.speeds import followed
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 SPEED = "operation.speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"

@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from loomopt import scene_csv
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import (
     NARROWEST,
@@ -30,8 +29,9 @@ from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.program import drive
 from loomopt.program.numbers import check_known
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene import csv_tables
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9
@@ -218,7 +218,7 @@ def _table(scene: Scene) -> cam_spline.Table:
     if given is None:
         remedy = 'Write law_table = "law.csv"; the file has the columns angle [deg], s [mm] of the rise'
         raise refusal("law table needs its file", scene.origin, key, remedy=remedy)
-    (angles, heights), origin = scene_csv.read(scene, given, key, columns)
+    (angles, heights), origin = csv_tables.read(scene, given, key, columns)
     if not (angles[-1] > 0.0 and heights[-1] > 0.0):
         raise refusal("the law does not rise", origin, remedy="Give angle and s of the rise, both from 0 on")
     try:
@@ -257,7 +257,6 @@ SCHEMA = SceneSchema(
     own_figures=FIGURES,
     targets=TARGETS,
     default_target="stiffness",
-    check=check,
     fault=fault,
     own_axes=AXES,
     conflict=Conflict(("K1", "X0")),

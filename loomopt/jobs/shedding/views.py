@@ -14,7 +14,7 @@ from loomopt.picture.panels import BY_EFFECT, Curve, Panel
 from loomopt.program.curves import POWER
 from loomopt.program.sampling import Sampler
 from loomopt.program.stretches import near_zero
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation

@@ -13,7 +13,6 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.physics.schema import Figure, Table, Values
 
 if TYPE_CHECKING:
-    # REMOVED
     from loomopt.physics.motion.flight import Cam, Course
     from loomopt.physics.motion.free import Body
     from loomopt.physics.motion.turning import Turning

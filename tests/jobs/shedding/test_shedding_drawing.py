@@ -12,7 +12,6 @@ import plain_cam
 import pytest
 
 import loomopt as lo
-from loomopt import designs
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing as cam_curves
@@ -20,6 +19,7 @@ from loomopt.jobs.shedding import drawing as shedding_drawing
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
+from loomopt.scene import designs
 from loomopt.views import dxf, svg
 
 ezdxf: Any = importlib.import_module("ezdxf")

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import designs, tables
+from loomopt import tables
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.program.curves import split
+from loomopt.scene import designs
 from loomopt.views import figure, outputs, scene_view
 from loomopt.views.layout import Grid
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import designs
 from loomopt.jobs import registry
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
+from loomopt.scene import designs
 
 SCENE = lo.load("shedding")
 

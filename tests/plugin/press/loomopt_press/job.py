@@ -6,9 +6,9 @@ from loomopt.program.curves import Columns
 from loomopt.program.model import JobModel
 from loomopt.program.program import Limit, Numbers, Objective, Program, Variable
 from loomopt.program.sampling import Sampler
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt_press import model as press
-from loomopt_press.scene import SCHEMA
+from loomopt_press.scene import SCHEMA, check
 
 
 class Press(Job):
@@ -16,6 +16,10 @@ class Press(Job):
 
     name = "press"
     own_schema = SCHEMA
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where the slider-crank does not turn."""
+        check(scene)
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the slider-crank with the effects the scene calls for."""

@@ -7,8 +7,8 @@ from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import Shown
 from loomopt.physics.effects import declared
 from loomopt.physics.schema import Figure, Table, Target
-from loomopt.scene_schema import SceneSchema
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
+from loomopt.scene.schema import SceneSchema
 from loomopt_press.model import LONGER
 
 
@@ -59,7 +59,6 @@ SCHEMA = SceneSchema(
     own_figures={figure.name: figure for figure in FIGURES},
     targets={"torque": Target("torque", "the least peak crank torque", Table, needs_effects=("forming",))},
     default_target="torque",
-    check=check,
     fault=fault,
     own_margins={LONGER: "length"},
 )

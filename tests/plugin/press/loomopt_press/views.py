@@ -14,7 +14,7 @@ from loomopt.picture.panels import Panel
 from loomopt.picture.shapes import Drawing, Point
 from loomopt.picture.skeleton import Skeleton
 from loomopt.picture.units import told
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 from loomopt_press.model import BOTTOM, TOP, SlidePose
 
 HALF = "half way"

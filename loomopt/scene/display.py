@@ -9,9 +9,9 @@ from loomopt.base.refusals import misread, refusal, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table
-from loomopt.scene_document import looked_up
-from loomopt.scene_schema import SceneSchema
-from loomopt.scene_tables import Bound, Limit, table
+from loomopt.scene.document import looked_up
+from loomopt.scene.schema import SceneSchema
+from loomopt.scene.tables import Bound, Limit, table
 
 KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
 """Key of [display] → kind of quantity."""

@@ -3,7 +3,7 @@
 import functools
 from typing import TYPE_CHECKING
 
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from loomopt import designs
 from loomopt.base.errors import BadInput, clean
 from loomopt.base.refusals import refusal, shown
-from loomopt.scene_document import looked_up
-from loomopt.scene_paths import Paths
-from loomopt.scenes import Scene, build
+from loomopt.scene import designs
+from loomopt.scene.document import Paths, looked_up
+from loomopt.scene.scene import Scene, build
 
 MOST_TOLD, LONGEST_TOLD = 8, 200
 """Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""

@@ -11,7 +11,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import plain_number
 from loomopt.base.refusals import refusal
 from loomopt.base.units import DISPLAY_UNIT, factor
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
 UNITS = {"angle": ("deg", "rad"), "length": ("mm", "cm", "m", "in")}

@@ -4,35 +4,31 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from loomopt import scene_display
-from loomopt import scene_tables as read
 from loomopt.base.errors import clean
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.refusals import refusal, shown, unknown
 from loomopt.base.units import show
 from loomopt.physics.effects.kinds import Effect, label, owned
 from loomopt.physics.schema import Table
-from loomopt.scene_document import copied, looked_up, removed, replaced
-from loomopt.scene_paths import Paths
-from loomopt.scene_schema import SceneSchema
-from loomopt.scene_tables import Bound, Limit
+from loomopt.scene import display
+from loomopt.scene import tables as read
+from loomopt.scene.document import Paths, copied, looked_up, removed, replaced
+from loomopt.scene.schema import SceneSchema
+from loomopt.scene.tables import Bound, JobNames, Limit
 
 _Own = TypeVar("_Own", bound=Table)
 
 TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
 
 
-class Jobs(Protocol):
+class Jobs(JobNames, Protocol):
     """Where a scene finds its job by name."""
-
-    def __contains__(self, name: object, /) -> bool:
-        """Say whether there is a job of a name."""
-
-    def names(self) -> Collection[str]:
-        """Return the names of all jobs."""
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str], /) -> SceneSchema:
         """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
+
+    def check(self, scene: "Scene", /) -> None:
+        """Raise BadInput where today's machine is not one that its job can work on."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,7 +101,7 @@ class Scene(Shown):
     @lazy
     def units(self) -> Mapping[str, str]:
         """Kind of quantity → the unit in which a person sees it: of [display], else as written, else composed."""
-        return scene_display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
+        return display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
 
     def shown_in(self, kind: str) -> str:
         """Return the unit in which a person sees quantities of a kind."""
@@ -113,11 +109,11 @@ class Scene(Shown):
 
     def unit_for(self, si: str) -> str:
         """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
-        return scene_display.unit_for(si, self.units)
+        return display.unit_for(si, self.units)
 
     def filed_in(self, si: str) -> str:
         """Return the unit in which a file of curves has what has an SI unit."""
-        return scene_display.filed_in(si, self.units, bool(self.document.get("display")))
+        return display.filed_in(si, self.units, bool(self.document.get("display")))
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
         """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
@@ -276,7 +272,7 @@ def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | N
     places = list(read.places(schema, tables, active, available))
     own_targets = {name: {} for name in schema.targets} | dict(read.table(raw["targets"], origin, "targets"))
     targets = {name: target.own for name, target in schema.targets.items()}
-    scene_display.read(raw["display"], origin)
+    display.read(raw["display"], origin)
     scene = Scene(
         document=original,
         origin=clean(origin),
@@ -295,7 +291,7 @@ def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | N
         targets=read.named(own_targets, targets, "target", origin, "targets"),
         paths=paths or Paths(),
     )
-    schema.check(scene)
+    jobs.check(scene)
     return scene
 
 

@@ -1,8 +1,8 @@
 """The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from pydantic import ValidationError
 
@@ -11,15 +11,22 @@ from loomopt.base.refusals import invalid, misread, missing, refusal, shown, unk
 from loomopt.base.units import QuantityError
 from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label
 from loomopt.physics.schema import Figure, Table
-from loomopt.scene_schema import SceneSchema
-
-if TYPE_CHECKING:
-    from loomopt.scenes import Jobs
+from loomopt.scene.schema import SceneSchema
 
 _Model = TypeVar("_Model", bound=Table)
 _NAME = re.compile(r"[^\W_][\w-]{0,63}")
 _TAKEN = {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in "0123456789¹²³")}
 """Names that Windows keeps for its devices."""
+
+
+class JobNames(Protocol):
+    """The jobs that there are, by name."""
+
+    def __contains__(self, name: object, /) -> bool:
+        """Say whether there is a job of a name."""
+
+    def names(self) -> Collection[str]:
+        """Return the names of all jobs."""
 
 
 class Problem(Table):
@@ -81,7 +88,7 @@ def checked(model: type[_Model], raw: object, origin: str, path: str) -> _Model:
         raise invalid(error, model, origin, path) from None
 
 
-def problem(raw: object, jobs: "Jobs", origin: str) -> Problem:
+def problem(raw: object, jobs: JobNames, origin: str) -> Problem:
     """Return [problem], its name fit for a file name and its job one of `jobs`."""
     found = checked(Problem, raw, origin, "problem")
     if not _NAME.fullmatch(found.name) or found.name.lower() in _TAKEN:

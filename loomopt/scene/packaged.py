@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, clean
 from loomopt.base.refusals import shown
-from loomopt.scene_document import looked_up, read_document
+from loomopt.scene.document import looked_up, read_document
 
 
 def _folder(name: str) -> Path:
-    package = Path(__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     return package / name if (package / name).is_dir() else package.parent / name
 
 

@@ -2,15 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
 from loomopt.base.units import Shown
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
-
-if TYPE_CHECKING:
-    from loomopt.scenes import Scene
 
 
 @dataclass(frozen=True)
@@ -20,7 +16,6 @@ class SceneSchema:
     operation, mechanism: models of those tables; keys that are required only by what reads them are optional there.
     effects: by name, in the order of the job. variables: design variables → kind of quantity, in the order shown.
     figures: the job's own; those of its effects come with them (`all_figures`).
-    check(scene): raises BadInput when today's machine is not one this job can work on.
     fault(design, shown): why a design, SI, cannot work as this mechanism, its numbers as `shown` tells them; "" when
     it can.
     margins: limits that every design keeps → kind of quantity; their names are whole phrases.
@@ -41,7 +36,6 @@ class SceneSchema:
     own_figures: Mapping[str, Figure]
     targets: Mapping[str, Target]
     default_target: str
-    check: "Callable[[Scene], None]"
     fault: Callable[[Mapping[str, float], Shown], str]
     needs: tuple[str, ...] = ()
     own_margins: Mapping[str, str] = field(default_factory=dict)

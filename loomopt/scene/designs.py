@@ -11,7 +11,7 @@ from loomopt.base.quantities import Quantity, described, quantity_of
 from loomopt.base.refusals import misread, refusal, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.physics.effects.kinds import label
-from loomopt.scenes import Scene
+from loomopt.scene.scene import Scene
 
 LARGEST_FILE = 1_000_000
 """Bytes; an answer has a few thousand."""
