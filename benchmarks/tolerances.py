@@ -18,11 +18,11 @@ from unittest import mock
 import harness
 
 from loomopt.jobs import registry
+from loomopt.model import reading
+from loomopt.model.program import Program
 from loomopt.nlp import exchange, options, transcribe
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.physics import tolerances
-from loomopt.program import reading
-from loomopt.program.program import Program
 
 NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
     "beatup": ("operation.M0", ("745 N*m", "752 N*m", "770 N*m")),

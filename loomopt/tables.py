@@ -133,7 +133,7 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
 
     In the units that [display] chooses, in inches and pounds where these are the scene's, else in SI.
     """
-    from loomopt.program.curves import split
+    from loomopt.model.curves import split
 
     found, names = frame.copy(), {}
     for column in frame.columns:
@@ -163,9 +163,9 @@ def curves(
     if accuracy is None:
         columns = rows()
     else:
-        from loomopt.program import sparse_curves
+        from loomopt.model import curves
 
-        columns, error = sparse_curves.curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
+        columns, error = curves.sparse_curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))

@@ -136,7 +136,7 @@ def test_an_import_from_above_is_found(source):
 
 
 def test_imports_of_a_module_below_or_beside_are_allowed():
-    below = "from loomopt.program import sampling\nfrom loomopt.base.errors import BadInput"
+    below = "from loomopt.model import sampling\nfrom loomopt.base.errors import BadInput"
     for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.views import svg"
     assert climbing("jobs.beatup.model", below) == climbing("jobs.beatup.model", for_reading) == []
 

@@ -12,10 +12,10 @@ from loomopt.base.quantities import Length, PositiveMass
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load
+from loomopt.model import numbers
 from loomopt.physics.effects.beatup import inertia, rocker_inertia
 from loomopt.physics.effects.kinds import Clash, Load, label, owned, ranked
 from loomopt.physics.schema import Figure, Table
-from loomopt.program import numbers
 from loomopt.scene import scene
 from loomopt.scene.tables import Bound, Limit
 

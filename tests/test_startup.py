@@ -121,7 +121,7 @@ def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_oth
 
 
 def test_a_motion_of_its_own_is_imported_only_by_the_scenes_that_need_it():
-    own = {"loomopt.physics.motion.turning", "loomopt.program.crank_motion"}
+    own = {"loomopt.physics.motion.turning", "loomopt.model.crank_motion"}
     for arguments, needed in (
         (("evaluate", "beatup"), set()),
         (("evaluate", "beatup", "--with", "speed_fluctuation"), own),

@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.base.errors import BadInput
 from loomopt.base.units import SI_UNIT
+from loomopt.model import drive, numbers
+from loomopt.model.curves import STEPS, Columns, curves, tops
+from loomopt.model.model import JobModel
+from loomopt.model.program import Numbers, Program
+from loomopt.model.sampling import Sampler, sampled
+from loomopt.model.studied import Studied
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Event
 from loomopt.picture.job_views import JobViews
-from loomopt.program import drive, numbers
-from loomopt.program.curves import STEPS, Columns, curves, tops
-from loomopt.program.model import JobModel
-from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler, sampled
-from loomopt.program.studied import Studied
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
-    from loomopt.program.axes import Asked, Traded
-    from loomopt.program.parting import Parted
+    from loomopt.model.axes import Asked, Traded
+    from loomopt.model.separation import Parted
 
 Figures = Mapping[str, float | None]
 
@@ -112,7 +112,7 @@ class Job(abc.ABC):
         found = sampled(self.model(scene, design), self.numbers_of(scene, design))
         if drive.motor(found.model.effects) is None:
             return found
-        from loomopt.program.crank_motion import turned
+        from loomopt.model.crank_motion import turned
 
         return turned(found, scene)
 
@@ -133,7 +133,7 @@ class Job(abc.ABC):
         """Return a sampled design, followed, where an effect of the scene may part its output from the mechanism."""
         if not any(isinstance(effect, Event) for effect in scene.active):
             return None
-        from loomopt.program.parting import followed
+        from loomopt.model.separation import followed
 
         return followed(scene, sampler)
 
@@ -152,7 +152,7 @@ class Job(abc.ABC):
 
         Raises BadInput.
         """
-        from loomopt.program import axes
+        from loomopt.model import axes
 
         bounded = [name for name, bound in scene.bounds.items() if bound.free and bound.min < bound.max]
         known = axes.asked_of(scene.schema.axes, bounded, asked, scene.origin)

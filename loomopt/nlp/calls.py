@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from loomopt.model.chains import recurrent, stations
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.families import Family, epigraphs, families
 from loomopt.nlp.point import Elastic, Known, Settings, sampler_at
 from loomopt.nlp.stations import Stood, held
 from loomopt.nlp.transcribe import Transcription, transcribe
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BESIDE_STATIONS, ELASTIC_SHARE, FIRST_ROOM, FIRST_SHARE, FIRST_SLOTS, LEADING
-from loomopt.program.chains import recurrent, stations
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
 
 
 class Calls:

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family
 from loomopt.nlp.follow import follow
@@ -20,8 +22,6 @@ from loomopt.nlp.polish import polish
 from loomopt.nlp.transcribe import Transcription
 from loomopt.physics.cycle import TURN, Cycle, Floats
 from loomopt.physics.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, NEEDED, STANDS
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""

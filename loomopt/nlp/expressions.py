@@ -5,15 +5,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from loomopt.maths.systems import Number
+from loomopt.model.chains import followed
+from loomopt.model.model import Integral
+from loomopt.model.reading import Rows
 from loomopt.nlp.families import Family
 from loomopt.nlp.lifted import Lifts
 from loomopt.nlp.quantities import Quantities
 from loomopt.nlp.structure import NodeParameters, Structure
 from loomopt.physics.balance import total
 from loomopt.physics.schema import Values
-from loomopt.program.chains import followed
-from loomopt.program.model import Integral
-from loomopt.program.reading import Rows
 
 
 class Expressions(NamedTuple):

@@ -7,9 +7,9 @@ section 4.1.3; Hettich and Kortanek, Semi-infinite programming, SIAM Review 35 (
 
 from typing import NamedTuple
 
+from loomopt.model.program import Program
 from loomopt.physics.cycle import Where
 from loomopt.physics.schema import Values
-from loomopt.program.program import Program
 
 
 class Epigraph(NamedTuple):

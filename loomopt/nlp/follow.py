@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.pivot import active_by, reach
 from loomopt.nlp.point import Point
@@ -24,7 +25,6 @@ from loomopt.physics.tolerances import (
     SAME_NODE,
     SETTLED,
 )
-from loomopt.program.sampling import Extreme, Sampler
 
 Nodes = Sequence[Sequence[Extreme]]
 """Nodes of each family."""

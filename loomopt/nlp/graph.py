@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
+from loomopt.model.program import Program
 from loomopt.nlp.expressions import expressions
 from loomopt.nlp.point import sampler_at
 from loomopt.nlp.structure import structure
-from loomopt.program.program import Program
 
 
 def nodes(program: Program, x: Mapping[str, float]) -> int | None:

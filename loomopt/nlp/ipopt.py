@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.model.sampling import Extreme, Sampler, Tally
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.transcribe import Transcription
 from loomopt.physics.cycle import Floats
-from loomopt.program.sampling import Extreme, Sampler, Tally
 
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 """What IPOPT says when its callback raised, or asked it to stop."""

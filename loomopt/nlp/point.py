@@ -6,10 +6,10 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler, sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CHECKED, MOST_CHECKED, NEAR, PENALTY, POLISH_FARTHEST, ROUNDING, SAMPLED, SAMPLES
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler, sampled
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 

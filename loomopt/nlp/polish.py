@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point
 from loomopt.physics.cycle import Floats
@@ -23,7 +24,6 @@ from loomopt.physics.tolerances import (
     SETTLED,
     TOUCHING,
 )
-from loomopt.program.sampling import Extreme, Sampler
 
 Nodes = Sequence[Sequence[Extreme]]
 Flags = NDArray[np.bool_]

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.model.model import JobModel
 from loomopt.nlp.lifted import Lifts, Options, chosen, identity
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import FEW_CHOICES
-from loomopt.program.model import JobModel
 
 
 class _Choice(NamedTuple):

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from loomopt.model.chains import Station, station_switches
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.families import Family
 from loomopt.physics.cycle import Cycle, Floats
 from loomopt.physics.schema import Values
-from loomopt.program.chains import Station, station_switches
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
 
 
 def held(switches: Sequence[Values], family: Family) -> list[int]:

@@ -13,15 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.maths.systems import Number
+from loomopt.model.chains import Station, recurrent, stations
+from loomopt.model.model import Integral
+from loomopt.model.program import Program
+from loomopt.model.reading import DATUM, quadrature
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp.families import Epigraph, Family, epigraphs, families
 from loomopt.nlp.layout import Layout
 from loomopt.nlp.stations import Stood, held
 from loomopt.physics.cycle import Cycle, Floats, Node, node_angle
-from loomopt.program.chains import Station, recurrent, stations
-from loomopt.program.model import Integral
-from loomopt.program.program import Program
-from loomopt.program.reading import DATUM, quadrature
-from loomopt.program.sampling import Extreme, Sampler
 
 
 class NodeParameters(NamedTuple):

@@ -4,13 +4,13 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.nlp.elimination import Elimination, Solver
 from loomopt.nlp.expressions import expressions
 from loomopt.nlp.options import ipopt_options
 from loomopt.nlp.point import Settings
 from loomopt.nlp.structure import Structure, structure
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 
 CACHE_SIZE = 32
 """NLPs that are kept; a study of many scenes meets no more structures at a time."""

@@ -38,9 +38,6 @@ GAUSS_NODES = 32
 """Nodes of a mean on each piece: of an analytic formula the error falls by a constant factor a node. Packaged means are
 right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/tolerances.py); the rest is for narrower peaks."""
 
-SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90
-"""Crank angle, rad, within which a spike beside a singular position is sought: two samples; its halvings, to rounding
-of an angle of 2π (0.02/2^44 = 1e-15); golden sections of what brackets it: 0.618^90 = 1e-19."""
 
 SINGULAR_SAMPLES, WORTH_A_LOOK = 361, 10
 """Samples of one turn between which the closest position of a triangle is sought, and how many times NEARLY_SINGULAR

@@ -7,6 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from loomopt.maths import systems
+from loomopt.model.drive import motor
+from loomopt.model.model import JobModel
 from loomopt.physics import balance
 from loomopt.physics.balance import Acting, Given
 from loomopt.physics.effects.kinds import Check, Event, Load, Motion, State, Terms
@@ -25,8 +27,6 @@ from loomopt.picture.equations import (
     sympy,
     text,
 )
-from loomopt.program.drive import motor
-from loomopt.program.model import JobModel
 
 if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import Written

@@ -49,8 +49,8 @@ class JobViews:
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
         """Return what to know beside the numbers, each a sentence without its full stop: what checks remark."""
+        from loomopt.model.numbers import numbers
         from loomopt.physics.effects.kinds import Check, owned
-        from loomopt.program.numbers import numbers
 
         known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
         told = []

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
+from loomopt.model.curves import ANGLE, COLUMN, POWER, load_name, split
+from loomopt.model.drive import MOTOR, SPEED
+from loomopt.model.drive import POWER as PEAK_POWER
 from loomopt.physics.effects.kinds import Check, Load, Speed, State
-from loomopt.program.curves import ANGLE, COLUMN, POWER, load_name, split
-from loomopt.program.drive import MOTOR, SPEED
-from loomopt.program.drive import POWER as PEAK_POWER
 from loomopt.scene.scene import Scene
 from loomopt.scene.tables import Limit
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from loomopt.model.separation import Parted
 from loomopt.physics.cycle import TURN
 from loomopt.physics.motion.flight import Landing
 from loomopt.picture.panels import Panel
-from loomopt.program.parting import Parted
 from loomopt.scene.scene import Scene
 
 WIDE = 0.1

@@ -3,9 +3,9 @@
 import numpy as np
 
 from loomopt.maths import systems
+from loomopt.model.model import read_at
+from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Load
-from loomopt.program import states
-from loomopt.program.sampling import Sampler
 from loomopt.scene.scene import Scene
 
 MOST = 0.1
@@ -24,7 +24,7 @@ def twisted(scene: Scene, sampler: Sampler) -> tuple[str, ...]:
             if load.name not in state.carries or not on.any():
                 continue
             at = model.instant(systems.numpy(), sampler.given, sampler.node(pieces[on], u[on]))
-            largest = float(np.abs(states.moved(state, at).coordinate()).max())
+            largest = float(np.abs(read_at(state, at).coordinate()).max())
             travel = float(np.ptp(at.pose.q))
             if largest > MOST * travel:
                 found.append(

@@ -13,11 +13,11 @@ import numpy as np
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.model import Integral
+from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.reading import DATUM, Reading, quadrature
+from loomopt.model.sampling import Sampler, Tally
 from loomopt.physics.cycle import Floats, Node, Pieces
-from loomopt.program.model import Integral
-from loomopt.program.program import Limit, Objective, Program
-from loomopt.program.reading import DATUM, Reading, quadrature
-from loomopt.program.sampling import Sampler, Tally
 from loomopt.solving.sizes import SCREENED_NODES
 
 

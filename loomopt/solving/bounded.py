@@ -16,12 +16,12 @@ import numpy as np
 from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.model.model import Integral
+from loomopt.model.program import Program
+from loomopt.model.reading import Reading
+from loomopt.model.sampling import Sampler, Tally
 from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import MEAN_BOXES, MOST_BOXES, NEAR_TOP
-from loomopt.program.model import Integral
-from loomopt.program.program import Program
-from loomopt.program.reading import Reading
-from loomopt.program.sampling import Sampler, Tally
 
 CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.nlp.point import Settings
 from loomopt.physics.tolerances import (
     COMPLEMENTARY,
@@ -23,8 +25,6 @@ from loomopt.physics.tolerances import (
     POSITIVE,
     STATIONARY,
 )
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler, sampled
 from loomopt.solving import kkt, second_order
 from loomopt.solving.bounded import between_points, cycle_rows, judged
 from loomopt.solving.derivatives import Derivatives
@@ -153,7 +153,7 @@ def _unserved(sampler: Sampler) -> str:
     """Return why the states of a design need another model than the one it was solved with, "" where they do not."""
     if not sampler.model.states:
         return ""
-    from loomopt.program.settled import unserved
+    from loomopt.model.model import unserved
 
     return unserved(sampler.model, sampler.values)
 

@@ -13,12 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.maths.systems import Number
+from loomopt.model.model import Instant, JobModel, Row
+from loomopt.model.numbers import LEAST_CHANGE
+from loomopt.model.program import Objective, Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
-from loomopt.program.instant import Instant, Row
-from loomopt.program.model import JobModel
-from loomopt.program.numbers import LEAST_CHANGE
-from loomopt.program.program import Objective, Program, Variable
 from loomopt.solving.certificate import certify
 from loomopt.solving.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
 from loomopt.solving.settle import unchanging, wished

@@ -4,9 +4,9 @@ import abc
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.rows import Row
 
 

@@ -10,12 +10,12 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from loomopt.model.program import Program
 from loomopt.nlp import exchange
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Elastic, Known, Point, Settings
 from loomopt.nlp.stations import owners
 from loomopt.physics.tolerances import CHEAP, NEEDED, PRICED, SCREENED
-from loomopt.program.program import Program
 from loomopt.solving.solution import Clash
 from loomopt.solving.words import Words
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.model.program import Program
+from loomopt.model.sampling import Tally, forget
 from loomopt.nlp.point import Point, Settings
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.program.program import Program
-from loomopt.program.sampling import Tally, forget
 from loomopt.scene.scene import Scene
 from loomopt.solving import report
 from loomopt.solving.asked import Everywhere, check_everywhere, check_numbers, check_sought, target_name
@@ -153,10 +153,10 @@ def _finer(search: "Search") -> Program:
     program, best = search.program, search.best
     if not program.model.states or best is None:
         return program
-    from loomopt.program.settled import settled
+    from loomopt.model.model import with_words_fixed
 
     try:
-        model = settled(program.model, {**program.parameters, **best.x})
+        model = with_words_fixed(program.model, {**program.parameters, **best.x})
     except ArithmeticError:
         return program
     return program if model is program.model else replace(program, model=model)

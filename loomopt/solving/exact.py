@@ -10,11 +10,11 @@ import numpy as np
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.model.program import Program
+from loomopt.model.reading import Reading
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import DIGITS, FIRST_STEP, NEWTON_SHIFT, ROUNDED, SECOND_STEP, THIRD_STEP
-from loomopt.program.program import Program
-from loomopt.program.reading import Reading
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
 

@@ -16,11 +16,11 @@ from typing import Literal
 import numpy as np
 
 from loomopt.base.records import lazy
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.nlp.point import sampler_at
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FALL_GROWTH, FALL_MARGIN, FEASIBLE, POLISH_DONE, POLISH_MET, PROBES
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 from loomopt.solving.lagrangian import Lagrangian
 from loomopt.solving.rows import Row, moved
 from loomopt.solving.valley import Closed, inverted

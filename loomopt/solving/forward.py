@@ -12,12 +12,12 @@ from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, stacked, variables
 from loomopt.maths.systems import Number
+from loomopt.model.model import Integral
+from loomopt.model.program import Program
+from loomopt.model.reading import DATUM, Reading, quadrature
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
-from loomopt.program.model import Integral
-from loomopt.program.program import Program
-from loomopt.program.reading import DATUM, Reading, quadrature
-from loomopt.program.sampling import Sampler
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.rows import Row
 

@@ -5,9 +5,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from loomopt.model.program import Program
 from loomopt.nlp.point import sampler_at
 from loomopt.physics.tolerances import FALL_MARGIN, FALLEN, PROBES
-from loomopt.program.program import Program
 
 
 @dataclass(frozen=True)

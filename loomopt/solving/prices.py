@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from loomopt.program.program import Limit, Objective
-from loomopt.program.sampling import Sampler
+from loomopt.model.program import Limit, Objective
+from loomopt.model.sampling import Sampler
 from loomopt.solving.verdict import Binding
 
 

@@ -16,11 +16,11 @@ from loomopt.base.errors import BadInput
 from loomopt.base.records import Shown
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.model import model
+from loomopt.model.program import Limit, Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
-from loomopt.program import states
-from loomopt.program.program import Limit, Program
-from loomopt.program.sampling import Sampler
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
 from loomopt.solving.asked import check_sought, target_name
@@ -115,7 +115,7 @@ def prove(
     reads = _readings(own, job, program, full, slack)
     found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
     whole = reads[1].sampler
-    return Proofs(scene.name, name, found, scene, states.rests(whole.model.effects, whole.given.own))
+    return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
 
 
 def _merged(found: list[Proof]) -> Iterator[Proof]:

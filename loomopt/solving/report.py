@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from loomopt.jobs.base import Job
+from loomopt.model import numbers
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE
-from loomopt.program import numbers
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
 from loomopt.solving.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from loomopt.base.units import factor
-from loomopt.program import numbers
+from loomopt.model import numbers
 from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Evaluation, Finding
 from loomopt.solving.words import Words

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SAME_NODE
-from loomopt.program.program import Limit, Objective, Program
-from loomopt.program.sampling import Extreme, Sampler
 
 Groups = tuple[tuple[int, ...], ...]
 """Places of rows: of each group of an objective, the pieces whose largest counts."""

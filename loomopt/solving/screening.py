@@ -10,10 +10,10 @@ import numpy as np
 
 from loomopt.maths.jets import Jet
 from loomopt.maths.sobol import points
+from loomopt.model.chains import roots
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.program.chains import roots
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 from loomopt.solving.batch import Batch, Judged
 from loomopt.solving.sizes import (
     APART,

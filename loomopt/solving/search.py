@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from loomopt.jobs.base import Job
+from loomopt.model.program import Program
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Known, Point, Settings, sampler_at
 from loomopt.physics.tolerances import (
@@ -22,7 +23,6 @@ from loomopt.physics.tolerances import (
     STRONGER,
     STRONGEST_PENALTY,
 )
-from loomopt.program.program import Program
 from loomopt.solving.certificate import certify
 from loomopt.solving.settle import settle
 from loomopt.solving.verdict import Certificate

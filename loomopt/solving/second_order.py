@@ -21,10 +21,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from loomopt.maths.nnls import least_on_cone
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 from loomopt.solving import settle
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.feasible_curve import FeasibleCurve, Verdict

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from loomopt.model.program import Limit, Move, Program, Wish
+from loomopt.model.sampling import sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, BEYOND, GIVES_WAY, MOVED, SETTLE_BISECTIONS, SETTLE_NODES, UNCHANGED
-from loomopt.program.program import Limit, Move, Program, Wish
-from loomopt.program.sampling import sampled
 
 Numbers = Mapping[str, float]
 

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.base.records import lazy
+from loomopt.model.program import Program
 from loomopt.nlp.point import sampler_at
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import RANK, SLOPE_ERROR
-from loomopt.program.program import Program
 from loomopt.solving.derivatives import Derivatives
 from loomopt.solving.forward import Forward
 from loomopt.solving.rows import Row, moved

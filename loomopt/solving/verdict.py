@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from loomopt.model.program import Limit, Objective
 from loomopt.physics.tolerances import ROUNDED
-from loomopt.program.program import Limit, Objective
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ import math
 
 from loomopt.base.quantities import quantity_of
 from loomopt.base.units import SI_UNIT, factor, show
+from loomopt.model.program import Limit
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.program.program import Limit
 from loomopt.scene.scene import Scene
 from loomopt.solving.solution import Price, Relaxation
 from loomopt.solving.verdict import Binding

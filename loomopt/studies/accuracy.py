@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs import registry
-from loomopt.program import states
+from loomopt.model import model
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
 from loomopt.solving.asked import check_sought
@@ -107,7 +107,7 @@ def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Stud
     rows = tuple(row for _, found in climbs for row in found)
     told = provenance.provenance(scene, study="full" if full else "quick")
     sampler = registry.of(scene).sampler(scene, {})
-    left = [f" Not covered: {text}." for text in states.rests(sampler.model.effects, sampler.given.own)]
+    left = [f" Not covered: {text}." for text in model.uncovered(sampler.model.effects, sampler.given.own)]
     return Study(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from loomopt.base.errors import BadInput
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
-from loomopt.program.program import Objective, Program
+from loomopt.model.program import Objective, Program
 from loomopt.scene.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.solution import Evaluation, Finding

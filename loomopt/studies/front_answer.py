@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.model.axes import Traded
+from loomopt.model.program import Limit, Program
+from loomopt.model.sampling import sampled
 from loomopt.nlp.point import Settings
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
-from loomopt.program.axes import Traded
-from loomopt.program.program import Limit, Program
-from loomopt.program.sampling import sampled
 from loomopt.scene.scene import Scene
 from loomopt.solving import engine, report
 from loomopt.solving.certificate import certify

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 from loomopt.jobs import registry
+from loomopt.model.axes import Asked, Traded, opposite
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
 from loomopt.physics.tolerances import FEASIBLE
-from loomopt.program.axes import Asked, Traded, opposite
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene.scene import Scene
 from loomopt.solving import change, report
 from loomopt.solving.rows import Row as Touched

@@ -15,7 +15,7 @@ import numpy as np
 
 from loomopt.base.errors import BadInput
 from loomopt.maths.systems import Number
-from loomopt.program.sampling import Tally
+from loomopt.model.sampling import Tally
 from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
 
 Setting = float | int | str

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from loomopt.model.sampling import Sampler
+from loomopt.model.studied import Family
 from loomopt.nlp import exchange
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point, Settings
-from loomopt.program.sampling import Sampler
-from loomopt.program.studied import Family
 from loomopt.solving import engine
 from loomopt.solving.solution import Solution
 from loomopt.studies import digits

@@ -8,11 +8,11 @@ import numpy as np
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.sampling import Sampler, Tally
+from loomopt.model.studied import Crossing
 from loomopt.nlp import slopes
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.program.sampling import Sampler, Tally
-from loomopt.program.studied import Crossing
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject

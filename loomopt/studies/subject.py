@@ -11,13 +11,13 @@ from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.program import Program
+from loomopt.model.reading import Reading
+from loomopt.model.sampling import Sampler
+from loomopt.model.studied import Studied
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion
-from loomopt.program.program import Program
-from loomopt.program.reading import Reading
-from loomopt.program.sampling import Sampler
-from loomopt.program.studied import Studied
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
 from loomopt.solving import engine

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme
 from loomopt.nlp.point import Point
-from loomopt.program.program import Program
-from loomopt.program.sampling import Extreme
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 

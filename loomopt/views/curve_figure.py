@@ -9,10 +9,10 @@ import numpy as np
 
 from loomopt.base import files
 from loomopt.base.units import factor, show
+from loomopt.model.curves import ANGLE
 from loomopt.physics.cycle import Floats
 from loomopt.picture.panels import Panel, each
 from loomopt.picture.shapes import plain
-from loomopt.program.curves import ANGLE
 from loomopt.views import figure
 from loomopt.views.figure import COLOURS, STYLES
 from loomopt.views.heads import LEGEND, SIZE, Entry, head

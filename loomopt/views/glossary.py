@@ -8,11 +8,11 @@ from typing import NamedTuple
 from loomopt.base.quantities import quantity_of
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs import registry, sources
+from loomopt.model.curves import split
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.schema import Figure, Table
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
-from loomopt.program.curves import split
 from loomopt.scene.scene import Scene
 from loomopt.solving.words import Words
 from loomopt.tables import PER_SECOND

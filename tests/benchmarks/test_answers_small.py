@@ -9,7 +9,7 @@ from test_benchmarks_small import ATTEMPTS, FOLDER
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving.exact import Exact
 from loomopt.solving.forward import Forward
 from loomopt.solving.rows import active_set

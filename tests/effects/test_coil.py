@@ -6,10 +6,10 @@ import pytest
 
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model import numbers
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.effects.shedding import coil
 from loomopt.physics.mechanisms.tension_spring import WIRES
-from loomopt.program import numbers
 
 SCENE = registry.load("shedding").set("effects.coil", dict(coil.EFFECT.examples[0]))
 KNOWN = numbers.numbers(SCENE)

@@ -12,10 +12,10 @@ import loomopt as lo
 from loomopt import cli, tables
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Check, Demand
 from loomopt.physics.schema import Figure
-from loomopt.program.sampling import Sampler
 from loomopt.studies.check import served
 
 UNIT = {"beatup": "N*m", "rapier": "N", "shedding": "N"}

@@ -107,7 +107,7 @@ def test_a_load_whose_force_flight_does_not_know_is_refused_by_name(monkeypatch)
     ],
 )
 def test_so_is_one_that_reads_the_cam_or_is_not_linear(force, why, monkeypatch):
-    from loomopt.program.free_loads import UnfollowedError, _form
+    from loomopt.model.separation import UnfollowedError, _form
 
     sampler = JOB.sampler(ON, {})
     load = dataclasses.replace(weight.EFFECT, force=force)

@@ -26,8 +26,8 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import FLOAT
+from loomopt.model import model
 from loomopt.physics.cycle import TURN, Node
-from loomopt.program import states
 
 TABLE = {
     (2e4, one_percent(2e4), True): (-1651.261880486, -0.0820964270, 192.496773, 1707.20032),
@@ -241,7 +241,7 @@ def test_every_number_system_gives_the_same():
 
 
 def test_recordings_give_the_same_bits():
-    from loomopt.program.traced import Quantities
+    from loomopt.model.reading import Quantities
 
     found = sampler(2e6, 45.0)
     plain = found.model.together(FLOAT, found.given, Node(1.0, {"resistance": 1.0}))
@@ -304,7 +304,7 @@ def test_what_the_crank_gives_is_what_the_cloth_and_the_damper_take(k, c):
         u = (x + 1) / 2
         at = found.model.instant(systems.numpy(), found.given, found.node(np.full(400, piece), u))
         (state,) = found.model.states
-        z, torque = states.moved(state, at).coordinate(), at.force
+        z, torque = model.read_at(state, at).coordinate(), at.force
         rate = (torque - k * z) / c
         width = np.diff(found.cycle.starts)[piece] * weights / 2
         crank += float(width @ at.crank_torque)

@@ -12,9 +12,9 @@ from loomopt.base.quantities import exact
 from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model.model import _with, with_words_fixed
+from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Load
-from loomopt.program import settled
-from loomopt.program.sampling import Sampler
 
 # What it takes away, what it refuses, what it says ------------------------------------------------------------------
 
@@ -102,8 +102,8 @@ def test_sharper_machines_have_more_harmonics_and_the_digits_of_more_still():
     model, values = job.model(scene), job.numbers(scene)
     count = int({key: word for _, key, word in model.words}["harmonics"])
     assert count > 32
-    more = settled._with(model, tuple((e, k, str(2 * count) if k == "harmonics" else w) for e, k, w in model.words), ())
-    assert settled.settled(more, values) is more
+    more = _with(model, tuple((e, k, str(2 * count) if k == "harmonics" else w) for e, k, w in model.words), ())
+    assert with_words_fixed(more, values) is more
     one, other = Sampler(model, values), Sampler(more, values)
     for name in ("shaft_peak", "twist_peak", "peak_torque"):
         assert one.peak(name) == pytest.approx(other.peak(name), rel=1e-12)

@@ -13,9 +13,9 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model.reading import DATUM
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.program.reading import DATUM
 from loomopt.studies import accuracy, front
 
 BEATUP = lo.load("beatup")

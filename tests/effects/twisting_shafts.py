@@ -9,8 +9,8 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
+from loomopt.model import model
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.program import states
 
 PLAIN = lo.load("beatup")
 OMEGA, J4, M0 = 20 * math.pi, 0.62, 745.0
@@ -46,4 +46,4 @@ def read(found, phi):
     pieces, u = found.cycle.located(np.asarray(phi))
     at = found.model.instant(systems.numpy(), found.given, found.node(pieces, u))
     (state,) = found.model.states
-    return states.moved(state, at)
+    return model.read_at(state, at)

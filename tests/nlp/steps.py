@@ -6,13 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Arcs, Chain, Group
+from loomopt.model.model import JobModel, Quantity, Row
+from loomopt.model.program import Limit, Objective, Program, Variable
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Node
 from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Values
-from loomopt.program.kinematics import Arcs, Chain, Group
-from loomopt.program.model import JobModel, Quantity, Row
-from loomopt.program.program import Limit, Objective, Program, Variable
 
 COUNT = 12
 NAMES = tuple(f"x{k}" for k in range(COUNT))

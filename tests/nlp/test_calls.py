@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from waves import model, objective, program
 
+from loomopt.model.program import Limit, Objective, Variable
+from loomopt.model.sampling import Extreme
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family
 from loomopt.nlp.point import Elastic, Known, Settings
-from loomopt.program.program import Limit, Objective, Variable
-from loomopt.program.sampling import Extreme
 
 X = {"x": 0.5, "y": -2.0}
 

@@ -10,11 +10,11 @@ import pytest
 from waves import model, objective, program
 
 from loomopt.jobs import registry
+from loomopt.model.kinematics import Arcs
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.nlp import exchange, ipopt
 from loomopt.nlp.point import Elastic, Settings, sampler_at
 from loomopt.physics.cycle import TURN, split
-from loomopt.program.kinematics import Arcs
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.certificate import certify
 
 BEATUP = registry.load("beatup")

@@ -8,8 +8,8 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
-from loomopt.program.sampling import Sampler
 
 RAPIER = registry.load("rapier")
 JOB = registry.of(RAPIER)

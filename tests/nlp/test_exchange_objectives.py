@@ -9,9 +9,9 @@ import pytest
 from waves import WAVES, model, objective, program
 
 from loomopt.maths import systems
+from loomopt.model.sampling import Sampler
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
-from loomopt.program.sampling import Sampler
 
 ROOT = 2**0.5
 

@@ -9,10 +9,10 @@ from beatup_nlps import EFFECTS, TARGETS, expected_rows, owner_of, program_of, p
 from waves import WAVES, model, objective, program
 
 from loomopt.maths import systems
+from loomopt.model.reading import Reading
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import families
 from loomopt.nlp.point import Elastic, Settings
-from loomopt.program.reading import Reading
 
 CASES: list[tuple[tuple[str, ...], str, tuple[tuple[str, str], ...]]]
 CASES = [((), target, ()) for target in TARGETS]

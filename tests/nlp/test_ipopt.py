@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from waves import objective, program
 
+from loomopt.model.sampling import Tally
 from loomopt.nlp import ipopt
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Settings
-from loomopt.program.sampling import Tally
 
 X = {"x": 0.5, "y": 0.4}
 

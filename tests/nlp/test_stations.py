@@ -5,6 +5,8 @@ import pytest
 from steps import COUNT, program
 
 from loomopt.jobs import registry
+from loomopt.model.chains import stations
+from loomopt.model.sampling import Extreme
 from loomopt.nlp import exchange
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.families import Family, families
@@ -12,8 +14,6 @@ from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.stations import Stood, held, owners
 from loomopt.nlp.structure import structure
 from loomopt.physics.cycle import TURN
-from loomopt.program.chains import stations
-from loomopt.program.sampling import Extreme
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.model import Instant, JobModel, Quantity, Row
+from loomopt.model.program import Limit, Objective, Program, Variable
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Values
-from loomopt.program.kinematics import Arcs, Group
-from loomopt.program.model import Instant, JobModel, Quantity, Row
-from loomopt.program.program import Limit, Objective, Program, Variable
 
 Wave = Callable[[Maths, Values, Number], Number]
 

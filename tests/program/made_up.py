@@ -4,12 +4,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Arcs, Group
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.schema import Table, Values
-from loomopt.program.kinematics import Arcs, Group
 
 FRONT, REAR = "front", "rear"
 

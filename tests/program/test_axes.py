@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.program.sampling import sampled
+from loomopt.model.sampling import sampled
 
 
 def traded(name, target, **asked):

@@ -10,12 +10,12 @@ from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from scipy.optimize import minimize
 
 from loomopt.maths import systems
+from loomopt.model.model import Integral, JobModel, Quantity, Row, cased
+from loomopt.model.program import Limit, Objective, Program, Variable
+from loomopt.model.sampling import Sampler
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings
 from loomopt.physics.cycle import TURN, Node
-from loomopt.program.model import Integral, JobModel, Quantity, Row, cased
-from loomopt.program.program import Limit, Objective, Program, Variable
-from loomopt.program.sampling import Sampler
 
 OTHER = {"cloth.F": 700.0, "cloth.width": 1.7}
 """The second fabric: softer, and pressed earlier."""

@@ -4,7 +4,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.program import drive
+from loomopt.model import drive
 
 SCENES = {
     "beatup": lo.load("beatup"),

@@ -6,8 +6,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.program import sampling
-from loomopt.program.sampling import KEPT, Sampler, sampled
+from loomopt.model import sampling
+from loomopt.model.sampling import KEPT, Sampler, sampled
 
 SCENE = lo.load("beatup")
 JOB = registry.of(SCENE)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from loomopt.jobs import registry
+from loomopt.model.sampling import CHUNK, Sampler
 from loomopt.physics.cycle import TURN
-from loomopt.program.sampling import CHUNK, Sampler
 
 POINTS = 1_000_000
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")

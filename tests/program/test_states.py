@@ -14,16 +14,16 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
 from loomopt.maths import systems
+from loomopt.model.model import JobModel, Quantity, Row, cased
+from loomopt.model.program import Limit, Objective, Program, Variable
+from loomopt.model.reading import Reading
+from loomopt.model.sampling import Sampler
 from loomopt.nlp import exchange
 from loomopt.nlp.point import Settings, sampler_at
 from loomopt.nlp.transcribe import transcribe
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load, State
 from loomopt.physics.schema import Table
-from loomopt.program.model import JobModel, Quantity, Row, cased
-from loomopt.program.program import Limit, Objective, Program, Variable
-from loomopt.program.reading import Reading
-from loomopt.program.sampling import Sampler
 
 SAMPLES = 8
 

@@ -7,7 +7,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.program.stretches import near_zero
+from loomopt.model.sampling import near_zero
 
 
 def sampler(name, **design):

@@ -17,13 +17,12 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
+from loomopt.model import reading, sampling
+from loomopt.model.model import JobModel, Quantity, Row
+from loomopt.model.reading import DATUM, Quantities
+from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.program import sampling, traced
-from loomopt.program.model import JobModel, Quantity, Row
-from loomopt.program.reading import DATUM
-from loomopt.program.sampling import Sampler
-from loomopt.program.traced import Quantities
 from loomopt.scene.packaged import problem_names
 from loomopt.solving.bounded import Boxes
 
@@ -73,7 +72,7 @@ def switched(sampler, piece):
     return {**{name: float(value) for name, value in sampler.cycle.switch(piece).items()}, DATUM: 0.3}
 
 
-RECORDED = functools.cache(traced.recorded)
+RECORDED = functools.cache(reading.recorded_quantities)
 
 
 def told(read):
@@ -118,7 +117,7 @@ def test_several_together_are_each_alone(name):
     names = tuple(quantities(sampler.model))
     node = sampler.node(*nodes(sampler, 20, 5))
     node = Node(node.phi, {**node.switch, DATUM: np.linspace(-0.5, 0.5, 20)})
-    recording = traced.recorded(sampler.model, names, tuple(node.switch), sampler.given.known)
+    recording = reading.recorded_quantities(sampler.model, names, tuple(node.switch), sampler.given.known)
     found = recording.bind((systems.FLOAT, systems.numpy()), sampler.given)(node)
     for each, value in zip(names, found, strict=True):
         alone = sampler.model.quantity(systems.numpy(), sampler.given, each, node)
@@ -194,12 +193,12 @@ def yoke(**quantities):
 @pytest.fixture
 def made():
     """The recordings that are made: a mock that makes them."""
-    with mock.patch.object(traced, "recorded", wraps=traced.recorded) as recorded:
+    with mock.patch.object(reading, "recorded_quantities", wraps=reading.recorded_quantities) as recorded:
         yield recorded
 
 
 def test_a_quantity_is_recorded_once_after_as_many_evaluations_as_make_it_worth_it(made, monkeypatch):
-    monkeypatch.setattr(traced, "WORTH_IT", 5)
+    monkeypatch.setattr(reading, "WORTH_IT", 5)
     model, values = yoke(), []
     for _ in range(4):
         sampler = Sampler(model, NUMBERS)
@@ -212,7 +211,7 @@ def test_a_quantity_is_recorded_once_after_as_many_evaluations_as_make_it_worth_
 
 
 def test_systems_share_a_recording(made, monkeypatch):
-    monkeypatch.setattr(traced, "WORTH_IT", 0)
+    monkeypatch.setattr(reading, "WORTH_IT", 0)
     sampler = Sampler(yoke(), NUMBERS)
     for system in (systems.FLOAT, systems.mpmath(), systems.jets()):
         sampler.read(system).at("torque", 0, system.number(0.25))
@@ -235,17 +234,17 @@ def test_a_formula_that_cannot_be_recorded_is_run_as_it_is(formula, made, monkey
     sampler = Sampler(model, NUMBERS)
     pieces, u = sampler.grid()
     before = sampler.at("odd", pieces, u)
-    monkeypatch.setattr(traced, "WORTH_IT", 0)
+    monkeypatch.setattr(reading, "WORTH_IT", 0)
     for _ in range(3):
         assert sampler.at("odd", pieces, u).tobytes() == before.tobytes()
     assert made.call_count == 1, "it is not tried again"
     with pytest.raises(TypeError, match=r"Recorded|no value"):
-        traced.recorded(model, ("odd",), ("cloth",), sampler.given.known)
+        reading.recorded_quantities(model, ("odd",), ("cloth",), sampler.given.known)
 
 
 def test_numbers_made_by_hand_are_not_recorded(monkeypatch):
     """Nobody knows what they follow from."""
-    monkeypatch.setattr(traced, "WORTH_IT", 0)
+    monkeypatch.setattr(reading, "WORTH_IT", 0)
     sampler = Sampler(yoke(), NUMBERS)
     by_hand = Given(sampler.given.values, sampler.given.own)
     node = Node(1.0, {"cloth": 0.0})
@@ -254,10 +253,10 @@ def test_numbers_made_by_hand_are_not_recorded(monkeypatch):
 
 
 def test_recordings_go_with_their_model(monkeypatch):
-    monkeypatch.setattr(traced, "WORTH_IT", 0)
+    monkeypatch.setattr(reading, "WORTH_IT", 0)
     model = yoke()
     Sampler(model, NUMBERS).at("torque", np.array([0]), np.array([0.5]))
-    assert model in traced._HISTORIES
+    assert model in reading._HISTORIES
     gone = weakref.ref(model)
     del model
     gc.collect()
@@ -268,10 +267,10 @@ def test_recordings_go_with_their_model(monkeypatch):
 def test_an_answer_does_not_hang_on_what_was_recorded(name, monkeypatch):
     """Nothing recorded, everything from the first evaluation on, and whatever this process has recorded so far."""
     answers = []
-    for worth_it in (traced.WORTH_IT, 0, 10**9):
-        monkeypatch.setattr(traced, "WORTH_IT", worth_it)
+    for worth_it in (reading.WORTH_IT, 0, 10**9):
+        monkeypatch.setattr(reading, "WORTH_IT", worth_it)
         if worth_it:
-            monkeypatch.setattr(traced, "_HISTORIES", weakref.WeakKeyDictionary())
+            monkeypatch.setattr(reading, "_HISTORIES", weakref.WeakKeyDictionary())
         sampling.forget()
         answers.append(lo.solve(lo.load(name)))
     for other in answers[1:]:

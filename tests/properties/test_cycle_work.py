@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from machines import NAMES, TURN, crank_rockers, drives, frames, machine, reeds, sides_of
 
 from loomopt.maths import systems
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
-from loomopt.program.sampling import Sampler
 
 POINTS = 4096
 """So many that the rule is right to rounding also for a crank-rocker a twentieth of its room from a change point."""

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import NAMES, drives, frames, machine, reeds, shares, varied
 
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
-from loomopt.program.sampling import Sampler
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|); worst of 1000 random machines each: 4.1 reed, 2 heald frame, 5.3 head."""

@@ -13,10 +13,10 @@ from shedding_cases import flat, freed, plain
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.program.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes, judged
 from loomopt.solving.certificate import certify

@@ -11,8 +11,8 @@ import toy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from loomopt.program.model import Integral
-from loomopt.program.sampling import Sampler, Tally
+from loomopt.model.model import Integral
+from loomopt.model.sampling import Sampler, Tally
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
 

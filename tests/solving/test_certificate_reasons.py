@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import COMPLEMENTARY, LARGEST_PRICE, POSITIVE, STATIONARY
-from loomopt.program.sampling import Sampler
 from loomopt.solving import certificate, kkt, second_order
 from loomopt.solving.certificate import Cycle, JudgedLevel, certified, certify
 from loomopt.solving.exact import Exact

@@ -9,9 +9,9 @@ from test_feasible_curve import ROOM
 
 import loomopt as lo
 from loomopt.maths.systems import FLOAT
+from loomopt.model.program import Move, Wish
 from loomopt.nlp.point import Settings
 from loomopt.physics.mechanisms.cam_spline import spline
-from loomopt.program.program import Move, Wish
 from loomopt.solving import change, second_order, settle
 from loomopt.solving.certificate import certify
 from loomopt.solving.change import with_least_change

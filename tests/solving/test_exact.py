@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import toy
 
-from loomopt.program.sampling import Extreme, Sampler
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.solving.exact import Exact
 from loomopt.solving.rows import active_set
 

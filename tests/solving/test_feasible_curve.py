@@ -5,7 +5,7 @@ import pytest
 import toy
 
 import loomopt as lo
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import SECOND_ORDER_OPEN, certify
 from loomopt.solving.exact import Exact
 from loomopt.solving.feasible_curve import FeasibleCurve

@@ -11,9 +11,9 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import variables
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
-from loomopt.program.sampling import Sampler
 from loomopt.solving.exact import Exact
 from loomopt.solving.forward import Forward
 from loomopt.solving.rows import active_set

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
-from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt
 from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers, System, replaceable, solved

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 import toy
 
-from loomopt.program.program import Limit, Objective
-from loomopt.program.sampling import Sampler
+from loomopt.model.program import Limit, Objective
+from loomopt.model.sampling import Sampler
 from loomopt.solving.prices import figure_of, priced
 
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}

@@ -13,7 +13,7 @@ from shedding_cases import flat, freed, product
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving import bounded
 from loomopt.solving.bounded import Boxes
 

@@ -13,7 +13,7 @@ from shedding_by_hand import product as framed
 from shedding_cases import product
 
 import loomopt as lo
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.scene.packaged import problem_names
 
 

@@ -6,8 +6,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.model.program import Goal, Limit, goals
 from loomopt.physics.tolerances import BALANCED, FEASIBLE
-from loomopt.program.program import Goal, Limit, goals
 
 ASKED = {
     "beatup": {"balance": ["M3_fdc"], "pulse": [], "torque": ["M3_fdc"], "retrofit": ["M3_fdc"]},

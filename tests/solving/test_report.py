@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import toy
 
-from loomopt.program.program import Limit, Objective
+from loomopt.model.program import Limit, Objective
 from loomopt.solving import report
 from loomopt.solving.solution import Clash, Relaxation
 from loomopt.solving.verdict import Binding, Certificate

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 import toy
 
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import ACTIVE
-from loomopt.program.sampling import Sampler
 from loomopt.solving.rows import active_set
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import toy
 
-from loomopt.program.program import Move, Wish
-from loomopt.program.sampling import Sampler
+from loomopt.model.program import Move, Wish
+from loomopt.model.sampling import Sampler
 from loomopt.solving import kkt, second_order
 from loomopt.solving.certificate import certify
 from loomopt.solving.exact import Exact

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import toy
 
+from loomopt.model.program import Move, Wish
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
-from loomopt.program.program import Move, Wish
-from loomopt.program.sampling import Sampler
 from loomopt.solving import kkt, second_order
 from loomopt.solving.exact import Exact
 from loomopt.solving.kkt import Multipliers

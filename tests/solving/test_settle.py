@@ -6,7 +6,7 @@ import toy
 from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
-from loomopt.program.program import Move, Wish
+from loomopt.model.program import Move, Wish
 from loomopt.solving.settle import _directions, _ends, goal_of, settle, unchanging, wished
 
 

@@ -44,7 +44,7 @@ def test_a_travel_that_would_better_be_longer_has_a_price_of_that_side():
 
 
 def test_variables_without_room_are_held_on_both_sides():
-    from loomopt.program.program import Limit
+    from loomopt.model.program import Limit
     from loomopt.solving.rows import ActiveSet, Row
 
     limit = Limit("kept", -1, "a", 1.0, 1.0, "variable")

@@ -7,9 +7,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.model import model
+from loomopt.model.sampling import sampled
 from loomopt.nlp.point import Settings
-from loomopt.program import settled
-from loomopt.program.sampling import sampled
 from loomopt.solving import engine
 from loomopt.solving.certificate import certify
 from loomopt.solving.exact import Exact
@@ -111,7 +111,7 @@ def coarse(count):
     """Return the program with so few harmonics, as if it had been made for another machine."""
     program = registry.of(SCENE).program(SCENE, "balance")
     words = tuple((e, key, str(count) if key == "harmonics" else word) for e, key, word in program.model.words)
-    return replace(program, model=settled._with(program.model, words, ()))
+    return replace(program, model=model._with(program.model, words, ()))
 
 
 def counted(program):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.program.program import Limit, Objective
+from loomopt.model.program import Limit, Objective
 from loomopt.solving.solution import Relaxation, remedies
 from loomopt.solving.verdict import Binding
 from loomopt.solving.words import Words, outward

@@ -13,16 +13,16 @@ from unittest import mock
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.curves import Columns
+from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.model.program import Limit, Move, Objective, Program, Variable
+from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Figure, Table, Target, Values
 from loomopt.picture.job_views import JobViews
-from loomopt.program.curves import Columns
-from loomopt.program.kinematics import Arcs, Group
-from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
-from loomopt.program.program import Limit, Move, Objective, Program, Variable
-from loomopt.program.sampling import Sampler
 from loomopt.scene import scene
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema

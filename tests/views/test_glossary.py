@@ -10,7 +10,7 @@ import loomopt as lo
 from loomopt.base.quantities import quantity_of
 from loomopt.cli import run
 from loomopt.jobs import registry, sources
-from loomopt.program.curves import split
+from loomopt.model.curves import split
 from loomopt.views import glossary
 
 JOBS = registry.own_names()

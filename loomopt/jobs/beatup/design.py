@@ -5,11 +5,11 @@ import math
 from loomopt.jobs.base import Figures
 from loomopt.jobs.beatup.model import FRONT
 from loomopt.jobs.beatup.scene import VARIABLES, RetrofitTarget
+from loomopt.model.axes import opposite
+from loomopt.model.numbers import Bounds
+from loomopt.model.program import Goal, Numbers, Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import BALANCED, NO_MASS
-from loomopt.program.axes import opposite
-from loomopt.program.numbers import Bounds
-from loomopt.program.program import Goal, Numbers, Program
-from loomopt.program.sampling import Sampler
 from loomopt.scene.scene import Scene
 
 BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")

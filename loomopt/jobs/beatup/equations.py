@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 
 from loomopt.maths import systems
+from loomopt.model.model import JobModel
 from loomopt.physics import balance
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.program.model import JobModel
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:

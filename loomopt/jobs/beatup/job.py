@@ -8,12 +8,12 @@ from loomopt.jobs.base import Figures, Job
 from loomopt.jobs.beatup import design as designs
 from loomopt.jobs.beatup import program as programs
 from loomopt.jobs.beatup.scene import SCHEMA, check
-from loomopt.program.curves import Columns
-from loomopt.program.model import JobModel
-from loomopt.program.numbers import bounds
-from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler
-from loomopt.program.studied import Studied
+from loomopt.model.curves import Columns
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import bounds
+from loomopt.model.program import Numbers, Program
+from loomopt.model.sampling import Sampler
+from loomopt.model.studied import Studied
 from loomopt.scene.scene import Scene
 
 

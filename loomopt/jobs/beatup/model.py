@@ -11,15 +11,15 @@ from typing import Any
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
+from loomopt.model import drive
+from loomopt.model.kinematics import Arcs, Group, four_bar
+from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node, Where
 from loomopt.physics.effects.kinds import Effect, Load, Motion
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Values
-from loomopt.program import drive
-from loomopt.program.kinematics import Arcs, Group, four_bar
-from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
 
 FRONT, REAR = "front dead centre", "rear dead centre"
 LENGTHS = ("l1", "l2", "l3", "l4")

@@ -12,14 +12,14 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.mechanisms import counterweight
 from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
+from loomopt.model import numbers as scene_numbers
+from loomopt.model.drive import TORQUE
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import Bounds, bound_limits, demand_figures, demanded, ends
+from loomopt.model.program import Limit, Move, Numbers, Objective, Program, Variable, Wish, goals
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.tolerances import NO_MASS
-from loomopt.program import numbers as scene_numbers
-from loomopt.program.drive import TORQUE
-from loomopt.program.model import JobModel
-from loomopt.program.numbers import Bounds, bound_limits, demand_figures, demanded, ends
-from loomopt.program.program import Limit, Move, Numbers, Objective, Program, Variable, Wish, goals
-from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene.scene import Scene
 from loomopt.scene.tables import Limit as Limited
 

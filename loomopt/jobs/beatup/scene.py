@@ -9,10 +9,10 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.base.units import Shown, usual
 from loomopt.jobs.beatup.model import CrankRocker
+from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.program import drive
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR
 from loomopt.maths.systems import FLOAT
+from loomopt.model.curves import tops
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import State
 from loomopt.picture.job_views import JobViews
-from loomopt.program.curves import tops
 from loomopt.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -12,12 +12,32 @@ from loomopt.jobs.base import Figures
 from loomopt.jobs.rapier.model import jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, VARIABLES, MatchTarget, match_table
 from loomopt.maths.turning_points import crossing
+from loomopt.model.model import JobModel
+from loomopt.model.program import Numbers, Program
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import TURN, Node
-from loomopt.program.model import JobModel
-from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler, sampled
-from loomopt.program.turning import settled
 from loomopt.scene.scene import Scene
+
+STEPS, FARTHEST, LAST = 6, 1e-3, 1e-15
+"""Newton's steps from a sampled extreme, which is right to 1e-8; rad beyond which a step leads elsewhere, and that end
+them."""
+
+
+def settled_turn(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
+    """Return the crank angle, rad, of a turning point after Newton's method from nearby.
+
+    derivatives: quantities that are the first and the second derivative in the crank angle.
+    """
+    for _ in range(STEPS):
+        slope, bend = sampler.at_angle(derivatives, angle)
+        step = slope / bend if bend else 0.0
+        if abs(step) > FARTHEST:
+            return angle
+        angle -= step
+        if abs(step) < LAST:
+            break
+    return angle
+
 
 SAMPLES = 720
 TOUCHES = 1e-9
@@ -42,7 +62,7 @@ def read(sampler: Sampler) -> Reading:
     outward = max(found, key=lambda extreme: extreme.value)
     stroke, phi = 0.0, 0.0
     if outward.value > 0.0:
-        phi = settled(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
+        phi = settled_turn(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
         stroke = sampler.at_angle(("S",), phi)[0]
     room = sampler.given.values.get("s_dwell")
     if room is None:

@@ -1,11 +1,11 @@
 """The equations a rapier scene really uses: both loops, the rapier's travel, each effect's own formula on symbols."""
 
 from loomopt.maths import systems
+from loomopt.model.model import JobModel
 from loomopt.physics import balance
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.program.model import JobModel
 
 
 def equations(model: JobModel) -> tuple[Equation, ...]:

@@ -8,11 +8,11 @@ from loomopt.jobs.rapier import design as designs
 from loomopt.jobs.rapier import program as programs
 from loomopt.jobs.rapier.scene import SCHEMA, check
 from loomopt.maths.systems import FLOAT
-from loomopt.program.curves import Columns
-from loomopt.program.model import JobModel
-from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler
-from loomopt.program.studied import Crossing, Studied
+from loomopt.model.curves import Columns
+from loomopt.model.model import JobModel
+from loomopt.model.program import Numbers, Program
+from loomopt.model.sampling import Sampler
+from loomopt.model.studied import Crossing, Studied
 from loomopt.scene.scene import Scene
 
 

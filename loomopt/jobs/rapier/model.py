@@ -13,6 +13,9 @@ from typing import Any
 from loomopt.base.records import lazy
 from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Maths, Number
+from loomopt.model import drive
+from loomopt.model.kinematics import Arcs, Group, four_bar
+from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.effects.kinds import Effect, Motion
@@ -20,9 +23,6 @@ from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
-from loomopt.program import drive
-from loomopt.program.kinematics import Arcs, Group, four_bar
-from loomopt.program.model import Instant, Integral, JobModel, Quantity, Row
 
 DIMENSIONS = tuple(entry.name for entry in fields(rapier_drive.Dimensions))
 SLEY = ("l1", "l2", "l3", "l71")

@@ -13,13 +13,13 @@ from loomopt.jobs.rapier.design import follow, read
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
 from loomopt.maths.systems import FLOAT
+from loomopt.model import numbers as scene_numbers
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
+from loomopt.model.program import Limit, Move, Objective, Program, Variable, goals
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.program import numbers as scene_numbers
-from loomopt.program.model import JobModel
-from loomopt.program.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, goals
-from loomopt.program.sampling import Sampler, sampled
 from loomopt.scene.scene import Scene
 from loomopt.scene.tables import Limit as Limited
 

@@ -9,10 +9,10 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.base.refusals import refusal
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
+from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.program import drive
 from loomopt.scene import csv_tables
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema

@@ -16,6 +16,12 @@ from loomopt.jobs.shedding.model import RETURN, RETURN_SPRING, RISE, FramePose, 
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, LawTarget
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
+from loomopt.model import drive
+from loomopt.model.model import JobModel
+from loomopt.model.program import Numbers, Program, Variable
+from loomopt.model.sampling import Extreme, Sampler
+from loomopt.model.speeds import speed_reached
+from loomopt.model.studied import Family
 from loomopt.physics import balance
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Load
@@ -23,12 +29,6 @@ from loomopt.physics.mechanisms import cam_limit
 from loomopt.physics.mechanisms.cam_laws import Derivatives
 from loomopt.physics.mechanisms.cam_motion import Spline, named_knots
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.program import drive
-from loomopt.program.model import JobModel
-from loomopt.program.program import Numbers, Program, Variable
-from loomopt.program.sampling import Extreme, Sampler
-from loomopt.program.speeds import speed_reached
-from loomopt.program.studied import Family
 from loomopt.scene.scene import Scene
 
 CYCLE = {

@@ -16,6 +16,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
 from loomopt.jobs.shedding.scene import Frame
 from loomopt.maths import systems
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.mechanisms.cam_follower import Follower, Stations
 from loomopt.physics.mechanisms.cam_motion import Spline
@@ -27,7 +28,6 @@ from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive
 from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.picture.symbols import arrow, fixed_pivot
 from loomopt.picture.units import Units, told
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
 

@@ -20,6 +20,7 @@ from loomopt.jobs.shedding.model import (
 )
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.model import JobModel
 from loomopt.physics.balance import Acting, Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load, Motion
@@ -27,7 +28,6 @@ from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.picture import effect_equations
 from loomopt.picture.cam_laws import Unwritten, law
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
-from loomopt.program.model import JobModel
 
 SPEED = "omega"
 SEGMENTS = {

@@ -8,13 +8,12 @@ from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import contact, moving
 from loomopt.jobs.shedding.scene import SCHEMA, LawTarget, check
+from loomopt.model.curves import Columns
+from loomopt.model.model import Formula, JobModel
+from loomopt.model.program import Numbers, Program
+from loomopt.model.sampling import Sampler
+from loomopt.model.studied import Studied
 from loomopt.physics.mechanisms.cam_motion import Spline, knots
-from loomopt.program.curves import Columns
-from loomopt.program.instant import Formula
-from loomopt.program.model import JobModel
-from loomopt.program.program import Numbers, Program
-from loomopt.program.sampling import Sampler
-from loomopt.program.studied import Studied
 from loomopt.scene.scene import Scene
 
 

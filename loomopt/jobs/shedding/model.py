@@ -13,6 +13,9 @@ from fractions import Fraction
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.turning_points import followed
+from loomopt.model import drive
+from loomopt.model.kinematics import Arcs, Chain, Group
+from loomopt.model.model import Instant, JobModel, Quantity, Row
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Effect, Load, Motion
@@ -21,9 +24,6 @@ from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.physics.mechanisms.cam_laws import Derivatives
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
 from loomopt.physics.schema import Table, Values
-from loomopt.program import drive
-from loomopt.program.kinematics import Arcs, Chain, Group
-from loomopt.program.model import Instant, JobModel, Quantity, Row
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 RISE, FAR_DWELL, RETURN, NEAR_DWELL = range(4)

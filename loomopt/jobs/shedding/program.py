@@ -11,17 +11,17 @@ from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.design import CONTACT_SPEED, CYCLE, Sizes, contact, survived
 from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, LIFT, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
+from loomopt.model import drive
+from loomopt.model import numbers as scene_numbers
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
+from loomopt.model.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
+from loomopt.model.sampling import sampled
+from loomopt.model.speeds import followed
 from loomopt.physics.effects.kinds import Check, owned
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.physics.tolerances import START_ROOM
-from loomopt.program import drive
-from loomopt.program import numbers as scene_numbers
-from loomopt.program.model import JobModel
-from loomopt.program.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
-from loomopt.program.sampling import sampled
-from loomopt.program.speeds import followed
 from loomopt.scene.scene import Scene
 
 SPEED = "operation.speed"

@@ -22,13 +22,13 @@ from loomopt.base.quantities import (
 from loomopt.base.refusals import refusal
 from loomopt.base.units import Shown, usual
 from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
+from loomopt.model import drive
+from loomopt.model.numbers import check_known
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.program import drive
-from loomopt.program.numbers import check_known
 from loomopt.scene import csv_tables
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema

@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING, Any, get_args
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
 from loomopt.maths.systems import FLOAT, Number
+from loomopt.model.curves import POWER
+from loomopt.model.sampling import Sampler, near_zero
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
-from loomopt.program.curves import POWER
-from loomopt.program.sampling import Sampler
-from loomopt.program.stretches import near_zero
 from loomopt.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from loomopt.model.separation import Parted
     from loomopt.picture.equations import Equation
     from loomopt.picture.shapes import Drawing
-    from loomopt.program.parting import Parted
 
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""

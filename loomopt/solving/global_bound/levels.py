@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from loomopt.jobs.base import Job
 from loomopt.maths.intervals import Floats
+from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
-from loomopt.program.program import Limit, Objective, Program
-from loomopt.program.sampling import Sampler
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.cuts import multipliers
 from loomopt.solving.global_bound.reading import Reader

@@ -16,9 +16,9 @@ from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.maths.intervals import PI, Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, Node, Where
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.task import Task
 
 Places = NDArray[np.intp]

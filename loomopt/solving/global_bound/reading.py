@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from loomopt.maths import systems
 from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
+from loomopt.model.program import Limit, Objective
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ACTIVE
-from loomopt.program.program import Limit, Objective
-from loomopt.program.sampling import Extreme, Sampler
 from loomopt.solving.global_bound.nodes import Layout, Spots, layouts
 from loomopt.solving.global_bound.rows import BoxRows, OpenError, strips
 from loomopt.solving.global_bound.task import Task

@@ -8,11 +8,10 @@ from loomopt.maths import systems
 from loomopt.maths.interval_series import Series, along
 from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.model import Integral, JobModel, Stills
+from loomopt.model.reading import DATUM, Quantities, Rows
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Cycle, Node
-from loomopt.program.model import Integral, JobModel, Stills
-from loomopt.program.reading import DATUM, Rows
-from loomopt.program.traced import Quantities
 
 STRIPS = ((0.1, 8), (0.03, 16), (0.0, 32))
 """Strips of a piece over which a mean is enclosed, by the width of boxes as a share of the whole: what strips leave

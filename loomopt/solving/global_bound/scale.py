@@ -11,8 +11,8 @@ import numpy as np
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Number
-from loomopt.program.program import Move, Program
-from loomopt.program.sampling import Sampler
+from loomopt.model.program import Move, Program
+from loomopt.model.sampling import Sampler
 
 DRAWN, TRIED = 3, 60
 """Random designs at which rows are read at two sizes, and draws to find them: formulas that agree to 30 digits at one

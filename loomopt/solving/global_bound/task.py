@@ -9,7 +9,7 @@ from loomopt.maths import intervals
 from loomopt.maths.intervals import Floats, Interval
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
-from loomopt.program.program import Limit, Program, Variable
+from loomopt.model.program import Limit, Program, Variable
 from loomopt.solving.global_bound.rows import BoxRows, OpenError
 from loomopt.solving.global_bound.scale import Scale
 

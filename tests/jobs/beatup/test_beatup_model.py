@@ -11,11 +11,11 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.model import FRONT, REAR, CrankRocker
 from loomopt.maths import systems
+from loomopt.model.model import JobModel
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.beatup import counterweight_inertia, rod_inertia
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
-from loomopt.program.model import JobModel
 
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)

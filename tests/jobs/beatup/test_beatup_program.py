@@ -6,8 +6,8 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.model.program import Limit, Objective, Program, Variable, Wish
 from loomopt.physics.tolerances import NO_MASS
-from loomopt.program.program import Limit, Objective, Program, Variable, Wish
 
 BEATUP = registry.load("beatup")
 JOB = registry.of(BEATUP)

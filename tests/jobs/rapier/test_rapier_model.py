@@ -12,9 +12,9 @@ from loomopt.jobs import registry
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, SLEY_MARGINS, RapierDrive
 from loomopt.maths import systems
+from loomopt.model.model import JobModel
 from loomopt.physics.cycle import TURN, Node
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
-from loomopt.program.model import JobModel
 
 SCENE = registry.load("rapier").with_effect("head_inertia").with_effect("tape_friction")
 JOB = registry.of(SCENE)

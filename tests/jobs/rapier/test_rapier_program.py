@@ -8,7 +8,7 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.design import read
 from loomopt.jobs.rapier.program import constructed
-from loomopt.program.program import Variable
+from loomopt.model.program import Variable
 
 SCENE = registry.load("rapier")
 JOB = registry.of(SCENE)

@@ -12,10 +12,10 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.jobs.rapier import design as rapier_design
 from loomopt.maths import systems, turning_points
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions
-from loomopt.program.sampling import Sampler
 
 MP = mpmath.MPContext()
 MP.dps = 30

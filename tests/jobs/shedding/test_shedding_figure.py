@@ -7,8 +7,8 @@ import pytest
 
 import loomopt as lo
 from loomopt import tables
+from loomopt.model.curves import split
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.program.curves import split
 from loomopt.scene import designs
 from loomopt.views import figure, outputs, scene_view
 from loomopt.views.layout import Grid

@@ -8,9 +8,9 @@ import numpy as np
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
 from loomopt.nlp.point import Settings
-from loomopt.program.program import Program
-from loomopt.program.sampling import Sampler
 from loomopt.solving.engine import solve_program
 from loomopt.solving.global_bound import scale
 from loomopt.solving.global_bound.levels import loosening

@@ -5,7 +5,7 @@ from machines_in_boxes import designs, solved
 
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving.global_bound.nodes import layouts
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from machines_in_boxes import solved
 
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving.global_bound.reading import LIMIT, Reader
 
 

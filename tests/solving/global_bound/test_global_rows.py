@@ -6,7 +6,7 @@ from machines_in_boxes import solved
 
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval, interval
-from loomopt.program.sampling import Sampler
+from loomopt.model.sampling import Sampler
 from loomopt.solving.global_bound.nodes import layouts
 from loomopt.solving.global_bound.reading import Reader
 from loomopt.solving.global_bound.rows import BoxRows, OpenError, _summed, strips

@@ -1,11 +1,11 @@
 """The press: the least crank torque of a slider-crank, its stroke kept."""
 
 from loomopt.jobs.base import Figures, Job
-from loomopt.program import numbers
-from loomopt.program.curves import Columns
-from loomopt.program.model import JobModel
-from loomopt.program.program import Limit, Numbers, Objective, Program, Variable
-from loomopt.program.sampling import Sampler
+from loomopt.model import numbers
+from loomopt.model.curves import Columns
+from loomopt.model.model import JobModel
+from loomopt.model.program import Limit, Numbers, Objective, Program, Variable
+from loomopt.model.sampling import Sampler
 from loomopt.scene.scene import Scene
 from loomopt_press import model as press
 from loomopt_press.scene import SCHEMA, check

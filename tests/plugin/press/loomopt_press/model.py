@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Group, Kinematics
+from loomopt.model.model import Instant, JobModel, Quantity, Row
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Effect, Motion
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
-from loomopt.program.kinematics import Group, Kinematics
-from loomopt.program.model import Instant, JobModel, Quantity, Row
 
 TOP, BOTTOM = "top dead centre", "bottom dead centre"
 LONGER = "assembly: crank < rod"

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from loomopt.base.records import Frozen
+from loomopt.maths import peaks
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node
@@ -15,7 +16,6 @@ from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN, NEARLY_SINGULAR, SINGULAR_SAMPLES, WORTH_A_LOOK
-from loomopt.program import spikes
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""
@@ -59,7 +59,7 @@ def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float
 
         top = int(np.argmax(sampled))
         if sampled[top] > 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
-            found = spikes.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
+            found = peaks.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
             yield found, float(height(np.array([found]))[0])
 
 

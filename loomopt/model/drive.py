@@ -3,9 +3,9 @@
 from collections.abc import Collection, Iterable
 
 from loomopt.maths.systems import Number
+from loomopt.model.model import Instant, Quantity
 from loomopt.physics.effects.kinds import Effect, Load, Speed, State
 from loomopt.physics.schema import Figure
-from loomopt.program.instant import Instant, Quantity
 
 TORQUE, POWER = "peak_torque", "peak_power"
 FIGURES = (

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
 from loomopt.maths.systems import Number
+from loomopt.model.model import Formula, Instant, JobModel, Row
+from loomopt.model.program import Limit, Objective, Program
 from loomopt.physics.schema import Axis, Sense
-from loomopt.program.instant import Formula, Instant, Row
-from loomopt.program.model import JobModel
-from loomopt.program.program import Limit, Objective, Program
 
 Asked = Mapping[str, Sense]
 """Axis → which end of it is sought."""

@@ -9,17 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base.records import lazy
-from loomopt.maths import systems
+from loomopt.maths import peaks, systems
+from loomopt.maths.peaks import inside_samples, vertex
 from loomopt.maths.systems import Number
+from loomopt.model.model import Integral, JobModel, Stills
+from loomopt.model.program import Limit, Objective
+from loomopt.model.reading import DATUM, Quantities, Reading, Rows, quadrature
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.tolerances import CLOSER, LEAST_NODES, LEAST_SHARE, SAMPLES
-from loomopt.program import spikes
-from loomopt.program.model import Integral, JobModel, Stills
-from loomopt.program.parabolas import inside, vertex
-from loomopt.program.program import Limit, Objective
-from loomopt.program.reading import DATUM, Reading, Rows, quadrature
-from loomopt.program.traced import Quantities
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -232,7 +230,7 @@ class Sampler:
             return self.heights(name, self._at_angles(name, angles))
 
         found = []
-        for angle in (peak for centre in self.singular for peak in spikes.peaks(heights, centre)):
+        for angle in (peak for centre in self.singular for peak in peaks.spike_peaks(heights, centre)):
             value = float(self._at_angles(name, np.array([angle]))[0])
             found.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
         return found
@@ -265,10 +263,10 @@ class Sampler:
         step = u[inner + 1] - u[inner]
         centre = u[inner] + step * vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
         step = CLOSER * step
-        centre = inside(centre, 2 * step)
+        centre = inside_samples(centre, 2 * step)
         nodes = centre + step * np.arange(-2, 3)[:, None]
         around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
-        top = inside(centre + step * vertex(sign * around), np.zeros_like(step))
+        top = inside_samples(centre + step * vertex(sign * around), np.zeros_like(step))
         refined = sign * self.at(name, piece, top)
         # A level stretch's extreme is its beginning.
         bent = (around[0] != around[2]) | (around[4] != around[2])
@@ -329,3 +327,24 @@ class _SampledRows(Rows):
     def mean(self, integral: Integral) -> float:
         """Return a mean over the cycle, SI."""
         return self.sampler.mean(integral)
+
+
+STRETCH_SAMPLES = 3600
+"""Of one turn: ends of stretches are right to a tenth of a degree."""
+
+
+def near_zero(sampler: Sampler, name: str, most: float, least: float) -> list[tuple[float, float]]:
+    """Return the stretches (begin, end), rad, over which |quantity| is at most `most`, SI, where it is known.
+
+    least: the narrowest that counts, rad; one across the turn's end ends beyond it.
+    """
+    pieces, u = sampler.grid(STRETCH_SAMPLES)
+    angles = sampler.cycle.angles(pieces, u)
+    inside = np.flatnonzero((np.abs(sampler.at(name, pieces, u)) <= most) & sampler.on(name)[pieces])
+    if not inside.size:
+        return []
+    runs = np.split(inside, np.flatnonzero(np.diff(inside) > 1) + 1)
+    found = [(float(angles[run[0]]), float(angles[run[-1]])) for run in runs]
+    if len(found) > 1 and inside[0] == 0 and inside[-1] == len(u) - 1:
+        found = [*found[1:-1], (found[-1][0], found[0][1] + TURN)]
+    return [(begin, end) for begin, end in found if end - begin >= least]

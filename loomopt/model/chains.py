@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Chain
+from loomopt.model.model import JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.schema import Values
-from loomopt.program.kinematics import Chain
-from loomopt.program.model import JobModel
 
 
 class Station(NamedTuple):

@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from loomopt.base.errors import BadInput
+from loomopt.model import drive
+from loomopt.model.model import JobModel, with_words_fixed
+from loomopt.model.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, label, owned
 from loomopt.physics.tolerances import START_ROOM
-from loomopt.program import drive
-from loomopt.program.model import JobModel
-from loomopt.program.program import Limit, Move, Objective, Program, Variable, Wish
-from loomopt.program.sampling import Sampler
 from loomopt.scene.scene import Scene
 
 Bounds = Mapping[str, tuple[float, float]]
@@ -135,10 +135,9 @@ def settled(scene: Scene, model: JobModel, known: Mapping[str, float], design: M
     if not model.states:
         return model
     from loomopt.physics.effects.kinds import UnsteadyError
-    from loomopt.program import settled
 
     try:
-        return settled.settled(model, {**known, **{scene.full(name): value for name, value in (design or {}).items()}})
+        return with_words_fixed(model, {**known, **{scene.full(name): value for name, value in (design or {}).items()}})
     except UnsteadyError as error:
         names = ", ".join(f"effects.{state.name}" for state in model.states)
         raise BadInput(error.problem, file=scene.origin, key=names, remedy=f"{error.remedy}.") from None

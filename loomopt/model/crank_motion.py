@@ -9,16 +9,16 @@ import numpy as np
 from loomopt.base.refusals import refusal
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
+from loomopt.model import drive
+from loomopt.model.kinematics import Arcs, Group, Kinematics
+from loomopt.model.model import Instant, Row
+from loomopt.model.sampling import KEPT, Sampler
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion, Speed
 from loomopt.physics.motion.turning import NoTurn, Turning, solved
 from loomopt.physics.schema import Values
-from loomopt.program import drive
-from loomopt.program.instant import Instant, Row
-from loomopt.program.kinematics import Arcs, Group, Kinematics
-from loomopt.program.sampling import KEPT, Sampler
 from loomopt.scene.scene import Scene
 
 FLOATS = ("float", "numpy")

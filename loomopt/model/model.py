@@ -1,26 +1,246 @@
 """One model for every job: kinematics + effects + arcs + named quantities and rows, in every number system.
 
-Only this file groups effects by name and runs loads and checks; corners.py reads their switches, and states.py
-eliminates states, where there are any.
+Only this file groups effects by name and runs loads and checks, reads their switches, and eliminates states, where
+there are any.
 """
 
 import functools
 import math
-from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 from loomopt.base.records import lazy
-from loomopt.maths.systems import Maths, Number
-from loomopt.physics import cycle
+from loomopt.maths.systems import FLOAT, Maths, Number, arrays
+from loomopt.model.kinematics import Arcs, Kinematics, Squares
+from loomopt.physics import balance, cycle
 from loomopt.physics.balance import Acting, Given
-from loomopt.physics.cycle import Cycle, Node, Where
-from loomopt.physics.effects.kinds import Check, Demand, Effect, Load, Speed, State, label, owned
+from loomopt.physics.cycle import TURN, Cycle, Node, Where
+from loomopt.physics.effects.kinds import (
+    Carried,
+    Check,
+    Demand,
+    Effect,
+    Event,
+    Load,
+    Moved,
+    Speed,
+    State,
+    UnsteadyError,
+    label,
+    owned,
+)
 from loomopt.physics.schema import Values
-from loomopt.program import formulas
-from loomopt.program.corners import cornered
-from loomopt.program.instant import Formula, Instant, Integral, Quantity, Row
-from loomopt.program.kinematics import Arcs, Kinematics, Squares
+
+
+class Instant:
+    """The mechanism with its effects at one node, in one number system; what no formula reads is not computed.
+
+    event: where it stands at an event of the motion, whose pose is exact.
+    """
+
+    def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
+        self.model, self.maths, self.given, self.node, self.event = model, maths, given, node, event
+        self._pose: Number = None
+
+    @property
+    def values(self) -> Values:
+        """The scene's numbers and what follows from them, by name."""
+        return self.given.values
+
+    @property
+    def pose(self) -> Number:
+        """The mechanism's pose."""
+        # Not functools.cached_property: its lock costs as much as a node's own arithmetic.
+        if self._pose is None:
+            kinematics = self.model.kinematics
+            if self.event:
+                self._pose = kinematics.still(self.maths, self.given, self.event, self.node.switch)
+            else:
+                self._pose = kinematics.pose(self.maths, self.given, self.node)
+        return self._pose
+
+    @property
+    def force(self) -> Number:
+        """Q, N or N·m: what the mechanism must supply at its output."""
+        return balance.output_force(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+
+    @property
+    def crank_torque(self) -> Number:
+        """The torque on the crank, N·m."""
+        return balance.crank_torque(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+
+    def terms(self) -> dict[str, Number]:
+        """Return each load's term by its name, N or N·m."""
+        found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+        return {load.name: term for load, term in found}
+
+    def switched(self, **switch: Number) -> "Instant":
+        """Return the same node with other switches."""
+        node = Node(self.node.phi, {**self.node.switch, **switch})
+        return Instant(self.model, self.maths, self.given, node, self.event)
+
+    def at_speed(self, speed: Number) -> "Instant":
+        """Return the same node with the crank at another speed, rad/s; its pose must be a dataclass with `omega`."""
+        found = Instant(self.model, self.maths, self.given, self.node, self.event)
+        found._pose = replace(self.pose, omega=speed)
+        return found
+
+
+Formula = Callable[[Instant], Number]
+
+
+class Quantity(NamedTuple):
+    """A whole-cycle quantity; figure: whether its largest |value| is one.
+
+    signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
+    bound between points is proven with every answer; loaded: it reads the sum of the loads, so that it is known only
+    where all of them are.
+    """
+
+    formula: Formula
+    figure: bool = True
+    signed: bool = False
+    bounded: bool = False
+    loaded: bool = False
+
+
+class Row(NamedTuple):
+    """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
+
+    formula: Formula
+    needs: tuple[str, ...] = ()
+    event: str = ""
+
+
+class Integral(NamedTuple):
+    """A mean of `quantity` over the crank angle; root: its square root.
+
+    Over the pieces `where`; or, with `angles` (rad), over these alone, each with one number of `data` as the switch
+    "datum". parts: of each piece, where one rule does not resolve what rings on it.
+    """
+
+    name: str
+    root: str
+    quantity: str
+    where: Where | None = None
+    angles: tuple[float, ...] = ()
+    data: tuple[float, ...] = ()
+    parts: int = 1
+
+
+def group_value(formula: Callable[..., Number], at: Instant) -> Number:
+    """Return a quantity of links that must close."""
+    return formula(at.maths, at.given, at.node.phi, lambda: at.pose)
+
+
+def check_value(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return a quantity of a check, SI."""
+    return check.quantities[name](at.maths, at.pose, at.values, at.given.own[check.name])
+
+
+def design_value(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
+    """Return a row of the design alone, SI."""
+    return formula(at.maths, at.values)
+
+
+def check_row(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return a row of a check, SI."""
+    return check.rows[name](at.maths, at.values, at.given.own[check.name])
+
+
+class Cornered(NamedTuple):
+    """A switch: the angles, rad, of its corners, what reads it between them, and those that part the cycle."""
+
+    angles: tuple[Number, ...]
+    switch: Callable[[float, tuple[float, ...]], float]
+    placed: tuple[Number, ...]
+
+
+def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
+    """Return each switch of a model, those of further cases after the first's."""
+    found: list[Cornered] = []
+    for case in (given, *given.cases):
+        for arc in (*model.kinematics.arcs, *model.arcs):
+            angles = arc.corners(maths, case)
+            found.append(Cornered(angles, arc.switch, angles))
+        for load in model.loads:
+            if isinstance(load, Load) and load.corners:
+                angles = load.corners(maths, case.values, case.own[load.name])
+                # An event on a corner of the motion's own arcs would be that corner twice.
+                events = model.kinematics.breaks.intersection(load.reads)
+                there = {id(angle) for event in events for angle in case.values[event]}
+                found.append(Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
+    return found
+
+
+def with_states_eliminated(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], found: Given) -> Given:
+    """Return the scene's numbers with what follows from them for each state."""
+    for state in (load for load in loads if isinstance(load, State)):
+        moving = carried_by(maths, kinematics, loads, found, state)
+        derived = state.derived(maths, found.values, found.own[state.name], moving)
+        found = found._replace(values={**found.values, **derived})
+    return found
+
+
+def carried_by(maths: Maths, kinematics: Kinematics, loads: Sequence[Acting], given: Given, state: State) -> Carried:
+    """Return what moves with a state's coordinate."""
+    own = [load for load in loads if isinstance(load, Load) and load.name in state.carries]
+    inertias = [load.moved(given.values, given.own[load.name]) for load in own if load.moved]
+    smooth = [load for load in own if not load.corners]
+
+    def weigh(angles: Sequence[Number], weights: Sequence[Sequence[Number]]) -> list[Number]:
+        system = arrays(maths)
+        phi = system.spread(angles, [value for name, value in given.values.items() if name in given.known])
+        force = 0 * phi
+        if smooth:
+            pose = kinematics.pose(system, given, Node(phi, {}))
+            force = force + balance.total([term for _, term in balance.terms(system, smooth, pose, given, {})])
+        return system.weighted(weights, force)
+
+    return Carried(balance.total(inertias), weigh)
+
+
+def read_at(state: State, at: Instant) -> Moved:
+    """Return what is read of a state at an instant."""
+
+    def coordinate() -> Number:
+        given, pose = at.given, at.pose
+        reply = balance.replied(at.maths, state, at.model.loads, pose, given, at.node.switch)
+        return state.coordinate(at.maths, pose, given.values, given.own[state.name], reply)
+
+    return Moved(at.pose, coordinate, lambda: at.force)
+
+
+def state_value(state: State, formula: Callable[[Moved], Number], sign: int, at: Instant) -> Number:
+    """Return what a formula reads of a state, SI."""
+    return formula(read_at(state, at)) if sign > 0 else -formula(read_at(state, at))
+
+
+def state_quantities(states: Sequence[State]) -> dict[str, Quantity]:
+    """Return what states tell over the cycle; of a least value its opposite, which is no figure."""
+    return {
+        name: Quantity(
+            functools.partial(state_value, state, peak.read, -1 if peak.least else 1), not peak.least, signed=peak.least
+        )
+        for state in states
+        for name, peak in state.peaks.items()
+    }
+
+
+def state_columns(states: Sequence[State]) -> Mapping[str, Callable[[Instant], Number]]:
+    """Return the columns that states add to the curves, with their units."""
+    return {
+        name: functools.partial(state_value, state, formula, 1)
+        for state in states
+        for name, formula in state.columns.items()
+    }
+
+
+def uncovered(effects: Sequence[Effect], own: Mapping[str, Values]) -> tuple[str, ...]:
+    """Return what neither proofs nor studies of accuracy cover, by states and events; own: values by effect."""
+    return tuple(each.rests(own[each.name]) for each in effects if isinstance(each, State | Event))
+
 
 __all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
 
@@ -109,26 +329,24 @@ class JobModel:
         found = dict(self.own_quantities)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.quantities.items():
-                found[prefix + name] = Quantity(functools.partial(formulas.of_group, formula), figure=False)
+                found[prefix + name] = Quantity(functools.partial(group_value, formula), figure=False)
         for check in self.checks:
             for name in check.quantities:
-                found[name] = Quantity(functools.partial(formulas.of_check, check, name))
+                found[name] = Quantity(functools.partial(check_value, check, name))
         if not self.states:
             return found
-        from loomopt.program import states
+        # REMOVED
 
-        return found | states.quantities(self.states)
+        return found | state_quantities(self.states)
 
     @lazy
     def _rows(self) -> dict[str, Row]:
         found = dict(self.own_rows)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.rows.items():
-                found[name if name in group.margins else prefix + name] = Row(
-                    functools.partial(formulas.of_design, formula)
-                )
+                found[name if name in group.margins else prefix + name] = Row(functools.partial(design_value, formula))
         for check in self.checks:
-            found |= {name: Row(functools.partial(formulas.row_of, check, name)) for name in check.rows}
+            found |= {name: Row(functools.partial(check_row, check, name)) for name in check.rows}
         return {name: row for name, row in found.items() if self._sufficed(row)}
 
     def _sufficed(self, row: Row) -> bool:
@@ -213,9 +431,9 @@ class JobModel:
         found = self.plain(maths, values, known)
         if not self.states:
             return found
-        from loomopt.program import states
+        # REMOVED
 
-        return states.eliminated(maths, self.kinematics, self.loads, found)
+        return with_states_eliminated(maths, self.kinematics, self.loads, found)
 
     def samples(self, given: Given) -> int:
         """Return how many samples of one turn the states of a design need; 0 without any."""
@@ -340,3 +558,58 @@ class JobModel:
 def cased(name: str, case: int) -> str:
     """Return the name of a number, quantity, row, switch or event at a further case, counted from 1."""
     return f"{name} [case {case}]"
+
+
+RESOLVED = 95
+"""Samples, of those a state asks for, that the rule of a mean resolves to rounding (4 swings of the state's own)."""
+Word = tuple[str, str, str]
+
+
+def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
+    """Return the model as its states need it at a design (SI); itself where it serves that already.
+
+    Raises UnsteadyError where there is no steady state to trust.
+    """
+    if not model.states:
+        return model
+    given = model.plain(FLOAT, values, frozenset(values))
+    words = {(effect, key): word for effect, key, word in model.words}
+    for state in model.states:
+        carried = carried_by(FLOAT, model.kinematics, model.loads, given, state)
+        fixed = state.fixed(given.values, given.own[state.name], carried)
+        words |= {(state.name, key): word for key, word in fixed.items()}
+    first = _with(model, tuple((*key, word) for key, word in words.items()), ())
+    return _with(first, first.words, _parts(first, values))
+
+
+def unserved(model: JobModel, values: Mapping[str, float]) -> str:
+    """Return why the model is none for a design (SI), "" where it serves it."""
+    try:
+        return (
+            "" if with_words_fixed(model, values) is model else "a steady state needs more here than it was solved with"
+        )
+    except UnsteadyError as error:
+        return error.problem
+
+
+def _parts(model: JobModel, values: Mapping[str, float]) -> tuple[int, ...]:
+    """Return into how many parts each mean's pieces are cut, so that its rule resolves what rings on them."""
+    given = model.given(FLOAT, values)
+    samples, cycle = model.samples(given), model.split(FLOAT, given)
+    stretches = [cycle.stretch(mean.where) for mean in model.integrals]
+    shares = [(end - begin) / TURN for begin, end in stretches]
+    return tuple(
+        max(mean.parts, math.ceil(share * samples / RESOLVED))
+        for mean, share in zip(model.integrals, shares, strict=True)
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _made(model: JobModel, words: tuple[Word, ...], integrals: tuple[Integral, ...]) -> JobModel:
+    return replace(model, words=words, integrals=integrals)
+
+
+def _with(model: JobModel, words: tuple[Word, ...], parts: tuple[int, ...]) -> JobModel:
+    """Return the model with these words, and means in these parts; itself where it has them."""
+    cut = tuple(mean._replace(parts=n) for mean, n in zip(model.integrals, parts, strict=False)) or model.integrals
+    return model if (words, cut) == (model.words, model.integrals) else _made(model, words, cut)

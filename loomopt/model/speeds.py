@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from loomopt.maths.systems import numpy
+from loomopt.model.model import JobModel
+from loomopt.model.reading import Quantities
+from loomopt.model.sampling import Sampler, Tally, sampled
 from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
-from loomopt.program.model import JobModel
-from loomopt.program.sampling import Sampler, Tally, sampled
-from loomopt.program.traced import Quantities
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float, slack: float = 0.0) -> float:

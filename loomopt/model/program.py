@@ -11,10 +11,10 @@ from typing import Literal, NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.model import JobModel
 from loomopt.physics.cycle import Where
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import FEASIBLE
-from loomopt.program.model import JobModel
 
 
 @dataclass(frozen=True)
