@@ -47,13 +47,13 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt import entry_points
+    from loomopt.jobs import registry
     from loomopt.scene import packaged
     from loomopt.views import layout, listing
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
-    if silent or entry_points.of("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
+    if silent or registry.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
         from loomopt.jobs import registry
 
         others, wrong = registry.brought()

@@ -7,16 +7,17 @@ import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from loomopt.base.errors import BadInput
+from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
+from loomopt.maths.systems import Number
 from loomopt.model import drive, numbers
 from loomopt.model.curves import STEPS, Columns, curves, tops
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.model.studied import Studied
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Event
 from loomopt.picture.job_views import JobViews
@@ -28,6 +29,44 @@ if TYPE_CHECKING:
 
     from loomopt.model.axes import Asked, Traded
     from loomopt.model.separation import Parted
+    from loomopt.scene.scene import Scene
+
+
+class Crossing(NamedTuple):
+    """The first crank angle at which |quantity| passes a level: the figure that tells it, and the level's full name."""
+
+    figure: str
+    quantity: str
+    level: str
+
+
+class Family(NamedTuple):
+    """Ever finer sets of designs that a target chooses from, such as laws of more and more intervals.
+
+    method: what its ladder is called; target, key: whose scene key says how fine; limit(scene, x): the figure that
+    they tend to, SI, in many digits, x the optimum's variables; None where no closed form holds.
+    """
+
+    method: str
+    target: str
+    key: str
+    limit: "Callable[[Scene, Mapping[str, Number]], Number | None]"
+
+
+class Studied(NamedTuple):
+    """What a designer reads of a job.
+
+    targets: the optima; peaks: figure → (quantity, whether its sign counts); static: figures of one position;
+    motion: what the second derivative of the output's displacement is called.
+    """
+
+    targets: tuple[str, ...]
+    peaks: Mapping[str, tuple[str, bool]] = Frozen()
+    static: tuple[str, ...] = ()
+    motion: str = "q_2"
+    crossing: Crossing | None = None
+    family: Family | None = None
+
 
 Figures = Mapping[str, float | None]
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt import entry_points
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
@@ -26,6 +25,15 @@ from loomopt.scene.schema import SceneSchema
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
+
+@functools.cache
+def entry_points(group: str) -> "tuple[EntryPoint, ...]":
+    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
+    from importlib.metadata import entry_points
+
+    return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
+
+
 JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
 """Groups of entry points."""
 HERE = Path(__file__).parent
@@ -37,16 +45,13 @@ def own_names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in HERE.glob("*/job.py")))
 
 
-_points = entry_points.of
-
-
 def _distribution(point: "EntryPoint") -> str:
     return point.dist.name if point.dist else point.value
 
 
 def _single(group: str, name: str, what: str) -> "EntryPoint | None":
     """Return the one entry point of a name. Raises BadInput, naming the distributions, where several claim it."""
-    points = [point for point in _points(group) if point.name == name]
+    points = [point for point in entry_points(group) if point.name == name]
     if len(points) > 1:
         problem = f"{what} {name} is brought by {' and by '.join(map(_distribution, points))}"
         raise BadInput(problem, key=name, remedy="Uninstall all of them but one")
@@ -74,7 +79,7 @@ def _useless(point: "EntryPoint", what: str, why: str) -> BadInput:
 
 def names() -> tuple[str, ...]:
     """Return the names of all jobs, other distributions' too."""
-    return tuple(sorted({*own_names(), *(point.name for point in _points(JOBS))}))
+    return tuple(sorted({*own_names(), *(point.name for point in entry_points(JOBS))}))
 
 
 @functools.cache
@@ -144,7 +149,7 @@ def brought() -> tuple[dict[str, Path], tuple[BadInput, ...]]:
     """Return the files of other distributions' scenes by name, and what is wrong with their jobs."""
     found: dict[str, Path] = {}
     faults: list[BadInput] = []
-    for point in {point.name: point for point in _points(JOBS)}.values():
+    for point in {point.name: point for point in entry_points(JOBS)}.values():
         try:
             if point.name in own_names():
                 raise _useless(point, "job", "is not looked at, for loomopt has one of that name")
@@ -188,7 +193,7 @@ def _folder(job: str, name: str) -> Path:
 
 def declared(name: str) -> SceneSchema:
     """Return what scenes of a job may hold, effects of other distributions too. Raises BadInput for an unknown job."""
-    others = [point.name.removeprefix(f"{name}.") for point in _points(EFFECTS) if point.name.startswith(f"{name}.")]
+    others = [point.name.removeprefix(f"{name}.") for point in entry_points(EFFECTS) if point.name.startswith(f"{name}.")]
     return REGISTERED.schema(name, {}, others)
 
 

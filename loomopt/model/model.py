@@ -335,7 +335,6 @@ class JobModel:
                 found[name] = Quantity(functools.partial(check_value, check, name))
         if not self.states:
             return found
-        # REMOVED
 
         return found | state_quantities(self.states)
 
@@ -431,7 +430,6 @@ class JobModel:
         found = self.plain(maths, values, known)
         if not self.states:
             return found
-        # REMOVED
 
         return with_states_eliminated(maths, self.kinematics, self.loads, found)
 

@@ -2,14 +2,28 @@
 
 import math
 import textwrap
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.base.units import factor
 from loomopt.picture import placing, shapes
-from loomopt.picture.shapes import CHARACTER, Drawing, Line, Point, Primitive, Text, plain
+from loomopt.picture.shapes import (
+    CHARACTER,
+    METRIC,
+    Arc,
+    Circle,
+    Drawing,
+    Line,
+    Point,
+    Primitive,
+    Text,
+    Trace,
+    Units,
+    plain,
+)
 
 LEADER = 2.0
 """Text heights between a label and its point from which on a thin line joins the two."""
@@ -75,3 +89,157 @@ def sheet(body: Drawing) -> Drawing:
         for row, (layer, text) in enumerate(body.legend)
     ]
     return replace(body, primitives=(*body.primitives, *above, *below), legend=())
+
+
+POINTER = 6.0
+"""How far a pointer reaches, in text heights."""
+MASS = 0.7
+"""Radius of the sign of a centre of mass, in text heights."""
+HEAD = 0.8
+"""Length of a dimension's arrow head, in text heights."""
+COILS = 8
+"""Coils of a spring's sign."""
+
+
+def arrow(layer: str, tip: Point, angle: float, length: float) -> Line:
+    """Return an open arrow head of a length, m, that points in the direction of an angle, rad."""
+    return Line(layer, (tip.towards(angle + 2.8, length), tip, tip.towards(angle - 2.8, length)))
+
+
+def pointer(near: Point, angle: float, h: float) -> list[Primitive]:
+    """Return an arrow that points away from a point in the direction of an angle, rad; h: text height, m."""
+    tip = near.towards(angle, POINTER * h)
+    return [Line("notes", (near.towards(angle, 1.5 * h), tip)), arrow("notes", tip, angle, 1.2 * h)]
+
+
+def angle_between(
+    centre: Point, radius: float, begin: float, end: float, h: float, both: bool = False
+) -> list[Primitive]:
+    """Return an angle's arc from begin to end, rad, with an arrow head at its end, or at both ends."""
+    turn = math.copysign(math.pi / 2, end - begin)
+    found: list[Primitive] = [Arc("dimensions", centre, radius, min(begin, end), max(begin, end))]
+    heads = [(end, turn), *([(begin, -turn)] if both else [])]
+    return found + [arrow("dimensions", centre.towards(at, radius), at + side, HEAD * h) for at, side in heads]
+
+
+def fixed_pivot(pivot: Point, h: float) -> list[Primitive]:
+    """Return a pivot on hatched ground; h: text height, m."""
+    left, right = Point(pivot.x - h, pivot.y - 1.6 * h), Point(pivot.x + h, pivot.y - 1.6 * h)
+    return [
+        Circle("frame", pivot, 0.45 * h),
+        Line("frame", (left, pivot, right)),
+        *ground("frame", left.part(right), -math.pi / 2, h),
+    ]
+
+
+def ground(layer: str, middle: Point, side: float, h: float) -> list[Line]:
+    """Return a straight piece of hatched ground; side: direction, rad, in which the hatched side lies."""
+    along = side - math.pi / 2
+    starts = [middle.towards(along, (1.0 - 0.6 * step) * h) for step in range(5)]
+    return [
+        Line(layer, (middle.towards(along, -1.6 * h), middle.towards(along, 1.6 * h))),
+        *(Line(layer, (at, at.towards(side, 0.6 * h).towards(along, 0.6 * h))) for at in starts),
+    ]
+
+
+def mass(centre: Point, h: float) -> list[Primitive]:
+    """Return the sign of a centre of mass: a circle with a cross; h: text height, m."""
+    r = MASS * h
+    return [
+        Circle("masses", centre, r),
+        Line("masses", (Point(centre.x - r, centre.y), Point(centre.x + r, centre.y))),
+        Line("masses", (Point(centre.x, centre.y - r), Point(centre.x, centre.y + r))),
+    ]
+
+
+def spring(layer: str, one: Point, other: Point, width: float) -> Line:
+    """Return a tension spring between two points as a zigzag of a width, m, with a straight hook at either end."""
+    along = math.atan2(other.y - one.y, other.x - one.x)
+    hook, turn = 0.1, (1.0 - 0.2) / (2 * COILS)
+    zigzag = [
+        one.part(other, hook + turn * (k + 0.5)).towards(along + math.copysign(math.pi / 2, (-1) ** k), width / 2)
+        for k in range(2 * COILS)
+    ]
+    return Line(layer, (one, one.part(other, hook), *zigzag, one.part(other, 1 - hook), other))
+
+
+def dimension(one: Point, other: Point, h: float) -> list[Primitive]:
+    """Return a straight dimension line with an arrow head at either end; nothing where the two points are one."""
+    length, along = math.dist(one, other), math.atan2(other.y - one.y, other.x - one.x)
+    if not length:
+        return []
+    head = min(HEAD * h, length / 3)
+    heads = [arrow("dimensions", other, along, head), arrow("dimensions", one, along + math.pi, head)]
+    return [Line("dimensions", (one, other)), *heads]
+
+
+JOINT = 0.35
+"""Radius of a joint's circle, in text heights."""
+
+
+class Mass(NamedTuple):
+    """A centre of mass: mass, kg; radius: its distance from the joint it turns about, m."""
+
+    mass: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints and links; each event of the motion is drawn on the layer of its name.
+
+    pivots: fixed joints; joints: event → moving joints. links: pairs of joints, the frame between two pivots.
+    guides: joint and radius, m, of a circle about it, which moves with it. traces: curves that stand still.
+    sizes: radius of a joint's own circle, in text heights, where it is another; 0 for none.
+    masses: which of the joints are centres of mass.
+    """
+
+    pivots: Mapping[str, Point]
+    joints: Mapping[str, Mapping[str, Point]]
+    links: tuple[tuple[str, str], ...]
+    guides: tuple[tuple[str, float], ...] = ()
+    traces: tuple[Trace, ...] = ()
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    masses: Mapping[str, Mass] = field(default_factory=dict)
+
+    @property
+    def primes(self) -> dict[str, str]:
+        """The marks of moving joints' names at each event."""
+        return {event: "'" * k for k, event in enumerate(self.joints)}
+
+    def at(self, event: str) -> dict[str, Point]:
+        """Return all joints at an event."""
+        return {**self.pivots, **self.joints[event]}
+
+    def strokes(self, h: float) -> list[Primitive]:
+        """Return what every drawing shows; h: text height, m."""
+        frame = [link for link in self.links if set(link) <= set(self.pivots)]
+        found: list[Primitive] = [Line("paths", (self.pivots[one], self.pivots[other])) for one, other in frame]
+        for pivot in self.pivots.values():
+            found += fixed_pivot(pivot, h)
+        found += [Circle("paths", self.pivots[name], radius) for name, radius in self.guides if name in self.pivots]
+        found += self.traces
+        for event, joints in self.joints.items():
+            at = self.at(event)
+            found += [Line(event, (at[one], at[other])) for one, other in self.links if (one, other) not in frame]
+            found += [Circle(event, joints[name], radius) for name, radius in self.guides if name in joints]
+            sizes = {name: self.sizes.get(name, JOINT) for name in joints if name not in self.masses}
+            found += [Circle("joints", joints[name], size * h) for name, size in sizes.items() if size]
+            found += [part for name in joints if name in self.masses for part in mass(joints[name], h)]
+        return found
+
+    def csv(self, units: Units = METRIC) -> str:
+        """Return the joints as CSV; of centres of mass, where there are any, mass and radius too. Digits round-trip."""
+        length, mass = units.length, units.mass
+        heading = f"joint,position,x [{length}],y [{length}]"
+        lines = [f"{heading},mass [{mass}],radius [{length}]" if self.masses else heading]
+        placed = [("frame", "", self.pivots), *((e, self.primes[e], joints) for e, joints in self.joints.items())]
+        for event, prime, joints in placed:
+            for name, point in joints.items():
+                numbers = [axis / factor(length) for axis in point]
+                if name in self.masses:
+                    own = self.masses[name]
+                    numbers += [own.mass / factor(mass), own.radius / factor(length)]
+                blank = "" if name in self.masses or not self.masses else ",,"
+                lines.append(f"{name}{prime},{event},{','.join(map(repr, numbers))}{blank}")
+        return "".join(f"{line}\n" for line in lines)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from loomopt.jobs.base import Family
 from loomopt.model.sampling import Sampler
-from loomopt.model.studied import Family
 from loomopt.nlp import exchange
 from loomopt.nlp.calls import Calls
 from loomopt.nlp.point import Point, Settings

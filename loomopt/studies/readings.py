@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from loomopt.jobs.base import Crossing
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.sampling import Sampler, Tally
-from loomopt.model.studied import Crossing
 from loomopt.nlp import slopes
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.jobs import registry
-from loomopt.jobs.base import Job
+from loomopt.jobs.base import Job, Studied
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.program import Program
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Sampler
-from loomopt.model.studied import Studied
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion

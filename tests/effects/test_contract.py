@@ -28,7 +28,7 @@ KEYS = {"most": "made_up_peak", "high": "made_up_size"}
 @pytest.fixture(autouse=True)
 def brought(monkeypatch):
     """Have another distribution bring the made-up effects."""
-    monkeypatch.setattr(registry, "_points", made_up.points)
+    monkeypatch.setattr(registry, "entry_points", made_up.points)
 
 
 def tightened(job, key):

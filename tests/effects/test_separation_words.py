@@ -91,7 +91,7 @@ def test_it_needs_the_inertia():
 
 
 def test_a_load_whose_force_flight_does_not_know_is_refused_by_name(monkeypatch):
-    monkeypatch.setattr(registry, "_points", made_up.points)
+    monkeypatch.setattr(registry, "entry_points", made_up.points)
     scene = registry.load("shedding").with_effect("separation")
     scene = scene.update({"effects.made_up_output": {"c": "0.02", "a": "0.3"}})
     for refused in (lo.evaluate, lo.simulate, lo.solve):

@@ -2,7 +2,7 @@ import inch
 import pytest
 
 import loomopt as lo
-from loomopt.picture.units import Units, told
+from loomopt.picture.shapes import Units, drawn_units
 
 SHARES = {"l1": 0.2, "l2": 0.4, "l3": 0.9, "l4": 1.0}
 
@@ -15,12 +15,12 @@ def test_a_scene_in_inches_or_feet_is_drawn_in_inches_and_every_other_in_mm(text
     size, unit_given = text.split()
     lengths = {name: f"{float(size) * share:.9g} {unit_given}" for name, share in SHARES.items()}
     scene = lo.scene({"problem": {"name": "x", "job": "beatup", "title": "x"}, "mechanism": lengths})
-    assert told(scene).length == unit
+    assert drawn_units(scene).length == unit
 
 
 def test_other_quantities_are_told_as_the_scene_writes_them():
-    assert told(lo.load("shedding")) == Units("mm", "kg", "N", "N/m")
-    assert told(inch.scene("shedding")) == Units("in", "lb", "lbf", "lbf/in")
+    assert drawn_units(lo.load("shedding")) == Units("mm", "kg", "N", "N/m")
+    assert drawn_units(inch.scene("shedding")) == Units("in", "lb", "lbf", "lbf/in")
 
 
 def test_lengths_are_told_in_the_unit_without_its_name():

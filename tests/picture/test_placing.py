@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from loomopt.picture import placing, shapes
-from loomopt.picture.drawing import LEADER, Label, along, around, place
+from loomopt.picture.drawing import LEADER, Label, along, around, dimension, ground, mass, place, spring
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text
-from loomopt.picture.symbols import dimension, ground, mass, spring
 
 POST = Line("frame", (Point(0.0, -30.0), Point(0.0, 30.0)))
 

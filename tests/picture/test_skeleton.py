@@ -2,8 +2,8 @@
 
 import math
 
+from loomopt.picture.drawing import JOINT, Skeleton
 from loomopt.picture.shapes import Circle, Drawing, Line, Point
-from loomopt.picture.skeleton import JOINT, Skeleton
 from loomopt.views import svg
 
 OUT, IN = "front dead centre", "rear dead centre"

@@ -10,11 +10,8 @@ from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.picture.drawing import Label, along, around, place
-from loomopt.picture.shapes import Arc, Drawing, Point, Primitive
-from loomopt.picture.skeleton import Mass, Skeleton
-from loomopt.picture.symbols import POINTER, angle_between, pointer
-from loomopt.picture.units import METRIC, Units
+from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_between, around, place, pointer
+from loomopt.picture.shapes import METRIC, Arc, Drawing, Point, Primitive, Units
 
 REED, COUNTERWEIGHT = "G", "E"
 MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}

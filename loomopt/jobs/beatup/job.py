@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from loomopt.jobs.base import Figures, Job
+from loomopt.jobs.base import Figures, Job, Studied
 from loomopt.jobs.beatup import design as designs
 from loomopt.jobs.beatup import program as programs
 from loomopt.jobs.beatup.scene import SCHEMA, check
@@ -13,7 +13,6 @@ from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.model.studied import Studied
 from loomopt.scene.scene import Scene
 
 

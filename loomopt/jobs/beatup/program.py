@@ -10,8 +10,6 @@ from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.design import BALANCE
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
-from loomopt.mechanisms import counterweight
-from loomopt.mechanisms.counterweight import NAMES as COUNTERWEIGHT
 from loomopt.model import numbers as scene_numbers
 from loomopt.model.drive import TORQUE
 from loomopt.model.model import JobModel
@@ -22,6 +20,37 @@ from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.tolerances import NO_MASS
 from loomopt.scene.scene import Scene
 from loomopt.scene.tables import Limit as Limited
+
+COUNTERWEIGHT = ("m4e", "r4e")
+AMPLE, LONG = 10.0, 3.0
+"""Inertia beyond which no counterweight is of use, in those of the reed; radius beyond which none is built, in l4."""
+
+
+def counterweight_holding(reed: float, front: float, resistance: float) -> float:
+    """Return the inertia, kg·m², that holds the resistance at front dead centre, turning as the reed does today.
+
+    reed: today's inertia, kg·m²; front: today's reed torque there with the resistance, N·m; resistance: N·m. From
+    M3 = M0 − J ψ'' ω² [Yuan24, eq 2], in proportion.
+    """
+    return reed * abs(resistance / (front - resistance)) if front != resistance else 0.0
+
+
+def counterweight_room(
+    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], inertia: float
+) -> dict[str, tuple[float, float]]:
+    """Return the bounds of mass, kg, and radius, m, as far as they are of use: generous ones say nothing of a machine.
+
+    known: today's m4e, r4e and l4; inertia: of the reed or of what holds the resistance, kg·m²; 0 where there is none
+    to compare with, and the bounds stay as they are.
+    """
+    found, ample = {name: bounds[name] for name in COUNTERWEIGHT}, AMPLE * inertia
+    if found["m4e"][1] * found["r4e"][1] ** 2 > ample > 0.0:
+        low, high = found["r4e"]
+        found["r4e"] = low, min(high, max(low, known["r4e"], LONG * known["l4"]))
+        low, high = found["m4e"]
+        found["m4e"] = low, min(high, max(low, known["m4e"], ample / found["r4e"][1] ** 2))
+    return found
+
 
 ROWS = {"mu_min": ("mu_near", "mu_far")}
 """Figures that are the least of several smooth rows."""
@@ -105,7 +134,7 @@ class _Sizes:
         self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
         self.length = known["l4"]
         reed = max((float(own) for own in _reed(sampler)), default=0.0)
-        self.room = counterweight.room(known, limited, max(reed, counterweight.holding(reed, front, resistance)))
+        self.room = counterweight_room(known, limited, max(reed, counterweight_holding(reed, front, resistance)))
         self.most = self.room["m4e"][1] * self.room["r4e"][1] ** 2
         self.inertia = max(reed, self.most) or 1.0
         self.peak = (sampler.peak(TORQUE) if physics.loads else 0.0) or 1.0

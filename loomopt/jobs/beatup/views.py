@@ -24,16 +24,16 @@ class BeatupViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
         """Return the crank-rocker in both dead centres at full scale. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
-        from loomopt.picture.units import told
+        from loomopt.picture.shapes import drawn_units
 
-        return drawing.linkage(_numbers(scene, design), scene.name, told(scene))
+        return drawing.linkage(_numbers(scene, design), scene.name, drawn_units(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints and centres of mass as CSV. Raises BadInput."""
         from loomopt.jobs.beatup import drawing
-        from loomopt.picture.units import told
+        from loomopt.picture.shapes import drawn_units
 
-        return drawing.joints_csv(_numbers(scene, design), told(scene))
+        return drawing.joints_csv(_numbers(scene, design), drawn_units(scene))
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
@@ -55,7 +55,7 @@ class BeatupViews(JobViews):
         """Return what there is to remark upon: a reed that twists away while it beats up."""
         if not any(isinstance(effect, State) for effect in scene.active):
             return ()
-        from loomopt.picture.twisted import twisted
+        from loomopt.picture.panels import twisted
 
         return twisted(scene, registry.of(scene).sampler(scene, design))
 

@@ -15,11 +15,8 @@ from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
-from loomopt.picture.drawing import Label, along, around, place
-from loomopt.picture.shapes import Drawing, Line, Point, Primitive
-from loomopt.picture.skeleton import Skeleton
-from loomopt.picture.symbols import POINTER, angle_between, arrow, pointer
-from loomopt.picture.units import METRIC, Units
+from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, place, pointer
+from loomopt.picture.shapes import METRIC, Drawing, Line, Point, Primitive, Units
 
 FRONT, REAR, OVER = "front dead centre", "rear dead centre", "hand-over"
 LINKS = (("A0", "A"), ("A", "B1"), ("B0", "B1"), ("B0", "B2"), ("C0", "C"), ("C", "D"), ("B2", "D"))

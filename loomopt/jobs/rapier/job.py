@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Collection
 
-from loomopt.jobs.base import Figures, Job
+from loomopt.jobs.base import Crossing, Figures, Job, Studied
 from loomopt.jobs.rapier import design as designs
 from loomopt.jobs.rapier import program as programs
 from loomopt.jobs.rapier.scene import SCHEMA, check
@@ -12,7 +12,6 @@ from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.model.studied import Crossing, Studied
 from loomopt.scene.scene import Scene
 
 

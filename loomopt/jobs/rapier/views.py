@@ -24,16 +24,16 @@ class RapierViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
         """Return the drive in both dead centres and at the hand-over, at full scale. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
-        from loomopt.picture.units import told
+        from loomopt.picture.shapes import drawn_units
 
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, told(scene))
+        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, drawn_units(scene))
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints as CSV. Raises BadInput."""
         from loomopt.jobs.rapier import drawing
-        from loomopt.picture.units import told
+        from loomopt.picture.shapes import drawn_units
 
-        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), told(scene))
+        return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), drawn_units(scene))
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""

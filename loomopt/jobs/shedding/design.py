@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from loomopt.jobs import registry
-from loomopt.jobs.base import Figures
+from loomopt.jobs.base import Family, Figures
 from loomopt.jobs.shedding.model import RETURN, RETURN_SPRING, RISE, FramePose, frame
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, LawTarget
 from loomopt.maths import systems
@@ -21,7 +21,6 @@ from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program, Variable
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.model.speeds import speed_reached
-from loomopt.model.studied import Family
 from loomopt.physics import balance
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Load

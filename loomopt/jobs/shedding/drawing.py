@@ -5,10 +5,11 @@ The cam stands still as it is at the beginning of the rise, and the arm goes rou
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor, show
@@ -21,15 +22,158 @@ from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.mechanisms.cam_follower import Follower, Stations
 from loomopt.physics.mechanisms.cam_motion import Spline
 from loomopt.physics.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
-from loomopt.picture import tracing
-from loomopt.picture.drawing import Label, along, around, place
-from loomopt.picture.return_spring import ReturnSpring
-from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive
-from loomopt.picture.skeleton import JOINT, Skeleton
-from loomopt.picture.symbols import arrow, fixed_pivot
-from loomopt.picture.units import Units, told
+from loomopt.picture.drawing import (
+    JOINT,
+    Label,
+    Skeleton,
+    along,
+    around,
+    arrow,
+    dimension,
+    fixed_pivot,
+    ground,
+    place,
+    spring,
+)
+from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive, Units, drawn_units
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
+
+WIDEST = math.radians(2.0)
+"""rad; width of the first intervals."""
+INSIDE = np.linspace(0.0, 1.0, 9)
+"""Where an interval's deviation is looked for, its ends included."""
+MOST_PARTS = 32
+"""Parts into which one round divides an interval at most."""
+
+
+def traced_nodes(
+    curves: Callable[[Pieces, Floats], Sequence[Floats]], starts: Floats, allowed: float
+) -> tuple[Pieces, Floats]:
+    """Return nodes (pieces, u) once round, the last before the first again, that straight lines join closely enough.
+
+    curves(pieces, u): points (n, 2) of each curve; none of them is farther than `allowed` from its lines. starts: crank
+    angles, rad, where pieces begin, the last one turn after the first; all are nodes.
+    """
+    widths = np.diff(starts)
+    there = np.flatnonzero(widths > 0.0)
+    parts = np.maximum(2, np.ceil(widths[there] / WIDEST).astype(int))
+    pieces, left, right = _divided(there, np.zeros(len(there)), np.ones(len(there)), parts)
+    while True:
+        far = _deviation(curves, pieces, left, right)
+        parts = np.clip(np.ceil(np.sqrt(far / allowed)).astype(int), 1, MOST_PARTS)
+        if np.all(parts == 1):
+            return pieces, left
+        pieces, left, right = _divided(pieces, left, right, parts)
+
+
+def deviation(curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, u: Floats) -> float:
+    """Return how far the curves lie from straight lines from node to node; a piece's last may begin the next."""
+    begins = np.where(np.diff(pieces) == 0, u[:-1], 0.0)
+    return float(np.max(_deviation(curves, pieces[1:], begins, u[1:])))
+
+
+def _divided(pieces: Pieces, left: Floats, right: Floats, parts: NDArray[np.int_]) -> tuple[Pieces, Floats, Floats]:
+    """Return intervals [left, right] of pieces, each divided into so many equal parts."""
+    which = np.repeat(np.arange(len(parts)), parts)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(parts) - parts, parts)
+    low, high, share = left[which], right[which], parts[which]
+    begin, end = (low * (1 - k) + high * k for k in (place / share, (place + 1) / share))
+    return pieces[which], begin, np.where(place + 1 == share, high, end)
+
+
+def _deviation(
+    curves: Callable[[Pieces, Floats], Sequence[Floats]], pieces: Pieces, left: Floats, right: Floats
+) -> Floats:
+    """Return how far the curves lie from the straight lines that join the ends of each interval."""
+    u = left[:, None] * (1 - INSIDE) + right[:, None] * INSIDE
+    found = curves(np.repeat(pieces, len(INSIDE)), u.ravel())
+    return np.asarray(np.max([_off_chord(points.reshape(*u.shape, 2)) for points in found], axis=0))
+
+
+def _off_chord(points: Floats) -> Floats:
+    """Return the greatest distance of points (n, k, 2) from the straight line between first and last."""
+    from_start, chord = points - points[:, :1], points[:, -1:] - points[:, :1]
+    length = np.sum(chord**2, axis=2)
+    share = np.sum(from_start * chord, axis=2) / np.where(length > 0.0, length, 1.0)
+    nearest = np.clip(share, 0.0, 1.0)[:, :, None] * chord
+    return np.asarray(np.max(np.hypot(*np.moveaxis(from_start - nearest, 2, 0)), axis=1), dtype=float)
+
+
+LAYER = "schematic"
+LENGTH, COIL, BAR = 20.0, 4.0, 9.0
+"""Length of the slack spring, width of its coils and of half of what it pulls, in text heights."""
+
+
+@dataclass(frozen=True)
+class ReturnSpring:
+    """A spring that pulls upward; K1: stiffness, N/m; X0: elongation, m, with the load on top; travel: downward, m.
+
+    top: the middle of the load on top; h: text height, m. upper, lower: what the load's positions are called.
+    """
+
+    K1: float
+    X0: float
+    travel: float
+    top: Point
+    h: float
+    upper: str
+    lower: str
+
+    @property
+    def levels(self) -> tuple[Point, Point, Point]:
+        """Where the load would be with the spring slack, where it is on top, and below."""
+        return Point(self.top.x, self.top.y + self.X0), self.top, Point(self.top.x, self.top.y - self.travel)
+
+    @property
+    def hung(self) -> Point:
+        """Where the spring hangs."""
+        return self.levels[0].towards(math.pi / 2, LENGTH * self.h)
+
+    def strokes(self) -> list[Primitive]:
+        """Return the spring, its load in both positions, preload and travel."""
+        h, (slack, top, bottom) = self.h, self.levels
+        loads = [Line(LAYER, (at.towards(0.0, -COIL * h), at.towards(0.0, BAR * h))) for at in (top, bottom)]
+        return [
+            *ground(LAYER, self.hung, math.pi / 2, h),
+            spring(LAYER, self.hung, top, COIL * h),
+            *loads,
+            Line(LAYER, (slack.towards(0.0, 0.75 * COIL * h), slack.towards(0.0, BAR * h))),
+            *dimension(slack.towards(0.0, 5 * h), top.towards(0.0, 5 * h), h),
+            *dimension(top.towards(0.0, 8 * h), bottom.towards(0.0, 8 * h), h),
+        ]
+
+    def labels(self, units: Units) -> list[Label]:
+        """Name stiffness, preload, travel and both positions of the load."""
+        h, (slack, top, bottom) = self.h, self.levels
+        beside = self.hung.part(top).towards(0.0, -COIL / 2 * h)
+        first, last = top.towards(0.0, 8 * h), bottom.towards(0.0, 8 * h)
+        return [
+            Label(LAYER, beside, math.pi, f"K1 = {show(self.K1, units.stiffness)}"),
+            along("dimensions", slack.towards(0.0, 5 * h), top.towards(0.0, 5 * h), 0.0, f"X0 = {units.size(self.X0)}"),
+            along("dimensions", first, last, 0.0, f"travel = {units.size(self.travel)}"),
+            *(
+                Label(LAYER, at.towards(0.0, BAR * h), side, text, (at.towards(0.0, -COIL * h),))
+                for at, side, text in ((top, math.pi / 8, self.upper), (bottom, -math.pi / 8, self.lower))
+            ),
+        ]
+
+    def legend(self, units: Units) -> tuple[tuple[str, str], ...]:
+        """Return what to say of it below a drawing, each line with its layer."""
+        preload = show(self.K1 * self.X0, units.force)
+        return (
+            (LAYER, f"return spring, K1 of all springs together: stretched by X0 on top, which takes {preload}"),
+            (LAYER, "its place and its coils are schematic; X0 and travel are at scale"),
+        )
+
+    def notes(self, units: Units) -> dict[str, str]:
+        """Return what a table's head says of it."""
+        return {
+            "K1": f"{show(self.K1, units.stiffness, 9)}, all return springs together",
+            "X0": f"{show(self.X0, units.length, 9)} of preload",
+            "preload": f"{show(self.K1 * self.X0, units.force, 9)} = K1 X0",
+        }
+
 
 NEAR, FAR, LEAST = "near dwell", "far dwell", "least cam force"
 PROFILE, PITCH = "profile", "pitch curve"
@@ -121,7 +265,7 @@ def traced(found: Cam) -> Stations:
 
     That holds for the profile and for the roller centre's curve. Corners of the law are stations.
     """
-    return found.stations(*tracing.nodes(found.curves, found.sampler.cycle.starts, allowed(found)))
+    return found.stations(*traced_nodes(found.curves, found.sampler.cycle.starts, allowed(found)))
 
 
 @dataclass(frozen=True)
@@ -170,7 +314,7 @@ def picture(found: Cam, least: float) -> Picture:
 
 def linkage(scene: Scene, found: Cam, figures: Figures) -> Drawing:
     """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
-    drawn, units = picture(found, figures["contact_angle"] or 0.0), told(scene)
+    drawn, units = picture(found, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
     texts = place(_labels(drawn, units), strokes, drawn.height)
     legend = _legend(scene, drawn, figures, units)
@@ -262,7 +406,7 @@ def joints_csv(scene: Scene, found: Cam) -> str:
     """
     import pandas as pd
 
-    nodes, units = _rows(found), told(scene)
+    nodes, units = _rows(found), drawn_units(scene)
     at, unit, size = found.stations(*nodes), units.length, factor(units.length)
     columns = {"theta [deg]": np.round(np.degrees(at.theta), DIGITS), f"X [{unit}]": at.X / size}
     for name, curve in (("pitch", at.pitch / size), ("profile", at.profile / size)):
@@ -273,7 +417,7 @@ def joints_csv(scene: Scene, found: Cam) -> str:
     notes |= {"arm_swing": show(found.follower.arm_swing, "deg", 9), **found.spring().notes(units)}
     notes["frame"] = "cam shaft at (0, 0), pivot at (0, centre_distance) at theta = 0; the cam turns anticlockwise"
     notes["curvature_of"] = "the pitch curve (roller centre), positive where convex"
-    within = units.within(CURVE_PROMISED * tracing.deviation(found.curves, *nodes))
+    within = units.within(CURVE_PROMISED * deviation(found.curves, *nodes))
     notes["chord_tolerance"] = f"{within}: no curve is farther from straight lines that join the rows"
     table = pd.DataFrame(columns)
     table.attrs.update(provenance.provenance(scene, law=_law(scene, found), **notes))

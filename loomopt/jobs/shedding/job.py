@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from loomopt.jobs.base import Figures, Job
+from loomopt.jobs.base import Figures, Job, Studied
 from loomopt.jobs.shedding import design as designs
 from loomopt.jobs.shedding import program as programs
 from loomopt.jobs.shedding.model import contact, moving
@@ -12,7 +12,6 @@ from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.model.studied import Studied
 from loomopt.physics.mechanisms.cam_motion import Spline, knots
 from loomopt.scene.scene import Scene
 

@@ -7,13 +7,11 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics import balance
 from loomopt.picture import effect_equations
-from loomopt.picture.drawing import Label, along, place
+from loomopt.picture.drawing import Label, Skeleton, along, place
 from loomopt.picture.equations import Equation, Symbols, equation, symbol
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Panel
-from loomopt.picture.shapes import Drawing, Point
-from loomopt.picture.skeleton import Skeleton
-from loomopt.picture.units import told
+from loomopt.picture.shapes import Drawing, Point, drawn_units
 from loomopt.scene.scene import Scene
 from loomopt_press.model import BOTTOM, TOP, SlidePose
 
@@ -26,7 +24,7 @@ class PressViews(JobViews):
     def linkage(self, scene: Scene, design: Mapping[str, float]) -> Drawing:
         """Return the press in both dead centres and half way, at full scale."""
         known = registry.of(scene).numbers_of(scene, design)
-        units, skeleton, height = told(scene), self._skeleton(known), 0.02 * (known["crank"] + known["rod"])
+        units, skeleton, height = drawn_units(scene), self._skeleton(known), 0.02 * (known["crank"] + known["rod"])
         strokes, at = skeleton.strokes(height), skeleton.at(HALF)
         labels = [
             Label("frame", at["A"], math.pi, "A"),
@@ -40,7 +38,7 @@ class PressViews(JobViews):
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints as CSV."""
-        return self._skeleton(registry.of(scene).numbers_of(scene, design)).csv(told(scene))
+        return self._skeleton(registry.of(scene).numbers_of(scene, design)).csv(drawn_units(scene))
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations the scene really uses."""
