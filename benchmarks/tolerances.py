@@ -20,9 +20,9 @@ import harness
 from loomopt.jobs import registry
 from loomopt.model import reading
 from loomopt.model.program import Program
-from loomopt.nlp import exchange, options, transcribe
-from loomopt.nlp.point import Settings, sampler_at
 from loomopt.physics import tolerances
+from loomopt.solve.nlp import exchange, ipopt, transcribe
+from loomopt.solve.nlp.point import Settings, sampler_at
 
 NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
     "beatup": ("operation.M0", ("745 N*m", "752 N*m", "770 N*m")),
@@ -40,7 +40,7 @@ IPOPTS = {
     "IPOPT_TOLERANCE": ("tol", "constr_viol_tol", "compl_inf_tol"),
     "IPOPT_SLOPE": ("dual_inf_tol",),
     "WARM_BARRIER": ("mu_init",),
-    "WARM_PUSH": tuple(name for name in options.WARM if name not in ("mu_init", "warm_start_init_point")),
+    "WARM_PUSH": tuple(name for name in ipopt.WARM if name not in ("mu_init", "warm_start_init_point")),
 }
 
 
@@ -92,7 +92,7 @@ def changed(name: str, value: Any) -> Iterator[None]:
     with ExitStack() as stack:
         for module in modules:
             stack.enter_context(mock.patch.object(module, name, value))
-        for said in (options.IPOPT, options.WARM):
+        for said in (ipopt.IPOPT, ipopt.WARM):
             own = {key: value for key in IPOPTS.get(name, ()) if key in said}
             stack.enter_context(mock.patch.dict(said, own))
         reading.gauss.cache_clear()

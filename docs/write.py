@@ -17,7 +17,7 @@ from unittest import mock
 from loomopt import api
 from loomopt.cli import run
 from loomopt.jobs import registry
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.tables import rows
 from loomopt.views import glossary, outputs, svg
 from loomopt.views.layout import Grid

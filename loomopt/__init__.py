@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from loomopt.design_study import DesignStudy
     from loomopt.effects_study import EffectsStudy
     from loomopt.scene.scene import Scene
-    from loomopt.solving.proof import Proofs
+    from loomopt.solve.proof.whole_cycle import Proofs
 
 __version__ = "0.1.0"
 
@@ -21,7 +21,7 @@ _HOMES = {
     "DesignStudy": "loomopt.design_study",
     "EffectsStudy": "loomopt.effects_study",
     "Evaluation": "loomopt.api",
-    "Proofs": "loomopt.solving.proof",
+    "Proofs": "loomopt.solve.proof.whole_cycle",
     "Scene": "loomopt.scene.scene",
     "effects": "loomopt.api",
     "evaluate": "loomopt.api",

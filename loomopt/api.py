@@ -12,8 +12,9 @@ from loomopt.results import Answer, Evaluation
 from loomopt.scene import designs
 from loomopt.scene.designs import Given as Design
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine, solution
-from loomopt.solving.asked import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
+from loomopt.solve import engine
+from loomopt.solve.answer import solution
+from loomopt.solve.options import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from loomopt.design_study import DesignStudy
     from loomopt.effects_study import EffectsStudy
-    from loomopt.solving.proof import Proofs
+    from loomopt.solve.proof.whole_cycle import Proofs
     from loomopt.studies.front import Given as Ranges
     from loomopt.studies.rows import Row
     from loomopt.studies.sweep import Over
@@ -109,10 +110,10 @@ def prove(
     the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
     over the cycle. Raises BadInput.
     """
-    from loomopt.solving import proof
+    from loomopt.solve.proof import whole_cycle
 
     own = _scene(scene)
-    return proof.prove(own, _design(design, own), target, slack)
+    return whole_cycle.prove(own, _design(design, own), target, slack)
 
 
 def simulate(

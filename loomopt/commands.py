@@ -12,7 +12,7 @@ from loomopt.shell import DIFFERS, Progress, read_asked, read_number, read_scene
 if TYPE_CHECKING:
     from loomopt.scene.designs import Design as DesignGiven
     from loomopt.scene.scene import Scene
-    from loomopt.solving.solution import Evaluation
+    from loomopt.solve.answer.solution import Evaluation
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
 Set = Annotated[
@@ -183,7 +183,7 @@ def simulate(
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
     from loomopt import api
-    from loomopt.solving.asked import check_numbers
+    from loomopt.solve.options import check_numbers
     from loomopt.views import layout, outputs, scene_view
 
     scene, given, name, status = read_asked(problem, design, target, sets, on, off)

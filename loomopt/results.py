@@ -12,14 +12,15 @@ from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine, solution
-from loomopt.solving.asked import check_numbers, target_name
+from loomopt.solve import engine
+from loomopt.solve.answer import solution
+from loomopt.solve.options import check_numbers, target_name
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from loomopt.solving.proof import Proofs
+    from loomopt.solve.proof.whole_cycle import Proofs
     from loomopt.views.notebook import Sketch
 
 
@@ -94,10 +95,14 @@ class Evaluation(solution.Evaluation, records.Shown):
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
-        from loomopt.solving import proof
+        from loomopt.solve.proof import whole_cycle
 
         design = designs.checked(self.design, self.scene)
-        return self.terms.proofs(design, slack) if self.terms else proof.prove(self.scene, design, self.target, slack)
+        return (
+            self.terms.proofs(design, slack)
+            if self.terms
+            else whole_cycle.prove(self.scene, design, self.target, slack)
+        )
 
     @property
     def sought(self) -> str:
@@ -113,7 +118,7 @@ class Evaluation(solution.Evaluation, records.Shown):
     def _told(self) -> str:
         """What a designer asks first: the figures that the target is about."""
         from loomopt.jobs import registry
-        from loomopt.solving.words import Words
+        from loomopt.solve.answer.words import Words
 
         if self.terms:
             asked = list(self.terms.axes)

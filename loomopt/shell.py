@@ -119,7 +119,7 @@ def read_asked(
     A remark names what is otherwise than in the file, where an answer brings any of it.
     """
     from loomopt.jobs.registry import load
-    from loomopt.solving.asked import target_name
+    from loomopt.solve.options import target_name
 
     scene = load(problem)
     if design is None:

@@ -13,8 +13,8 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene import designs
 from loomopt.scene.provenance import provenance
 from loomopt.scene.scene import Scene
-from loomopt.solving.solution import Evaluation, Solution
-from loomopt.solving.words import Words
+from loomopt.solve.answer.solution import Evaluation, Solution
+from loomopt.solve.answer.words import Words
 
 if TYPE_CHECKING:
     import pandas as pd

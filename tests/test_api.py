@@ -14,8 +14,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.scene.packaged import problems
-from loomopt.solving import search, solution
-from loomopt.solving.certificate import certify
+from loomopt.solve.answer import solution
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.search import search
 
 SCENE = lo.load("beatup-light")
 

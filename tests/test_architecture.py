@@ -127,8 +127,8 @@ def test_imports_run_upward_only():
     [
         "from loomopt.views import svg",
         "from loomopt import tables; from loomopt.base import errors",
-        "def f():\n    import loomopt.solving.engine",
-        "import importlib\nimportlib.import_module('loomopt.nlp.exchange')",
+        "def f():\n    import loomopt.solve.engine",
+        "import importlib\nimportlib.import_module('loomopt.solve.nlp.exchange')",
     ],
 )
 def test_an_import_from_above_is_found(source):

@@ -19,8 +19,8 @@ from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
 from loomopt.scene.packaged import problem_names
-from loomopt.solving import search
-from loomopt.solving.certificate import certify
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.search import search
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]

@@ -10,7 +10,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.solving import bounded
+from loomopt.solve.certificate import taylor_bounds
 
 KEYS = ["limit", "text", "status", "margin", "slack", "boxes", "angle"]
 DEFAULTS = {"beatup": "balance", "rapier": "stroke-dwell", "shedding": "stiffness"}
@@ -109,7 +109,7 @@ def test_what_is_proven_is_said_in_one_sentence_and_a_table(cli, files):
 
 
 def test_undecided_is_no_proof_and_exit_status_1(cli, files, monkeypatch):
-    monkeypatch.setattr(bounded, "MOST_BOXES", 3)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
     data = proved(cli, "beatup", "--design", str(files["beatup"]), status=1)
     statuses = {proof["limit"]: proof["status"] for proof in data["proofs"]}
     assert statuses["peak peak_torque"] == "undecided"
@@ -179,7 +179,7 @@ def test_solve_with_prove_says_proven(cli, name):
 
 
 def test_solve_with_prove_is_uncertified_where_the_boxes_run_out(cli, monkeypatch):
-    monkeypatch.setattr(bounded, "MOST_BOXES", 3)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
     code, out, _ = cli("solve", "beatup", "--prove", "--json")
     data = json.loads(out)
     assert (code, data["status"]) == (4, "uncertified")

@@ -13,7 +13,7 @@ from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
 from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.scene import packaged
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.views import layout, scene_view, terminal
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"

@@ -193,7 +193,9 @@ def _folder(job: str, name: str) -> Path:
 
 def declared(name: str) -> SceneSchema:
     """Return what scenes of a job may hold, effects of other distributions too. Raises BadInput for an unknown job."""
-    others = [point.name.removeprefix(f"{name}.") for point in entry_points(EFFECTS) if point.name.startswith(f"{name}.")]
+    others = [
+        point.name.removeprefix(f"{name}.") for point in entry_points(EFFECTS) if point.name.startswith(f"{name}.")
+    ]
     return REGISTERED.schema(name, {}, others)
 
 

@@ -12,7 +12,7 @@ from loomopt.jobs import registry
 from loomopt.model import model
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
-from loomopt.solving.asked import check_sought
+from loomopt.solve.options import check_sought
 from loomopt.studies import optima, readings
 from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.subject import Subject

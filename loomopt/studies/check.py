@@ -11,8 +11,8 @@ from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scene import packaged, provenance
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.solution import Solution
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Solution
 from loomopt.studies import references
 
 if TYPE_CHECKING:

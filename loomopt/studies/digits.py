@@ -10,16 +10,14 @@ import numpy as np
 
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.chains import stations
 from loomopt.model.program import Program
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.nlp.families import Epigraph, Family, epigraphs, families
-from loomopt.nlp.point import Point
-from loomopt.nlp.stations import Stood, held
 from loomopt.physics.balance import total
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
+from loomopt.solve.nlp.point import Point
+from loomopt.solve.nlp.stations import Epigraph, Family, Stood, epigraphs, families, held, stations
 from loomopt.studies.tolerances import (
     EXTREME_FAR,
     EXTREME_STEPS,

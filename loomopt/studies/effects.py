@@ -19,8 +19,8 @@ from loomopt.scene import designs
 from loomopt.scene.numbers import files
 from loomopt.scene.provenance import versions
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.asked import OMITTED, check_numbers, target_name
+from loomopt.solve import engine
+from loomopt.solve.options import OMITTED, check_numbers, target_name
 from loomopt.studies import effects_known
 from loomopt.studies.effects_worth import Judge, Worth
 from loomopt.studies.plan import Task
@@ -86,7 +86,7 @@ class Effects:
 
     def solved(self, task: Task, parent: Row | None) -> Row:
         """Return the row of a task: its place names the effects that are off."""
-        from loomopt.nlp import graph
+        from loomopt.solve.nlp import transcribe
 
         scene = self.without(frozenset(task.place))
         try:
@@ -105,7 +105,7 @@ class Effects:
             certified=answer.certificate is not None and answer.certificate.passed and answer.admissible,
             seconds=answer.time["total_s"],
             warm={
-                "nodes": graph.nodes(program, job.values(program, {**job.today(scene), **design})),
+                "nodes": transcribe.graph_size(program, job.values(program, {**job.today(scene), **design})),
                 "build_s": answer.time["build_s"],
                 "solve_s": answer.time["solve_s"],
             },

@@ -7,7 +7,7 @@ from typing import Any
 from loomopt.base.records import freeze
 from loomopt.base.refusals import refusal
 from loomopt.scene.scene import Scene
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.studies import effects_known
 from loomopt.studies.effects import Course, Effects
 from loomopt.studies.effects_worth import NEEDED, Worth

@@ -10,8 +10,8 @@ from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.model.program import Objective, Program
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.solution import Evaluation, Finding
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Evaluation, Finding
 from loomopt.studies.rows import Row
 
 NEEDED, EVALUATED = "needed", "evaluated"

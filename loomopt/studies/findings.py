@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from loomopt.scene.scene import Scene
-from loomopt.solving.solution import Solution
+from loomopt.solve.answer.solution import Solution
 from loomopt.studies.plan import Study, Task
 from loomopt.studies.rows import Row
 

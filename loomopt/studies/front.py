@@ -16,8 +16,8 @@ from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scene import numbers
 from loomopt.scene.scene import Scene
-from loomopt.solving.asked import check_numbers, check_sought, target_name
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
+from loomopt.solve.options import check_numbers, check_sought, target_name
 from loomopt.studies.front_trade import POINTS, Trade
 
 FEWEST = 3

@@ -11,19 +11,20 @@ from loomopt.jobs.base import Job
 from loomopt.model.axes import Traded
 from loomopt.model.program import Limit, Program
 from loomopt.model.sampling import sampled
-from loomopt.nlp.point import Settings
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine, report
-from loomopt.solving.certificate import certify
-from loomopt.solving.solution import Clash, Evaluation, Finding, Solution
-from loomopt.solving.verdict import Binding, Certificate
-from loomopt.solving.words import Words
+from loomopt.solve import engine
+from loomopt.solve.answer import report
+from loomopt.solve.answer.solution import Clash, Evaluation, Finding, Solution
+from loomopt.solve.answer.words import Words
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.certificate.verdict import Binding, Certificate
+from loomopt.solve.nlp.point import Settings
 from loomopt.studies import warm
 from loomopt.studies.front_solve import CAPPED, Asking, Reached, Solver
 
 if TYPE_CHECKING:
-    from loomopt.solving.proof import Proofs
+    from loomopt.solve.proof.whole_cycle import Proofs
 
 Cap = tuple[Traded, float]
 """An axis and the largest value of what is sought the least of."""
@@ -74,10 +75,10 @@ class Terms:
 
     def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
         """Return proofs of a design's limits (SI). Raises BadInput."""
-        from loomopt.solving import proof
+        from loomopt.solve.proof import whole_cycle
 
         program = replace(self.program, limits=_named(self))
-        return replace(proof.prove(self.scene, design, self.target, slack, program), target=self.said)
+        return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.said)
 
     def _finding(self, cap: Cap, found: Evaluation, design: Mapping[str, float]) -> Finding:
         """Return the limit on an axis beside its figure."""
@@ -151,7 +152,7 @@ def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
 
 def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
-    from loomopt.solving import elastic
+    from loomopt.solve.search import elastic
 
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
-from loomopt.solving.words import Words, grouped
+from loomopt.solve.answer.words import Words, grouped
 from loomopt.studies import front, front_plan, front_read, front_trade, references, runs
 from loomopt.studies.plan import Task
 from loomopt.studies.rows import Row

@@ -10,15 +10,16 @@ from loomopt.jobs import registry
 from loomopt.model.axes import Asked, Traded, opposite
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.nlp import exchange
-from loomopt.nlp.point import Settings
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scene.scene import Scene
-from loomopt.solving import change, report
-from loomopt.solving.rows import Row as Touched
-from loomopt.solving.rows import active_set
-from loomopt.solving.search import Judged, Search, judged, objectives, tried
-from loomopt.solving.strategy import searched, spread, tied
+from loomopt.solve.answer import report
+from loomopt.solve.certificate.active_set import Row as Touched
+from loomopt.solve.certificate.active_set import active_set
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.point import Settings
+from loomopt.solve.search import least_change
+from loomopt.solve.search.multistart import searched, spread, tied
+from loomopt.solve.search.search import Judged, Search, judged, objectives, tried
 from loomopt.studies import warm
 
 CAPPED = " at most as asked"
@@ -114,7 +115,7 @@ class Solver:
             if wide and after.passed and tied(search):
                 after = self._spread(after)
             search = after if after.passed else searched(found, None, 0, (), None)
-        return self._told(change.with_least_change(search), asking)
+        return self._told(least_change.with_least_change(search), asking)
 
     def _begun(self, asking: Asking) -> Search:
         program = self.program(asking)

@@ -19,8 +19,8 @@ from loomopt.scene import designs
 from loomopt.scene.numbers import files
 from loomopt.scene.provenance import versions
 from loomopt.scene.scene import Scene
-from loomopt.solving.solution import Solution
-from loomopt.solving.words import Words
+from loomopt.solve.answer.solution import Solution
+from loomopt.solve.answer.words import Words
 from loomopt.studies import front_answer, front_plan, front_read
 from loomopt.studies.findings import Change, Findings
 from loomopt.studies.front_plan import ENDS, Next, Scale

@@ -8,11 +8,11 @@ from typing import Any
 
 from loomopt.jobs.base import Family
 from loomopt.model.sampling import Sampler
-from loomopt.nlp import exchange
-from loomopt.nlp.calls import Calls
-from loomopt.nlp.point import Point, Settings
-from loomopt.solving import engine
-from loomopt.solving.solution import Solution
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Solution
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.calls import Calls
+from loomopt.solve.nlp.point import Point, Settings
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference, Setting
 from loomopt.studies.subject import Subject, Target

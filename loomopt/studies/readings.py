@@ -10,9 +10,9 @@ from loomopt.jobs.base import Crossing
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.sampling import Sampler, Tally
-from loomopt.nlp import slopes
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
+from loomopt.solve.nlp import expressions
 from loomopt.studies import digits
 from loomopt.studies.ladders import Ladder, Outcome, Reference
 from loomopt.studies.subject import POSITIONS, Subject
@@ -151,7 +151,7 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
 
     @functools.cache
     def automatic() -> Callable[[Floats, Floats], Floats]:
-        return slopes.second(formula, len(cycle.names))
+        return expressions.second_derivative(formula, len(cycle.names))
 
     def differentiated(_: str) -> dict[str, Any]:
         Tally.positions += POSITIONS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from loomopt.base.units import SI_UNIT, factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
-from loomopt.solving.words import Words, grouped
+from loomopt.solve.answer.words import Words, grouped
 from loomopt.studies.findings import SceneStudy
 from loomopt.studies.rows import Row, parts
 

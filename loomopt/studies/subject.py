@@ -19,8 +19,8 @@ from loomopt.physics.cycle import TURN, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.solution import Solution
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Solution
 from loomopt.studies import check, digits
 from loomopt.studies.ladders import Reference
 from loomopt.studies.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS

@@ -12,15 +12,15 @@ from loomopt.base.errors import BadInput
 from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
-from loomopt.nlp.point import Point
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scene import designs, numbers
 from loomopt.scene.numbers import files, quantity
 from loomopt.scene.provenance import versions
 from loomopt.scene.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.asked import check_numbers, check_sought, target_name
-from loomopt.solving.solution import Solution
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Solution
+from loomopt.solve.nlp.point import Point
+from loomopt.solve.options import check_numbers, check_sought, target_name
 from loomopt.studies import warm
 from loomopt.studies.findings import Change, Findings
 from loomopt.studies.lattice import Lattice

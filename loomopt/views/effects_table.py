@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from loomopt.base.units import factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.studies.effects_found import Found
 from loomopt.studies.effects_worth import LIMITS, Worth
 from loomopt.views.layout import Grid, joined

@@ -14,7 +14,7 @@ from loomopt.physics.schema import Figure, Table
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.scene.scene import Scene
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.tables import PER_SECOND
 from loomopt.views.layout import Grid
 

@@ -9,8 +9,8 @@ from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
 from loomopt.scene.designs import Design
 from loomopt.scene.scene import Scene
-from loomopt.solving.proof import Proofs
-from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solve.answer.solution import Evaluation, Solution
+from loomopt.solve.proof.whole_cycle import Proofs
 from loomopt.views import outputs, scene_view, svg, terminal
 from loomopt.views.layout import Grid, spaced
 

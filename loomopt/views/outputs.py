@@ -16,7 +16,7 @@ from loomopt.jobs import registry
 from loomopt.scene import provenance
 from loomopt.scene.designs import Design, flat
 from loomopt.scene.scene import Scene
-from loomopt.solving.solution import Evaluation, Solution
+from loomopt.solve.answer.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ from loomopt.physics.effects.kinds import label, owned
 from loomopt.scene.designs import Design, flat
 from loomopt.scene.display import KINDS
 from loomopt.scene.scene import Scene, given
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.views.layout import GAP, Grid
 
 STEP = 15

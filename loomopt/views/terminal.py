@@ -8,14 +8,14 @@ from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
 from loomopt.scene.scene import Scene
-from loomopt.solving.solution import Evaluation, Solution, remedies
-from loomopt.solving.verdict import GlobalBound
-from loomopt.solving.words import Words
+from loomopt.solve.answer.solution import Evaluation, Solution, remedies
+from loomopt.solve.answer.words import Words
+from loomopt.solve.certificate.verdict import GlobalBound
 from loomopt.tables import rows
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:
-    from loomopt.solving.proof import Proofs
+    from loomopt.solve.proof.whole_cycle import Proofs
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:

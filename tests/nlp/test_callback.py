@@ -5,9 +5,9 @@ import itertools
 import pytest
 from waves import objective, program
 
-from loomopt.nlp import exchange
-from loomopt.nlp.callback import IterationCallback
-from loomopt.nlp.point import Settings
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.ipopt import IterationCallback
+from loomopt.solve.nlp.point import Settings
 
 
 def test_every_iteration_is_reported_in_order():

@@ -12,10 +12,10 @@ from waves import model, objective, program
 from loomopt.jobs import registry
 from loomopt.model.kinematics import Arcs
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.nlp import exchange, ipopt
-from loomopt.nlp.point import Elastic, Settings, sampler_at
 from loomopt.physics.cycle import TURN, split
-from loomopt.solving.certificate import certify
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.nlp import exchange, ipopt
+from loomopt.solve.nlp.point import Elastic, Settings, sampler_at
 
 BEATUP = registry.load("beatup")
 

@@ -9,12 +9,12 @@ import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
-from loomopt.nlp.calls import Calls
-from loomopt.nlp.expressions import expressions
-from loomopt.nlp.lifted import Lifts, Options, chosen, identity
-from loomopt.nlp.point import Settings
-from loomopt.nlp.structure import structure
 from loomopt.physics.tolerances import BESIDE_STATIONS, FEW_CHOICES, FIRST_SLOTS, LEADING
+from loomopt.solve.nlp.calls import Calls
+from loomopt.solve.nlp.expressions import expressions
+from loomopt.solve.nlp.lifted import Lifts, Options, chosen, identity
+from loomopt.solve.nlp.point import Settings
+from loomopt.solve.nlp.structure import structure
 
 
 def made(count=FEW_CHOICES + 1):

@@ -5,15 +5,13 @@ import pytest
 from steps import COUNT, program
 
 from loomopt.jobs import registry
-from loomopt.model.chains import stations
 from loomopt.model.sampling import Extreme
-from loomopt.nlp import exchange
-from loomopt.nlp.calls import Calls
-from loomopt.nlp.families import Family, families
-from loomopt.nlp.point import Settings, sampler_at
-from loomopt.nlp.stations import Stood, held, owners
-from loomopt.nlp.structure import structure
 from loomopt.physics.cycle import TURN
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.calls import Calls
+from loomopt.solve.nlp.point import Settings, sampler_at
+from loomopt.solve.nlp.stations import Family, Stood, families, held, owners, stations
+from loomopt.solve.nlp.structure import structure
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from waves import Still, objective, program
 from loomopt.maths import systems
 from loomopt.model.model import Integral, JobModel, Quantity, Row
 from loomopt.model.sampling import Sampler
-from loomopt.nlp.calls import Calls
-from loomopt.nlp.point import Settings
-from loomopt.nlp.structure import NodeParameters, means, structure
 from loomopt.physics.cycle import TURN, split
+from loomopt.solve.nlp.calls import Calls
+from loomopt.solve.nlp.point import Settings
+from loomopt.solve.nlp.structure import NodeParameters, means, structure
 
 
 def test_a_node_on_a_corner_keeps_its_side():

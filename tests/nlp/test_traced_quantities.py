@@ -6,9 +6,9 @@ import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.maths import systems
-from loomopt.nlp.lifted import Lifts
-from loomopt.nlp.quantities import Quantities
 from loomopt.physics.cycle import Node
+from loomopt.solve.nlp.expressions import Quantities
+from loomopt.solve.nlp.lifted import Lifts
 
 X = {name: 0.1 + 0.05 * k for k, name in enumerate(NAMES)}
 

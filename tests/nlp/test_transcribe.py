@@ -3,9 +3,9 @@
 import pytest
 from beatup_nlps import DESIGN, program_of, put
 
-from loomopt.nlp import transcribe as module
-from loomopt.nlp.point import sampler_at
-from loomopt.nlp.transcribe import transcribe
+from loomopt.solve.nlp import transcribe as built
+from loomopt.solve.nlp.point import sampler_at
+from loomopt.solve.nlp.transcribe import transcribe
 
 
 def test_numbers_are_parameters_and_only_structure_is_built():
@@ -35,7 +35,7 @@ def test_another_structure_is_another_program(effects, target, changes):
 
 
 def test_no_more_programs_are_kept_than_there_is_room_for():
-    for slots in range(6, 6 + module.CACHE_SIZE + 3):
+    for slots in range(6, 6 + built.CACHE_SIZE + 3):
         program = program_of((), "torque")
         transcribe(program, sampler_at(program, DESIGN), slots)
-    assert len(module._cache) <= module.CACHE_SIZE
+    assert len(built._cache) <= built.CACHE_SIZE

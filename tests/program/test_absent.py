@@ -6,8 +6,8 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
-from loomopt.nlp import graph
 from loomopt.physics.cycle import Node
+from loomopt.solve.nlp import transcribe
 
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 NODES = {
@@ -71,7 +71,7 @@ def test_algebraic_scenes_have_not_one_node_more(case):
 def solved(scene, target):
     """Return how many nodes the program of a target has at the first of its own starts."""
     program = registry.of(scene).program(scene, target)
-    return graph.nodes(program, program.starts[0])
+    return transcribe.graph_size(program, program.starts[0])
 
 
 @pytest.mark.parametrize("job", SOLVED)

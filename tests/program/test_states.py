@@ -18,12 +18,12 @@ from loomopt.model.model import JobModel, Quantity, Row, cased
 from loomopt.model.program import Limit, Objective, Program, Variable
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Sampler
-from loomopt.nlp import exchange
-from loomopt.nlp.point import Settings, sampler_at
-from loomopt.nlp.transcribe import transcribe
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load, State
 from loomopt.physics.schema import Table
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.point import Settings, sampler_at
+from loomopt.solve.nlp.transcribe import transcribe
 
 SAMPLES = 8
 

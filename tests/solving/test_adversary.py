@@ -10,9 +10,9 @@ import pytest
 import toy
 from scipy.optimize import linprog
 
-from loomopt.solving.certificate import certified, certify
-from loomopt.solving.exact import Exact
-from loomopt.solving.forward import Forward
+from loomopt.solve.certificate.certificate import certified, certify
+from loomopt.solve.certificate.derivatives_jets import Forward
+from loomopt.solve.certificate.derivatives_mp import Exact
 
 ACCURACY = 1e-8
 FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is exceeded by ", "carries a price"

@@ -5,7 +5,7 @@ import toy
 
 from loomopt.base.errors import BadInput
 from loomopt.physics.tolerances import COARSEST, MOST_STARTS, TIGHTEST
-from loomopt.solving.asked import check_numbers, target_name
+from loomopt.solve.options import check_numbers, target_name
 
 SCENE = toy.scene_of(toy.ToyJob(toy.program("x", {"f": lambda v: v["x"]})))
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from loomopt.jobs import registry
-from loomopt.nlp import exchange
-from loomopt.nlp.point import sampler_at
-from loomopt.solving.batch import Batch
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.point import sampler_at
+from loomopt.solve.search.batch import Batch
 
 TASKS = [
     ("beatup", "balance", ()),

@@ -17,9 +17,9 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.solving import bounded
-from loomopt.solving.bounded import Boxes, judged
-from loomopt.solving.certificate import certify
+from loomopt.solve.certificate import taylor_bounds
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.certificate.taylor_bounds import Boxes, judged
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 ACCURACY = 1e-8
@@ -99,11 +99,11 @@ def test_a_bound_is_undecided_when_the_boxes_run_out(monkeypatch):
     sampled, boxes = boxed(FULL, {})
     proven, limit = tried(sampled, boxes, "lift", 1.0, 1e-9)
     assert proven.status == "proven"
-    monkeypatch.setattr(bounded, "MOST_BOXES", proven.boxes // 2)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", proven.boxes // 2)
     short = boxes.bound("lift", 1.0, limit)
     assert (short.status, short.angle) == ("undecided", None)
     assert short.boxes < proven.boxes
-    monkeypatch.setattr(bounded, "MOST_BOXES", 3)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
     answer = lo.solve(lo.load("shedding"), starts=1)
     assert (answer.status, answer.certificate.whole_cycle) == ("optimal", "refined")
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from loomopt.model.model import Integral
 from loomopt.model.sampling import Sampler, Tally
-from loomopt.solving import bounded
-from loomopt.solving.bounded import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
+from loomopt.solve.certificate import taylor_bounds
+from loomopt.solve.certificate.taylor_bounds import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
 
 TURN = 2 * math.pi
 flint = importlib.import_module("flint")
@@ -202,16 +202,16 @@ def test_readings_are_counted_and_kept_for_the_other_sign(blind):
 
 
 def test_a_bound_is_given_up_after_as_many_boxes_as_allowed(blind, monkeypatch):
-    monkeypatch.setattr(bounded, "MOST_BOXES", 3)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
     found = boxes().bound("square", 1.0, 0.6)
     assert (found.status, found.boxes, found.angle) == ("undecided", 3, None)
-    monkeypatch.setattr(bounded, "MOST_BOXES", 1)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 1)
     assert boxes().bound("square", 1.0, 0.6).boxes == 1
 
 
 @pytest.mark.parametrize(("name", "exact"), [("level", 1.0), ("square", 1 / 3), ("hill", 11 / 12)])
 def test_the_mean_of_a_parabola_is_exact(name, exact, monkeypatch):
-    monkeypatch.setattr(bounded, "MEAN_BOXES", 4)
+    monkeypatch.setattr(taylor_bounds, "MEAN_BOXES", 4)
     mean = boxes().mean(Integral("mean", "root", name))
     assert float(mean) == pytest.approx(exact, rel=1e-14)
     assert float(mean.rad()) < 1e-14
@@ -220,7 +220,7 @@ def test_the_mean_of_a_parabola_is_exact(name, exact, monkeypatch):
 def test_a_mean_is_enclosed_and_closer_by_the_cube_of_the_width(monkeypatch):
     widths = []
     for count in (4, 8):
-        monkeypatch.setattr(bounded, "MEAN_BOXES", count)
+        monkeypatch.setattr(taylor_bounds, "MEAN_BOXES", count)
         mean = boxes().mean(Integral("mean", "root", "bump"))
         assert abs(float(mean.mid()) - 0.25) <= float(mean.rad())
         widths.append(float(mean.rad()))
@@ -256,7 +256,7 @@ def test_both_signs_count_unless_a_quantity_has_one():
     ],
 )
 def test_the_worst_of_all_rows_is_said(statuses, said):
-    found = [bounded.Bound(status, 1) for status in statuses]
+    found = [taylor_bounds.Bound(status, 1) for status in statuses]
     with mock.patch.object(Boxes, "bound", side_effect=found):
         assert judged(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == said
 

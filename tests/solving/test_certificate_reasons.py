@@ -9,14 +9,14 @@ import toy
 
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import COMPLEMENTARY, LARGEST_PRICE, POSITIVE, STATIONARY
-from loomopt.solving import certificate, kkt, second_order
-from loomopt.solving.certificate import Cycle, JudgedLevel, certified, certify
-from loomopt.solving.exact import Exact
-from loomopt.solving.forward import Forward
-from loomopt.solving.kkt import Multipliers
-from loomopt.solving.rows import active_set
-from loomopt.solving.second_order import Curvature, Local
-from loomopt.solving.verdict import Level
+from loomopt.solve.certificate import certificate, kkt, second_order
+from loomopt.solve.certificate.active_set import active_set
+from loomopt.solve.certificate.certificate import Cycle, JudgedLevel, certified, certify
+from loomopt.solve.certificate.derivatives_jets import Forward
+from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solve.certificate.kkt import Multipliers
+from loomopt.solve.certificate.second_order import Curvature, Local
+from loomopt.solve.certificate.verdict import Level
 
 NONE = Multipliers(np.zeros(0), 0.0)
 

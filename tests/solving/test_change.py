@@ -10,12 +10,13 @@ from test_feasible_curve import ROOM
 import loomopt as lo
 from loomopt.maths.systems import FLOAT
 from loomopt.model.program import Move, Wish
-from loomopt.nlp.point import Settings
 from loomopt.physics.mechanisms.cam_spline import spline
-from loomopt.solving import change, second_order, settle
-from loomopt.solving.certificate import certify
-from loomopt.solving.change import with_least_change
-from loomopt.solving.search import Search, judged, objectives, tried
+from loomopt.solve.certificate import second_order
+from loomopt.solve.certificate.certificate import certify
+from loomopt.solve.nlp.point import Settings
+from loomopt.solve.search import least_change, settle
+from loomopt.solve.search.least_change import with_least_change
+from loomopt.solve.search.search import Search, judged, objectives, tried
 
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 LEAST = "least change from today"
@@ -27,7 +28,7 @@ def unsettled(monkeypatch):
 
     def solve(scene, target=None):
         with monkeypatch.context() as patch:
-            patch.setattr(change, "with_least_change", lambda search: search)
+            patch.setattr(least_change, "with_least_change", lambda search: search)
             return lo.solve(scene, target, starts=1)
 
     return solve
@@ -97,7 +98,7 @@ def test_what_has_no_value_of_today_is_named_as_open():
 
 
 def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypatch):
-    monkeypatch.setattr(change, "_held", lambda *_: None)
+    monkeypatch.setattr(least_change, "_held", lambda *_: None)
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2})
     search = judged(tried(Search(toy.ToyJob(program), program, Settings(), {"y": 2.0}), {"x": 4.0, "y": 3.0}))
     best = with_least_change(search).best
@@ -109,7 +110,7 @@ def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypat
     "moves", [(), (Move("y", ("y",), "axis", (Wish("least", "tidy"),), {"y": 0.0}, {"y": (-9, 9)}),)]
 )
 def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
-    monkeypatch.setattr(change, "tried", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr(least_change, "tried", lambda *_: pytest.fail("solved again"))
     rows = {"f": lambda v: v["x"] ** 2 + (0 if moves else v["y"] ** 2)}
     program = toy.program("xy", rows, moves=moves)
     best = solved(program, {"x": 4.0, "y": 3.0}, {"x": 1.0, "y": 2.0}).best
@@ -124,7 +125,7 @@ def test_a_design_that_has_changed_least_already_stays_to_the_last_bit_and_is_no
         certified.append(asked)
         return certify(*asked)
 
-    monkeypatch.setattr(change, "certify", counted)
+    monkeypatch.setattr(least_change, "certify", counted)
     program = toy.program("xy", {"f": lambda v: v["x"]}, bounds={"x": (1.0, 9.0)})
     first = solved(program, {"x": 4.0, "y": 3.0}, {"y": 2.0}).best
     assert len(certified) == 1
@@ -165,10 +166,10 @@ def test_a_level_that_is_shown_says_as_much_as_one_that_is_followed():
 
 def test_designs_that_change_share_one_model():
     program = toy.program("xy", {"f": lambda v: v["x"] ** 2})
-    tasks = [change.changing(program, {"x": 0.0, "y": y}, (), {"x": 0.0, "y": 2.0}) for y in (1.0, 3.0)]
+    tasks = [least_change.changing(program, {"x": 0.0, "y": y}, (), {"x": 0.0, "y": 2.0}) for y in (1.0, 3.0)]
     assert tasks[0].model is tasks[1].model
     assert tasks[0].parameters == tasks[1].parameters
-    other = change.changing(program, {"x": 0.0, "y": 1.0}, ("x",), {"x": 0.0, "y": 2.0})
+    other = least_change.changing(program, {"x": 0.0, "y": 1.0}, ("x",), {"x": 0.0, "y": 2.0})
     assert other.model is not tasks[0].model
 
 
@@ -183,12 +184,12 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
     axes = [Move(n, (n,), "axis", (Wish("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
-    ways = change.left(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
+    ways = least_change.left(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())
     assert len(ways) == 1, "y and z together are no move"
     assert asked == []
     flat = toy.program("xyz", {"f": lambda v: v["x"] ** 2}, moves=tuple(axes))
     certificate = certify(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
-    assert len(change.left(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
+    assert len(least_change.left(flat, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ("y",))) == 0
     assert asked == [{"z"}], "y stays whatever it changes"
 
 
@@ -292,7 +293,7 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
         seen.append([objectives(search.program, each.best.x) for each in (search, after)])
         return after
 
-    monkeypatch.setattr(change, "with_least_change", kept)
+    monkeypatch.setattr(least_change, "with_least_change", kept)
     answer = lo.solve(scene, target, starts=1)
     assert answer.status == "optimal"
     assert answer.certificate.settled
@@ -302,14 +303,14 @@ def test_no_earlier_objective_changes(scene, target, monkeypatch):
 
 @pytest.mark.parametrize(("name", "target"), [("beatup", "balance"), ("beatup-light", "balance"), ("beatup", "pulse")])
 def test_a_counterweight_and_a_common_scale_are_settled_by_their_own_rules(name, target, monkeypatch):
-    monkeypatch.setattr(change, "tried", lambda *_: pytest.fail("solved again"))
+    monkeypatch.setattr(least_change, "tried", lambda *_: pytest.fail("solved again"))
     answer = lo.solve(lo.load(name), target, starts=1)
     assert not answer.certificate.unique
     assert answer.certificate.open == ()
 
 
 def test_what_is_left_open_is_said(monkeypatch):
-    monkeypatch.setattr(change, "_moved", lambda *_: None)
+    monkeypatch.setattr(least_change, "_moved", lambda *_: None)
     answer = lo.solve(freed(operation__speed="60 rpm"), starts=1)
     assert answer.status == "optimal"
     assert "Left open, for others are as good: rise, far_dwell, return." in answer.message

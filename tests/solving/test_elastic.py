@@ -5,12 +5,12 @@ import math
 import pytest
 import toy
 
-from loomopt.nlp import exchange
-from loomopt.nlp.point import Point, Settings
 from loomopt.physics.tolerances import NEEDED
-from loomopt.solving import elastic
-from loomopt.solving.elastic import clash, least
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
+from loomopt.solve.nlp import exchange
+from loomopt.solve.nlp.point import Point, Settings
+from loomopt.solve.search import elastic
+from loomopt.solve.search.elastic import clash, least
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 

@@ -6,11 +6,11 @@ import toy
 
 import loomopt as lo
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate import SECOND_ORDER_OPEN, certify
-from loomopt.solving.exact import Exact
-from loomopt.solving.feasible_curve import FeasibleCurve
-from loomopt.solving.lagrangian import Lagrangian
-from loomopt.solving.rows import active_set
+from loomopt.solve.certificate.active_set import active_set
+from loomopt.solve.certificate.certificate import SECOND_ORDER_OPEN, certify
+from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solve.certificate.feasible_curve import FeasibleCurve
+from loomopt.solve.certificate.second_order import Lagrangian
 
 ROUND = {"f": lambda v: -((v["x"] ** 2 + v["y"] ** 2) ** 2), "r": lambda v: v["x"] ** 2 + v["y"] ** 2}
 """On the circle r = 1 all is level; along its tangent f + 2 r falls by the fourth power of the step."""

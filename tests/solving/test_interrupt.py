@@ -13,7 +13,7 @@ import loomopt as lo
 HOOKED = """
 import os, signal, sys
 from loomopt import cli
-from loomopt.solving import engine
+from loomopt.solve import engine
 
 genuine, hits = engine.solve, []
 

@@ -11,7 +11,7 @@ from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.scene.packaged import problem_names
-from loomopt.solving import bounded
+from loomopt.solve.certificate import taylor_bounds
 from loomopt.studies.check import served
 
 PAIRS = [(name, target) for name in problem_names() for target in served(lo.load(name))]
@@ -120,7 +120,7 @@ def test_a_slack_out_of_range_is_refused(slack):
 
 def test_what_the_boxes_do_not_decide_is_undecided_and_does_not_pass(monkeypatch):
     scene, design = lo.load("beatup"), solved("beatup").design
-    monkeypatch.setattr(bounded, "MOST_BOXES", 3)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 3)
     proofs = lo.prove(scene, design)
     open_ones = {proof.limit for proof in proofs.proofs if proof.status == "undecided"}
     assert "peak peak_torque" in open_ones

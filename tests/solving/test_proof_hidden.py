@@ -14,8 +14,8 @@ from shedding_cases import flat, freed, product
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.model.sampling import Sampler
-from loomopt.solving import bounded
-from loomopt.solving.bounded import Boxes
+from loomopt.solve.certificate import taylor_bounds
+from loomopt.solve.certificate.taylor_bounds import Boxes
 
 # Effects, laws, coils ------------------------------------------------------------------------------------------------
 
@@ -156,7 +156,7 @@ def test_a_jump_of_the_angle_inside_a_box_is_not_stepped_over(sign):
 def test_a_link_that_turns_right_over_has_no_stroke_to_prove(monkeypatch):
     """Its travel runs on, 4π a turn; what is read of it jumps at ±2π m."""
     lengths = {"C0x": -0.06, "C0y": 0.17, "l4": 0.3, "l5": 0.2, "l6": 0.2, "phi40": 0.0}
-    monkeypatch.setattr(bounded, "MOST_BOXES", 2000)
+    monkeypatch.setattr(taylor_bounds, "MOST_BOXES", 2000)
     try:
         claim = found(lo.prove(lo.load("rapier"), lengths), "peak stroke")
     except BadInput:

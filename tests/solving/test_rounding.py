@@ -6,8 +6,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.units import factor
-from loomopt.solving.rounding import LEAST_DIGITS, digits, roundings
-from loomopt.solving.words import Words
+from loomopt.solve.answer.report import LEAST_DIGITS, digits, roundings
+from loomopt.solve.answer.words import Words
 from loomopt.views import layout, terminal
 
 CASES = [("beatup", "retrofit"), ("beatup-heavy", "torque"), ("rapier", "stroke-dwell"), ("shedding", "speed")]

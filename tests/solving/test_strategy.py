@@ -8,12 +8,12 @@ import toy
 from searches import BAD, certified, empty, solved
 
 import loomopt as lo
-from loomopt.nlp.point import Point, Settings
 from loomopt.physics.tolerances import MORE_STARTS
-from loomopt.solving import strategy
-from loomopt.solving.search import Search
-from loomopt.solving.sizes import BETTER, DESIGNS
-from loomopt.solving.strategy import searched
+from loomopt.solve.nlp.point import Point, Settings
+from loomopt.solve.search import multistart
+from loomopt.solve.search.multistart import searched
+from loomopt.solve.search.search import Search
+from loomopt.solve.search.sizes import BETTER, DESIGNS
 
 __all__ = ["certified", "solved"]
 
@@ -126,7 +126,7 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
     nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, excesses=(1.0,))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(strategy, "least", lambda *_: nearest)
+        patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
     assert len(calls) == 1
     assert found.clashes
@@ -140,7 +140,7 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
     points += [Point({"x": 2.0, "y": 0.0}, "Solve_Succeeded", True)] * 40
     nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, excesses=(0.0,))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(strategy, "least", lambda *_: nearest)
+        patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
     assert calls[1][0] == {"x": 2.5, "y": 0.0}
     assert found.passed

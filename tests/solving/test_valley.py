@@ -8,13 +8,12 @@ import toy
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import PROBES
-from loomopt.solving.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
-from loomopt.solving.exact import Exact
-from loomopt.solving.feasible_curve import FeasibleCurve
-from loomopt.solving.forward import Forward
-from loomopt.solving.lagrangian import Lagrangian
-from loomopt.solving.rows import active_set
-from loomopt.solving.second_order import Local
+from loomopt.solve.certificate.active_set import active_set
+from loomopt.solve.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
+from loomopt.solve.certificate.derivatives_jets import Forward
+from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solve.certificate.feasible_curve import FeasibleCurve
+from loomopt.solve.certificate.second_order import Lagrangian, Local
 from loomopt.studies import front
 from loomopt.studies.front_solve import Asking
 

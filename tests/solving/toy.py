@@ -26,8 +26,8 @@ from loomopt.picture.job_views import JobViews
 from loomopt.scene import scene
 from loomopt.scene.scene import Scene
 from loomopt.scene.schema import SceneSchema
-from loomopt.solving import engine
-from loomopt.solving.solution import Solution
+from loomopt.solve import engine
+from loomopt.solve.answer.solution import Solution
 
 WIDE = 10.0
 Formula = Callable[[Values], Number]

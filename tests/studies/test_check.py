@@ -10,7 +10,7 @@ from loomopt.cli import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.scene import packaged
-from loomopt.solving import engine
+from loomopt.solve import engine
 from loomopt.studies import check as study
 
 NAME = "beatup-light"

@@ -12,7 +12,7 @@ import uncoiled
 import loomopt as lo
 from loomopt import effects_study
 from loomopt.base.errors import BadInput
-from loomopt.solving import engine
+from loomopt.solve import engine
 from loomopt.studies import effects, effects_known, runs
 from loomopt.studies.plan import Task
 

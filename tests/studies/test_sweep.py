@@ -14,7 +14,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.solving.solution import Solution
+from loomopt.solve.answer.solution import Solution
 from loomopt.studies import runs, sweep
 from loomopt.studies.rows import digest
 from loomopt.studies.store import Store

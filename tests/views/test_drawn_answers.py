@@ -8,7 +8,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.cli import run
-from loomopt.solving.solution import Finding
+from loomopt.solve.answer.solution import Finding
 from loomopt.views import notebook, outputs, svg
 
 TOO_WIDE = {"limits.swing.min": "30 deg", "limits.swing.max": "31 deg"}

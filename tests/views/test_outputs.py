@@ -15,7 +15,7 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.cli import run
-from loomopt.solving.solution import Evaluation, Finding
+from loomopt.solve.answer.solution import Evaluation, Finding
 from loomopt.views import outputs
 
 ezdxf: Any = importlib.import_module("ezdxf")

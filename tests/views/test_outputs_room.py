@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.base import files
 from loomopt.base.errors import BadInput
 from loomopt.cli import run
-from loomopt.solving import engine
+from loomopt.solve import engine
 from loomopt.views import outputs
 
 NAMES = ["answer.json", "curves.csv", "linkage.svg", "table.csv"]

@@ -12,7 +12,7 @@ from loomopt import api
 from loomopt.base.quantities import read
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
-from loomopt.solving.words import Words
+from loomopt.solve.answer.words import Words
 from loomopt.views import layout, scene_view, terminal
 from loomopt.views.layout import Grid
 

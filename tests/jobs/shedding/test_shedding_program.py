@@ -8,8 +8,8 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
 from loomopt.jobs.shedding.scene import Frame
-from loomopt.nlp.families import families
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
+from loomopt.solve.nlp.stations import families
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)

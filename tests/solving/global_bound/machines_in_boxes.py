@@ -10,12 +10,12 @@ from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
-from loomopt.nlp.point import Settings
-from loomopt.solving.engine import solve_program
-from loomopt.solving.global_bound import scale
-from loomopt.solving.global_bound.levels import loosening
-from loomopt.solving.global_bound.task import Task, reduced
-from loomopt.solving.search import Search
+from loomopt.solve.engine import solve_program
+from loomopt.solve.nlp.point import Settings
+from loomopt.solve.proof import task
+from loomopt.solve.proof.levels import loosening
+from loomopt.solve.proof.task import Task, reduced
+from loomopt.solve.search.search import Search
 
 
 class Solved(NamedTuple):
@@ -30,7 +30,7 @@ class Solved(NamedTuple):
 
     @property
     def task(self) -> Task:
-        return reduced(self.program, loosening(self.job, self.program), scale.silent(self.program), {})
+        return reduced(self.program, loosening(self.job, self.program), task.silent(self.program), {})
 
 
 @functools.cache

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import solved
 
-from loomopt.solving.global_bound.cuts import multipliers, with_cut
-from loomopt.solving.global_bound.reading import LIMIT, Reader
+from loomopt.solve.proof.box_rows import LIMIT, Reader
+from loomopt.solve.proof.tree import multipliers, with_cut
 
 
 @pytest.mark.parametrize(("name", "level"), [("beatup-light", 0), ("beatup-light", 1), ("beatup", 1)])

@@ -8,10 +8,9 @@ import pytest
 from machines_in_boxes import quietly, solved
 
 from loomopt.maths.intervals import Enclosure
-from loomopt.solving.global_bound.levels import HELD, Levels, _Level, loosening
-from loomopt.solving.global_bound.scale import silent
-from loomopt.solving.global_bound.task import reduced
-from loomopt.solving.global_bound.tree import grown
+from loomopt.solve.proof.levels import HELD, Levels, _Level, loosening
+from loomopt.solve.proof.task import reduced, silent
+from loomopt.solve.proof.tree import grown
 
 FOREVER = 1e12
 TURNS = 3

@@ -7,9 +7,8 @@ from machines_in_boxes import solved
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval, interval
 from loomopt.model.sampling import Sampler
-from loomopt.solving.global_bound.nodes import layouts
-from loomopt.solving.global_bound.reading import Reader
-from loomopt.solving.global_bound.rows import BoxRows, OpenError, _summed, strips
+from loomopt.solve.proof.box_rows import BoxRows, OpenError, Reader, _summed, strips
+from loomopt.solve.proof.nodes import layouts
 
 
 def test_means_hold_the_quadrature_of_designs_in_the_box():

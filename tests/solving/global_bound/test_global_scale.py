@@ -3,7 +3,7 @@
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solving.global_bound.scale import silent
+from loomopt.solve.proof.task import silent
 
 FREE = [
     ("beatup", "balance"),

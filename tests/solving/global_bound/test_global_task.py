@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solving.global_bound.rows import OpenError
-from loomopt.solving.global_bound.task import reduced
+from loomopt.solve.proof.box_rows import OpenError
+from loomopt.solve.proof.task import reduced
 
 
 @pytest.mark.parametrize(

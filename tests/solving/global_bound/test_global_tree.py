@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from loomopt.maths.intervals import Interval, variable
-from loomopt.solving.global_bound.reading import LIMIT, Read
-from loomopt.solving.global_bound.tree import BATCH, Question, Tree, grown
+from loomopt.solve.proof.box_rows import LIMIT, Read
+from loomopt.solve.proof.tree import BATCH, Question, Tree, grown
 
 LOW, HIGH = np.array([-1.0, -2.0]), np.array([2.0, 1.0])
 

@@ -1,0 +1,1 @@
+"""What a solve says: plain data, and words."""

@@ -1,0 +1,1 @@
+"""The certificate: a proven local optimum, computed apart from the solver."""
