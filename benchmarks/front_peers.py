@@ -20,9 +20,10 @@ import loomopt as lo
 from benchmarks import harness
 from benchmarks.front_rivals import Rival, Spot, beatup, rapier, shedding
 from benchmarks.fronts import asked_at
-from loomopt.studies import executors, front, front_read, front_trade, runs
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.front import front, trade
+from loomopt.studies.front.trade import read_front
+from loomopt.studies.run import executors, run
+from loomopt.studies.run.rows import Row, Task
 
 LONGER = 10.0
 """Times the front's own that the peer gets."""
@@ -69,7 +70,7 @@ def compared(rival: Rival, points: int) -> list[dict[str, object]]:
     """Return a row for loomopt's front, one for the peer's, and one for the front asked at the peer's places too."""
     began = time.process_time()
     trade = front.trade(lo.load(rival.problem), rival.axes, rival.target, points=points)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     spent, name = time.process_time() - began, " against ".join(rival.axes)
     certified = [row for row in found.rows if row.certified]
     mine = _judged(rival, [rival.own(row) for row in certified])
@@ -94,7 +95,7 @@ def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
     return [spot for design in designs if (spot := rival.judge(design))]
 
 
-def _asked(trade: front_trade.Trade, found: front_read.Front, second: float) -> Row | None:
+def _asked(trade: trade.Trade, found: trade.Front, second: float) -> Row | None:
     """Return the front's design at a place; None beside the front."""
     paid = found.values(trade.axes[1])
     row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
@@ -117,12 +118,12 @@ def _row(method: str, seconds: float, looked: int, spots: Sequence[Spot], whole:
 def plain_loop(points: int) -> int:
     """Solve a whole front, one point after the other; returns how many rows there are."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), points=points)
-    return len(runs.run(trade))
+    return len(run.run(trade))
 
 
 @functools.lru_cache(maxsize=2)
-def _trade(payload: bytes) -> front_trade.Trade:
-    found: front_trade.Trade = pickle.loads(payload)
+def _trade(payload: bytes) -> trade.Trade:
+    found: trade.Trade = pickle.loads(payload)
     return found
 
 
@@ -139,7 +140,7 @@ def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool)
     pay for; else the same two do all, warm.
     """
     trade = front.trade(lo.load("beatup"), axes, target)
-    work, payload = list(runs.tasks(trade, runs.run(trade))), pickle.dumps(trade)
+    work, payload = list(run.tasks(trade, run.run(trade))), pickle.dumps(trade)
 
     def halves(pool: Executor) -> None:
         for each in [pool.submit(half, payload, work[first::2]) for first in (0, 1)]:
@@ -156,8 +157,8 @@ def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool)
     pool = None if fresh else executors.workers(2)()
     if pool:
         halves(pool)
-        runs.run(trade, pool)
-    turns = [(timed(pool, halves), timed(pool, lambda own: runs.run(trade, own))) for _ in range(repeats)]
+        run.run(trade, pool)
+    turns = [(timed(pool, halves), timed(pool, lambda own: run.run(trade, own))) for _ in range(repeats)]
     if pool:
         pool.shutdown()
     return statistics.median(plain / ours for plain, ours in turns)

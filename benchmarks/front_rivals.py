@@ -9,7 +9,7 @@ import numpy as np
 
 import loomopt as lo
 from benchmarks import plain_beatup, plain_rapier, plain_shedding
-from loomopt.studies.rows import Row
+from loomopt.studies.run.rows import Row
 
 GRID = 360
 M0 = 745.0

@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 import loomopt as lo
 from loomopt.physics.tolerances import SAME_OBJECTIVE
-from loomopt.studies import front, front_plan, front_read, front_trade, runs
-from loomopt.studies.front_solve import Asking
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.front import front, plan, trade
+from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.trade import POINTS, read_front
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Row, Task
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
 LARGEST_AREA, CORNER = 34.892414, (7.0, 97.0)
@@ -95,22 +96,22 @@ def main() -> None:
     """Print a block for each front."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cold", action="store_true")
-    parser.add_argument("--points", type=int, default=front_trade.POINTS)
+    parser.add_argument("--points", type=int, default=POINTS)
     asked = parser.parse_args()
     for case in CASES:
         began = time.process_time()
         trade = front.trade(
             lo.load(case.problem), case.axes, case.target, maximise=case.most, ranges=case.ranges, points=asked.points
         )
-        rows = runs.run(trade)
+        rows = run.run(trade)
         spent = time.process_time() - began
-        found = front_read.read(trade, rows)
+        found = read_front(trade, rows)
         told(case, trade, found, spent)
         if asked.cold:
             searched(trade, found)
 
 
-def told(case: Case, trade: front_trade.Trade, found: front_read.Front, spent: float) -> None:
+def told(case: Case, trade: trade.Trade, found: trade.Front, spent: float) -> None:
     """Print a front's points beside known ones, its ends, its changes and its speed."""
     first, second = case.axes
     sought, paid = found.values(first), found.values(second)
@@ -121,7 +122,7 @@ def told(case: Case, trade: front_trade.Trade, found: front_read.Front, spent: f
         print(f"  {change['kind']} at {second} {change['at']:.9g}: {', '.join(change['limits'])}")
     for value, expected in case.known.items():
         row = asked_at(trade, found, value)
-        reached = front_plan.value(row, first)
+        reached = plan.value(row, first)
         print(f"  {second} {value:.9g}: {reached:.9f}, known {expected:.9f}, apart {reached / expected - 1:+.1e}")
     if second == "m4e":
         corners = [(x, CORNER[1] - y) for x, y in zip([*paid, CORNER[0]], [*sought, sought[-1]], strict=True)]
@@ -133,19 +134,19 @@ def told(case: Case, trade: front_trade.Trade, found: front_read.Front, spent: f
     print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
 
 
-def asked_at(trade: front_trade.Trade, found: front_read.Front, value: float) -> Row:
+def asked_at(trade: trade.Trade, found: trade.Front, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
     return trade.solved(Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
-def trade_value(trade: front_trade.Trade, row: Row) -> float:
+def trade_value(trade: trade.Trade, row: Row) -> float:
     """Return the second axis of a row."""
-    return front_plan.value(row, trade.axes[1])
+    return plan.value(row, trade.axes[1])
 
 
-def searched(trade: front_trade.Trade, found: front_read.Front) -> None:
+def searched(trade: trade.Trade, found: trade.Front) -> None:
     """Print which of every third point a search from scratch is better at, and which it is worse at."""
     better, worse, count = [], [], 0
     sought = trade.solver.axes[0]

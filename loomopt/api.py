@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from loomopt.design_study import DesignStudy
     from loomopt.effects_study import EffectsStudy
     from loomopt.solve.proof.whole_cycle import Proofs
-    from loomopt.studies.front import Given as Ranges
-    from loomopt.studies.rows import Row
+    from loomopt.studies.front.front import Given as Ranges
+    from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over
 
 Given = Scene | str | os.PathLike[str]
@@ -184,7 +184,7 @@ def effects(
     KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.effects_study import conducted
-    from loomopt.studies.effects import planned
+    from loomopt.studies.effects.study import planned
 
     study = planned(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
     return conducted(study, executor, workers, on_row)
@@ -215,7 +215,7 @@ def pareto(
     KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.design_study import conducted
-    from loomopt.studies import front
+    from loomopt.studies.front import front
 
     own = _scene(scene)
     asked = front.si(own, ranges or {})

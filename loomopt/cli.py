@@ -112,7 +112,7 @@ def accuracy(
     ] = None,
 ) -> None:
     """Show what accuracy costs in time, method by method."""
-    from loomopt.studies import accuracy as study
+    from loomopt.studies.accuracy import accuracy as study
     from loomopt.views import accuracy_figure, layout, outputs
 
     for path in out or ():

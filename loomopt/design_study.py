@@ -12,10 +12,11 @@ from loomopt.base.records import lazy
 from loomopt.base.refusals import refusal
 from loomopt.results import Answer, solved
 from loomopt.scene.scene import Scene
-from loomopt.studies import executors, runs, study_table, workers
-from loomopt.studies.findings import Findings, SceneStudy, counted
-from loomopt.studies.rows import Row, digest
-from loomopt.studies.store import Store
+from loomopt.studies import study_table
+from loomopt.studies.run import executors, run
+from loomopt.studies.run.findings import Findings, SceneStudy, counted
+from loomopt.studies.run.rows import Row, digest
+from loomopt.studies.run.store import Store
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,7 +61,7 @@ class DesignStudy:
 
     def answer(self, point: int) -> Answer:
         """Return the whole answer of a row: its solve is repeated, to the same digits. Raises BadInput."""
-        for task, parent in runs.tasks(self.study, self.solved):
+        for task, parent in run.tasks(self.study, self.solved):
             if task.point == point:
                 return solved(self.study.solve(task, parent), self.study.scene_at(point))
         allowed = ", ".join(str(row.point) for row in self.solved[:20])
@@ -104,11 +105,11 @@ class DesignStudy:
 
 def conducted(
     study: SceneStudy,
-    executor: Executor | workers.Making | None = None,
+    executor: Executor | run.Making | None = None,
     count: int | None = None,
     store: str | os.PathLike[str] | None = None,
     resume: bool = False,
-    on_row: runs.OnRow | None = None,
+    on_row: run.OnRow | None = None,
 ) -> DesignStudy:
     """Return a study after running what is left of it.
 
@@ -121,7 +122,7 @@ def conducted(
     if store is None:
         if resume:
             raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
-        return DesignStudy(study, runs.run(study, executor, None, on_row))
+        return DesignStudy(study, run.run(study, executor, None, on_row))
     with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
         known = len(opened.rows(study.key))
         if known and not resume:
@@ -129,10 +130,10 @@ def conducted(
             remedy = "Resume (--resume, or resume=True), or name another file"
             raise refusal(problem, str(store), "store", remedy=remedy)
         opened.begin(study.key, told(study))
-        return DesignStudy(study, runs.run(study, executor, opened, on_row))
+        return DesignStudy(study, run.run(study, executor, opened, on_row))
 
 
-def who(executor: Executor | workers.Making | None, count: int | None) -> Executor | workers.Making | None:
+def who(executor: Executor | run.Making | None, count: int | None) -> Executor | run.Making | None:
     """Return who computes a study: an executor, or so many processes, not both. Raises BadInput."""
     if executor is not None and count is not None:
         remedy = "Give one of them"

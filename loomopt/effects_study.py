@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt.design_study import who
-from loomopt.studies import effects_found, runs, workers
-from loomopt.studies.effects import Effects
-from loomopt.studies.rows import Row
+from loomopt.studies.effects import worth
+from loomopt.studies.effects.study import Effects
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Row
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
 
-class EffectsStudy(effects_found.Found):
+class EffectsStudy(worth.Found):
     """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -48,18 +49,18 @@ class EffectsStudy(effects_found.Found):
 
 def concluded(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
     """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
-    found = effects_found.concluded(study, rows)
+    found = worth.concluded(study, rows)
     return EffectsStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
 
 
 def conducted(
     study: Effects,
-    executor: Executor | workers.Making | None = None,
+    executor: Executor | run.Making | None = None,
     count: int | None = None,
-    on_row: runs.OnRow | None = None,
+    on_row: run.OnRow | None = None,
 ) -> EffectsStudy:
     """Return a study after running it; count: of worker processes, where there is no executor.
 
     Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    return concluded(study, runs.run(study, who(executor, count), None, on_row))
+    return concluded(study, run.run(study, who(executor, count), None, on_row))

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from loomopt.design_study import DesignStudy
-    from loomopt.studies.findings import SceneStudy
-    from loomopt.studies.rows import Row
+    from loomopt.studies.run.findings import SceneStudy
+    from loomopt.studies.run.rows import Row
 
 Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
 Workers = Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")]
@@ -107,7 +107,7 @@ def pareto(
     as_json: Json = False,
 ) -> None:
     """Show what two figures cost each other: the whole front."""
-    from loomopt.studies import front
+    from loomopt.studies.front import front
 
     how = Run(workers, dask, store, resume, out, figure, si, as_json)
     scene = read_scene(problem, sets, on, off, free)
@@ -153,7 +153,7 @@ def _parted(items: list[str], option: str, example: str, form: str) -> dict[str,
 def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
     from loomopt.design_study import DesignStudy, conducted
-    from loomopt.studies.findings import counted
+    from loomopt.studies.run.findings import counted
     from loomopt.views import study_files
 
     for path in how.out or ():
@@ -217,7 +217,7 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
         from loomopt.base.refusals import refusal
 
         raise refusal("there are a cluster and a number of workers", "", "--workers", count, remedy="Give one of them")
-    from loomopt.studies import executors
+    from loomopt.studies.run import executors
 
     with executors.dask(dask) as executor:
         yield executor
@@ -256,7 +256,7 @@ def effects(
 ) -> None:
     """Show what each effect is worth, and what may be left out."""
     from loomopt import effects_study
-    from loomopt.studies.effects import planned
+    from loomopt.studies.effects.study import planned
     from loomopt.views import effects_table, layout, outputs, study_files
 
     for path in figure or ():

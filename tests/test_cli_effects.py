@@ -7,7 +7,7 @@ import pytest
 import uncoiled
 
 from loomopt.cli import run
-from loomopt.studies.effects import Effects
+from loomopt.studies.effects.study import Effects
 from loomopt.study_commands import outcome
 
 KEYS = ["effect", "shift", "regret", "may_go", "nodes", "build_s", "solve_s", "status", "why"]

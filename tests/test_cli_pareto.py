@@ -7,7 +7,7 @@ import pytest
 
 from loomopt import study_commands
 from loomopt.cli import run
-from loomopt.studies.front_trade import Trade
+from loomopt.studies.front.trade import Trade
 
 MASS = ("--minimise", "peak_torque", "--against", "m4e")
 FEW = (*MASS, "--target", "balance", "--range", "m4e=0:2 kg", "--points", "3")

@@ -1,7 +1,8 @@
 """Solve the packaged scenes again and compare with the reference tables: verified optima, and a front for each job."""
 
 import functools
-from collections.abc import Callable, Iterable
+import io
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +14,151 @@ from loomopt.scene import packaged, provenance
 from loomopt.scene.scene import Scene
 from loomopt.solve import engine
 from loomopt.solve.answer.solution import Solution
-from loomopt.studies import references
+from loomopt.solve.answer.words import Words, grouped
+from loomopt.studies.front import front, plan, trade
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.tolerances import REPRODUCED_DESIGN, REPRODUCED_OBJECTIVE
 
 if TYPE_CHECKING:
     import pandas as pd
+
+LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
+"""Sizes below which a difference is measured against the size instead, by unit, SI."""
+LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
+"""Figures that another of the same unit, which may be zero, is measured against."""
+
+
+def read_reference(path: Path) -> "pd.DataFrame | None":
+    """Return a reference table, its cells as they stand there; None where there is none."""
+    import pandas as pd
+
+    if not path.is_file():
+        return None
+    text = "".join(line for line in path.read_text(encoding="utf-8").splitlines(True) if not line.startswith("#"))
+    return pd.read_csv(io.StringIO(text), keep_default_na=False, dtype=str)
+
+
+def differing(now: "pd.DataFrame", then: "pd.DataFrame", objectives: Collection[str]) -> Iterator[str]:
+    """Yield every difference between a table of one line, SI, and its reference; objectives: figures held closest."""
+    yield from (f"column {name} is new" for name in now.columns.difference(then.columns))
+    yield from (f"column {name} is gone" for name in then.columns.difference(now.columns))
+    least = LEAST | {of: float(then[column].iloc[0]) for of, column in LARGEST.items() if column in then}
+    for name in now.columns.intersection(then.columns):
+        new, old = now[name].iloc[0], then[name].iloc[0]
+        if isinstance(new, str) or name == "unique":
+            if str(new) != str(old):
+                yield f"{name}: {new}, reference {old}"
+            continue
+        allowed = REPRODUCED_OBJECTIVE if name.split(" [")[0] in objectives else REPRODUCED_DESIGN
+        size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
+        if not abs(float(new) - float(old)) <= allowed * size:
+            yield f"{name}: {float(new)!r}, reference {float(old)!r}"
+
+
+POINTS = 12
+"""Designs of a front asked for, beside those that narrow its changes down."""
+BETWEEN = 0.25, 0.5, 0.75
+"""Where between its ends a front is solved again, as shares of the second axis."""
+
+
+def reference_trade(scene: Scene) -> trade.Trade | None:
+    """Return the front that stands for a scene's job; None where the scene is not named after it, or it has none."""
+    found = scene.schema.conflict
+    if found is None or scene.name != scene.schema.name:
+        return None
+    return front.trade(scene, found.axes, found.target, maximise=found.maximise, points=POINTS)
+
+
+def trade_said(study: trade.Trade) -> str:
+    """Return what a front is called."""
+    return " against ".join(study.axes)
+
+
+def front_file(study: trade.Trade) -> str:
+    """Return the name of a front's file."""
+    return f"{study.scene.name}.{'-against-'.join(study.axes)}.csv"
+
+
+def front_table(study: trade.Trade) -> "pd.DataFrame":
+    """Return the whole front as a table, a line for each of its designs in the order of the second axis; SI."""
+    import pandas as pd
+
+    found = trade.read_front(study, run.run(study))
+    frame = pd.DataFrame([front_line(study, row) for row in found.rows if row.certified])
+    more = {"target": study.target or "none", "accuracy": study.accuracy, "points": study.points}
+    frame.attrs.update(provenance.provenance(study.scene, **more))
+    return frame
+
+
+def front_line(study: trade.Trade, row: Row) -> dict[str, object]:
+    """Return a certified design of a front as a line, SI: what was asked, axes, figures, slope, what is touched."""
+    words, (first, second) = Words(study.scene), study.axes
+    over, under = words.si(first), words.si(second)
+    slope = row.multipliers.get(study.solver.slope, "")
+    found: dict[str, object] = {"status": row.status, f"asked {second} [{under}]": row.place.get(second, "")}
+    axes = {name: plan.value(row, name) for name in study.axes}
+    numbers = {**axes, **row.design, **row.figures, **axes}
+    found |= {f"{name} [{words.si(name)}]": value for name, value in numbers.items() if value is not None}
+    found[f"{study.solver.slope} [{over}/{grouped(under)}]"] = slope
+    found["touched"] = " | ".join(dict.fromkeys(str(label) for label, *_ in row.warm["active"]))
+    return found
+
+
+def checked_front(study: trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[str, list[str]]]:
+    """Yield the status of each design that is solved again, and what of its line in a reference differs.
+
+    Its ends and three designs between, each from the design of its line, those between also from the nearest end.
+    """
+    import pandas as pd
+
+    words, second = Words(study.scene), study.axes[1]
+    asked, figure = (f"{kind}{second} [{words.si(second)}]" for kind in ("asked ", ""))
+    values = [float(value) for value in then[figure]]
+    ends = _front_ends(study, values)
+    rows: dict[int, Row] = {}
+    for place in dict.fromkeys((*ends, *_front_between(values))):
+        near = _front_start(study, {str(name): str(cell) for name, cell in then.iloc[place].items()})
+        if place in ends:
+            task = Task(ends.index(place), None, {}, {"end": ends.index(place), "also": near})
+            parent = None
+        else:
+            parent = rows[min(ends, key=lambda end: abs(values[end] - values[place]))]
+            ask = {"also": near, "held": rows[ends[0]].warm.get("held", []), "wide": False}
+            task = Task(place, parent.point, {second: float(then[asked].iloc[place])}, ask)
+        rows[place] = row = study.solved(task, parent if parent and parent.certified else None)
+        spot = f"{second} {words.shown(second, values[place])}"
+        if not row.certified:
+            yield row.status, [f"{spot}: {row.status}, {row.reason}"]
+            continue
+        now = pd.DataFrame([front_line(study, row)])
+        found = differing(now, then.iloc[place : place + 1], study.axes)
+        yield row.status, [f"{spot}: {difference}" for difference in found]
+
+
+def _front_ends(study: trade.Trade, values: list[float]) -> tuple[int, int]:
+    """Return the lines where the first axis, and the second, is best: lines are in the order of the second."""
+    first, last = 0, len(values) - 1
+    return (last, first) if study.senses[1] == "least" else (first, last)
+
+
+def _front_between(values: list[float]) -> list[int]:
+    """Return the lines nearest to even shares of the second axis, the ends apart."""
+    low, high = values[0], values[-1]
+    inner = range(1, len(values) - 1)
+    return [min(inner, key=lambda k: abs(values[k] - low - share * (high - low))) for share in BETWEEN if inner]
+
+
+def _front_start(study: trade.Trade, told: Mapping[str, str]) -> list[dict[str, dict[str, object]]]:
+    """Return the design of a line as what a solve may start from; nothing where it does not assemble."""
+    job, scene = study.solver.job, study.scene
+    cells = {name.split(" [")[0]: value for name, value in told.items()}
+    design = {name: float(cells[scene.full(name)]) for name in job.today(scene)}
+    try:
+        return [{"point": {"task": "", "x": job.values(study.solver.base, design)}}]
+    except (ValueError, ZeroDivisionError):
+        return []
+
 
 OnStep = Callable[[str], None]
 
@@ -106,37 +248,35 @@ def _solved(scene: Scene, target: str, on_step: OnStep | None) -> Solution:
 
 def _fronts(scene: Scene, folder: Path, on_step: OnStep | None) -> Iterable[Outcome]:
     """Yield the outcome of the front that stands for a scene's job, where there is one."""
-    from loomopt.studies import front_reference
 
-    study = front_reference.trade(scene)
+    study = reference_trade(scene)
     if study is None:
         return
-    called = front_reference.said(study)
+    called = trade_said(study)
     if on_step:
         on_step(f"solving {scene.name}, {called}")
-    path = folder / front_reference.file(study)
-    then = references.read(path)
+    path = folder / front_file(study)
+    then = read_reference(path)
     if then is None:
         yield Outcome(scene.name, called, "not solved", (f"no reference table {path.name}",))
         return
-    found = list(front_reference.checked(study, then))
+    found = list(checked_front(study, then))
     status = next((status for status, _ in found if status != "optimal"), "optimal")
     yield Outcome(scene.name, called, status, tuple(each for _, differences in found for each in differences))
 
 
 def _differences(now: "pd.DataFrame", path: Path) -> list[str]:
     """Name every difference between an answer and its reference table."""
-    then = references.read(path)
+    then = read_reference(path)
     if then is None:
         return [f"no reference table {path.name}"]
     objectives = str(then["objectives"].iloc[0]).split(" | ") if "objectives" in then else []
-    return list(references.differing(now, then, objectives))
+    return list(differing(now, then, objectives))
 
 
 def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = None) -> list[Path]:
     """Write the reference table of every target and front of the named scenes (all without one); returns the files."""
     from loomopt.base.files import atomically
-    from loomopt.studies import front_reference
 
     written = []
     for name in named(problems):
@@ -145,12 +285,12 @@ def write(folder: Path, problems: Iterable[str] = (), on_step: OnStep | None = N
             text = provenance.csv(reference(_solved(scene, target, on_step), scene))
             written.append(folder / f"{name}.{target}.csv")
             atomically(written[-1], functools.partial(_put, text))
-        study = front_reference.trade(scene)
+        study = reference_trade(scene)
         if study:
             if on_step:
-                on_step(f"solving {name}, {front_reference.said(study)}")
-            written.append(folder / front_reference.file(study))
-            atomically(written[-1], functools.partial(_put, provenance.csv(front_reference.table(study))))
+                on_step(f"solving {name}, {trade_said(study)}")
+            written.append(folder / front_file(study))
+            atomically(written[-1], functools.partial(_put, provenance.csv(front_table(study))))
     return written
 
 

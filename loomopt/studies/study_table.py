@@ -9,8 +9,8 @@ from loomopt.base.units import SI_UNIT, factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
 from loomopt.solve.answer.words import Words, grouped
-from loomopt.studies.findings import SceneStudy
-from loomopt.studies.rows import Row, parts
+from loomopt.studies.run.findings import SceneStudy
+from loomopt.studies.run.rows import Row, parts
 
 if TYPE_CHECKING:
     import pandas as pd

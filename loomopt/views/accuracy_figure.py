@@ -9,9 +9,9 @@ from typing import Any
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
 from loomopt.scene import provenance
-from loomopt.studies.accuracy import Study, in_time
-from loomopt.studies.ladders import Row, grouped, told
-from loomopt.studies.readings import NUMBERS
+from loomopt.studies.accuracy.accuracy import Study, in_time
+from loomopt.studies.accuracy.ladders import Row, grouped, told
+from loomopt.studies.accuracy.readings import NUMBERS
 from loomopt.views import outputs
 from loomopt.views.figure import COLOURS, STYLES, blank, own_style, save
 from loomopt.views.heads import Entry, head

@@ -10,7 +10,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, suffix
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain
-from loomopt.studies.effects_found import Found
+from loomopt.studies.effects.worth import Found
 from loomopt.views import outputs
 from loomopt.views.figure import COLOURS, blank, own_style, save
 from loomopt.views.heads import Entry, head

@@ -8,8 +8,7 @@ from loomopt.base.units import factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
 from loomopt.solve.answer.words import Words
-from loomopt.studies.effects_found import Found
-from loomopt.studies.effects_worth import LIMITS, Worth
+from loomopt.studies.effects.worth import LIMITS, Found, Worth
 from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:

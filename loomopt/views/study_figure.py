@@ -13,8 +13,8 @@ from loomopt.base.files import atomically, suffix
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing, Text, extent, plain
 from loomopt.studies import study_table
-from loomopt.studies.findings import Findings, SceneStudy
-from loomopt.studies.rows import Row
+from loomopt.studies.run.findings import Findings, SceneStudy
+from loomopt.studies.run.rows import Row
 from loomopt.studies.study_table import Column
 from loomopt.views import outputs, study_files, study_marks
 from loomopt.views.figure import COLOURS, blank, own_style, put, save

@@ -9,8 +9,8 @@ from loomopt.base.files import atomically, check, suffix
 from loomopt.base.units import show
 from loomopt.scene.provenance import csv
 from loomopt.studies import study_table
-from loomopt.studies.findings import Change, SceneStudy, counted
-from loomopt.studies.rows import Row
+from loomopt.studies.run.findings import Change, SceneStudy, counted
+from loomopt.studies.run.rows import Row
 from loomopt.studies.study_table import Column
 from loomopt.views import outputs
 from loomopt.views.layout import Grid, joined

@@ -9,7 +9,7 @@ import numpy as np
 
 from loomopt.picture import placing
 from loomopt.picture.shapes import plain
-from loomopt.studies.findings import Change, Findings, SceneStudy
+from loomopt.studies.run.findings import Change, Findings, SceneStudy
 from loomopt.views import study_files
 from loomopt.views.layout import spaced
 

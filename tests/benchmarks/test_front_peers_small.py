@@ -9,7 +9,7 @@ import pytest
 from test_benchmarks_small import FOLDER
 
 from loomopt.scene import packaged
-from loomopt.studies import references
+from loomopt.studies import check
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_referee_reads_published_designs_and_refuses_softer_ones(rival):
 
 def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
     beatup = peers.beatup()
-    told = references.read(packaged.results_path() / "beatup.balance.csv").iloc[0]
+    told = check.read_reference(packaged.results_path() / "beatup.balance.csv").iloc[0]
     design = {str(name).split(" [")[0]: cell for name, cell in told.items()}
     best = beatup.own(SimpleNamespace(design={n: float(design[n]) for n in ("l1", "l2", "l3", "l4", "m4e", "r4e")}))
     assert beatup.judge(best) == pytest.approx((88.689413492, 0.0), abs=1e-6)
@@ -56,7 +56,7 @@ def test_the_referee_of_the_beat_up_reads_the_published_optimum(peers):
 
 def test_the_referee_of_the_rapier_reads_the_published_optimum(peers):
     rapier = peers.rapier()
-    told = references.read(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
+    told = check.read_reference(packaged.results_path() / "rapier.stroke-dwell.csv").iloc[0]
     design = {str(name).split(" [")[0]: float(cell) for name, cell in told.items() if str(name)[0] in "laCp"}
     best = rapier.own(SimpleNamespace(design=design))
     peak, dwell = rapier.judge(best)

@@ -16,7 +16,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.physics.effects.shedding import separation, weight
-from loomopt.studies import accuracy
+from loomopt.studies.accuracy import accuracy
 from loomopt.views import scene_view
 
 

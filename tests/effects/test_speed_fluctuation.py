@@ -16,7 +16,8 @@ from loomopt.maths import systems
 from loomopt.model.reading import DATUM
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.studies import accuracy, front
+from loomopt.studies.accuracy import accuracy
+from loomopt.studies.front import front
 
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)

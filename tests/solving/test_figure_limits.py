@@ -7,8 +7,8 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.studies import front
-from loomopt.studies.plan import Task
+from loomopt.studies.front import front
+from loomopt.studies.run.rows import Task
 
 DEGREE, RPM = math.pi / 180, math.pi / 30
 PEAKS = {25: 0.672656909, 30: 0.694984754, 35: 0.714035795, 45: 0.751506644}

@@ -14,8 +14,8 @@ from loomopt.solve.certificate.derivatives_jets import Forward
 from loomopt.solve.certificate.derivatives_mp import Exact
 from loomopt.solve.certificate.feasible_curve import FeasibleCurve
 from loomopt.solve.certificate.second_order import Lagrangian, Local
-from loomopt.studies import front
-from loomopt.studies.front_solve import Asking
+from loomopt.studies.front import front
+from loomopt.studies.front.solver import Asking
 
 both = pytest.mark.parametrize("derivatives", [Forward, Exact])
 

@@ -1,5 +1,5 @@
 """Amounts of work with which the work-precision study is tried."""
 
-from loomopt.studies import optima
+from loomopt.studies.accuracy import optima
 
 SMALL = optima.Amount((1e-3, 1e-6, 1e-11), (12, 48), (1e-2, 1e-6, 1e-12), (8, 16, 32))

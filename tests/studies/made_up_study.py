@@ -4,8 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.run.rows import Row, Task
 
 
 @dataclass(frozen=True)

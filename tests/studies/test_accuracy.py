@@ -9,8 +9,8 @@ from few_settings import SMALL
 
 import loomopt as lo
 from loomopt.jobs.shedding import design as limit_law
-from loomopt.studies import accuracy, optima
-from loomopt.studies.ladders import grouped
+from loomopt.studies.accuracy import accuracy, optima
+from loomopt.studies.accuracy.ladders import grouped
 from loomopt.studies.tolerances import NO_ORDER
 from loomopt.views import accuracy_figure
 from tests.views import overlaps

@@ -6,7 +6,7 @@ import pytest
 from few_settings import SMALL
 
 from loomopt.cli import run
-from loomopt.studies import accuracy, optima, readings
+from loomopt.studies.accuracy import accuracy, optima, readings
 
 pytestmark = pytest.mark.slow
 

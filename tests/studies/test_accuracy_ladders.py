@@ -5,8 +5,8 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.studies import accuracy, optima
-from loomopt.studies.ladders import Ladder, Outcome, Reference, Row, climbed, knee, order
+from loomopt.studies.accuracy import accuracy, optima
+from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference, Row, climbed, knee, order
 
 pytestmark = pytest.mark.slow
 

@@ -6,8 +6,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs.shedding import design as limit_law
-from loomopt.studies import digits
-from loomopt.studies.subject import Target
+from loomopt.studies.accuracy import reference_digits
+from loomopt.studies.accuracy.subject import Target
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +33,7 @@ def test_a_reference_optimum_is_the_same_in_60_digits_and_from_a_rough_start():
     target = Target(lo.load("beatup-light"), "balance")
     x, point = target.variables(target.answer), target.answer.point
     rough = {name: value * (1 + 1e-7 * (-1) ** k) for k, (name, value) in enumerate(x.items())}
-    found = [digits.optimum(target.program, point, start, count) for start, count in ((x, 60), (rough, 40))]
+    found = [reference_digits.optimum(target.program, point, start, count) for start, count in ((x, 60), (rough, 40))]
     for other in found:
         assert abs(other.objectives[-1] / target.optimum.objectives[-1] - 1) < 1e-25
 

@@ -13,8 +13,9 @@ import loomopt as lo
 from loomopt import effects_study
 from loomopt.base.errors import BadInput
 from loomopt.solve import engine
-from loomopt.studies import effects, effects_known, runs
-from loomopt.studies.plan import Task
+from loomopt.studies.effects import study
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Task
 
 TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its natural size
     "inertia": (677.009, -77.527, 13.804),
@@ -31,12 +32,12 @@ SCALES = {"M3_fdc": 734.985, "peak_torque": 93.850}
 
 @pytest.fixture(scope="module")
 def plan():
-    return effects.planned(lo.load("beatup"))
+    return study.planned(lo.load("beatup"))
 
 
 @pytest.fixture(scope="module")
 def rows(plan):
-    return runs.run(plan)
+    return run.run(plan)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +106,7 @@ def test_regret_alone_is_a_trap(beatup):
     ],
 )
 def test_omissions_do_not_add_up(plan, rows, off, regret):
-    course = effects.Course(plan, rows)
+    course = study.Course(plan, rows)
     gone = frozenset({"gravity", *off}) | course.base
     row = plan.solved(Task(0, None, dict.fromkeys(gone, 0.0)), None)
     worth = course.judge.without("", plan.without(gone), row, 0.01)
@@ -216,7 +217,7 @@ def refusing(monkeypatch):
         return solve(scene, *given, **options)
 
     monkeypatch.setattr(engine, "solve", solving)
-    monkeypatch.setattr(effects_known, "YIELDING", (made_up.Moving,))
+    monkeypatch.setattr(study, "YIELDING", (made_up.Moving,))
 
 
 @pytest.mark.parametrize(("torque", "may_go"), [(3.0, True), (30.0, False)])

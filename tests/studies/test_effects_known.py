@@ -3,16 +3,16 @@
 import made_up_effects_of_a_reed as made_up
 
 from loomopt.physics.effects.kinds import Event, Speed, State
-from loomopt.studies import effects, effects_known
+from loomopt.studies.effects import study
 
 
 def together(**available):
     scene = made_up.scene(**available)
-    return effects_known.combined(effects_known.known(scene), scene)
+    return study.combined(study.known(scene), scene)
 
 
 def test_kinds_that_change_the_motion_yield():
-    assert (State, Speed, Event) == effects_known.YIELDING
+    assert (State, Speed, Event) == study.YIELDING
 
 
 def test_of_two_that_clash_the_later_yields_but_a_moving_kind_to_any_other(monkeypatch):
@@ -20,16 +20,16 @@ def test_of_two_that_clash_the_later_yields_but_a_moving_kind_to_any_other(monke
     found = together(push=1, lone=1)
     assert [effect.name for effect in found.effects] == names
     assert found.out["lone"] == "it yields to push: effects lone and push cannot be on together: both push"
-    monkeypatch.setattr(effects_known, "YIELDING", (made_up.Moving,))
+    monkeypatch.setattr(study, "YIELDING", (made_up.Moving,))
     found = together(push=1, shaft=1)
     assert [effect.name for effect in found.effects] == names
     assert found.out["shaft"].startswith("it yields to push: effects shaft and push cannot be on together: it bends")
-    monkeypatch.setattr(effects_known, "YIELDING", ())
+    monkeypatch.setattr(study, "YIELDING", ())
     assert "push" in together(push=1, shaft=1).out, "shaft comes first in the order of the job"
 
 
 def test_of_two_moving_kinds_the_later_yields(monkeypatch):
-    monkeypatch.setattr(effects_known, "YIELDING", (made_up.Moving,))
+    monkeypatch.setattr(study, "YIELDING", (made_up.Moving,))
     found = together(shaft=1, motor=1)
     assert {effect.name for effect in found.effects} == {"shaft", "inertia", "resistance"}
     assert found.out["motor"].startswith("it yields to shaft")
@@ -41,19 +41,19 @@ def test_what_lacks_something_stays_out_and_displaces_nothing():
     scene = made_up.scene(blind=1)
     document = {**scene.document, "mechanism": {k: v for k, v in scene.document["mechanism"].items() if k != "m4"}}
     bare = made_up.scenes.build(document, made_up.Jobs(), "beatup.toml")
-    assert effects_known.combined(effects_known.known(bare), bare).out == {"blind": "it needs mechanism.m4"}
+    assert study.combined(study.known(bare), bare).out == {"blind": "it needs mechanism.m4"}
 
 
 def test_what_is_on_and_what_is_available_are_known_alike():
     scene = made_up.scene(on=("pull",), push=1, pull=2)
-    assert [effect.name for effect in effects_known.known(scene)] == ["inertia", "resistance", "push", "pull"]
-    both = effects_known.with_only(scene, ["inertia", "push"])
+    assert [effect.name for effect in study.known(scene)] == ["inertia", "resistance", "push", "pull"]
+    both = study.with_only(scene, ["inertia", "push"])
     assert list(both.effects) == ["inertia", "push"]
     assert both.with_effect("pull").given("effects.pull.T") == "2 N*m", "values are kept"
 
 
 def test_nothing_is_invented():
-    found = effects.planned(made_up.scene(push=1)).unknown
+    found = study.planned(made_up.scene(push=1)).unknown
     assert found["gravity"] == "no values: set effects.gravity.tilt, effects.gravity.offset"
     assert found["pull"] == "no values: set effects.pull.T"
     assert found["centrifugal"] == "it has no values to set: --with centrifugal"

@@ -11,9 +11,10 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.studies import front, front_plan, front_read, runs
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.front import front, plan, trade
+from loomopt.studies.front.trade import read_front
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Row, Task
 
 RPM = math.pi / 30
 CLOSE = 1e-9
@@ -32,7 +33,7 @@ def at(trade, value, parent, **more):
 
 
 def read(row, axis):
-    return front_plan.value(row, axis)
+    return plan.value(row, axis)
 
 
 def untimed(row):
@@ -42,7 +43,7 @@ def untimed(row):
 @pytest.fixture(scope="module")
 def mass():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance")
-    return trade, runs.run(trade)
+    return trade, run.run(trade)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,7 @@ def torque():
 @pytest.fixture(scope="module")
 def preload():
     trade = front.trade(lo.load("shedding"), ("K1", "X0"), points=12)
-    return trade, runs.run(trade)
+    return trade, run.run(trade)
 
 
 MASS = {0.0: 96.540355060, 1.0: 95.103966045, 3.0: 92.460846773, 5.0: 90.088516886, 6.286039692: 88.689413492}
@@ -77,7 +78,7 @@ def test_slope_of_the_counterweight(mass):
 
 
 def test_area_of_the_front(mass):
-    found = front_read.read(*mass)
+    found = trade.read_front(*mass)
     masses, peaks = found.values("m4e"), found.values("peak_torque")
     assert masses[0] == 0.0
     assert masses[-1] == pytest.approx(6.286039692, rel=1e-8)
@@ -87,7 +88,7 @@ def test_area_of_the_front(mass):
 
 
 def test_every_point_is_certified_and_none_is_as_good_as_another(mass):
-    found = front_read.read(*mass)
+    found = trade.read_front(*mass)
     assert len(found.rows) >= 40
     assert all(row.certified and row.status == "optimal" for row in found.rows)
     for axis, rising in (("m4e", 1), ("peak_torque", -1)):
@@ -95,7 +96,7 @@ def test_every_point_is_certified_and_none_is_as_good_as_another(mass):
 
 
 def test_multipliers_are_the_slope_between_neighbours(mass):
-    found = front_read.read(*mass)
+    found = trade.read_front(*mass)
     slopes = [row.multipliers["peak_torque per m4e"] for row in found.rows[:-1]]
     points = list(zip(found.values("m4e"), found.values("peak_torque"), strict=True))
     for (one, other), (left, right) in zip(itertools.pairwise(points[:-1]), itertools.pairwise(slopes), strict=True):
@@ -105,7 +106,7 @@ def test_multipliers_are_the_slope_between_neighbours(mass):
 
 
 def test_what_changes_along_the_counterweight_is_told(mass):
-    changes = {change["limits"][0]: change for change in front_read.read(*mass).changes}
+    changes = {change["limits"][0]: change for change in trade.read_front(*mass).changes}
     assert set(changes) == {"l4 max", "l1 min"}
     assert changes["l4 max"]["at"] == pytest.approx(2.2654, abs=1e-4)
     assert changes["l4 max"]["kind"] == "active set"
@@ -117,11 +118,11 @@ def test_rounds_are_batches_of_eight_with_parents_of_earlier_rounds(mass):
     trade, rows = mass
     done: tuple[Row, ...] = ()
     while batch := trade.batch(done):
-        assert len(batch) <= front_plan.BATCH
+        assert len(batch) <= plan.BATCH
         assert [task.point for task in batch] == list(range(len(done), len(done) + len(batch)))
         assert all(task.parent is None or task.parent < len(done) for task in batch)
         if len(done) in (2, 10):
-            assert len(batch) == front_plan.BATCH
+            assert len(batch) == plan.BATCH
         done = rows[: len(done) + len(batch)]
     assert len(done) == len(rows)
 
@@ -180,7 +181,7 @@ def test_slopes_against_reed_torque(torque):
 
 def test_the_counterweight_that_is_used_up_is_told():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), ranges={"M3_fdc": (45.0, 46.0)}, points=5)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert (found.values("M3_fdc")[0], found.values("M3_fdc")[-1]) == pytest.approx((45.0, 46.0), abs=1e-7)
     used, left = (next(c for c in found.changes if name in c["limits"]) for name in ("m4e min", "theta max"))
     assert used["between"][0] < 45.3960098 < used["between"][1]
@@ -192,7 +193,7 @@ def test_the_counterweight_that_is_used_up_is_told():
 @pytest.mark.parametrize(("most", "low", "high"), [((), 600.0, 800.0), (("M0",), 700.0, 950.0)])
 def test_reed_torque_against_resistance_in_closed_form(most, low, high):
     trade = front.trade(lo.load("beatup"), ("M3_fdc", "M0"), maximise=most, ranges={"M0": (low, high)}, points=4)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     for resistance, reed in zip(found.values("M0"), found.values("M3_fdc"), strict=True):
         assert reed == pytest.approx(max(0.0, 676.981102 - resistance, resistance - 871.503394), abs=2e-6)
     reached = found.values("M0")
@@ -224,7 +225,7 @@ def test_stiffness_against_preload(preload, preload_, stiffness):
 
 
 def test_statics_govern_a_short_spring(preload):
-    found = front_read.read(*preload)
+    found = trade.read_front(*preload)
     (change,) = found.changes
     assert change["kind"] == "kink"
     assert change["limits"] == ["N_min min"]
@@ -236,12 +237,12 @@ def test_statics_govern_a_short_spring(preload):
 def test_stiffness_against_speed():
     ranges = {"speed": (10 * RPM, 900 * RPM)}
     trade = front.trade(lo.load("shedding"), ("K1", "speed"), maximise=("speed",), ranges=ranges, points=3)
-    rows = runs.run(trade)
+    rows = run.run(trade)
     for speed, stiffness in ((200.0, 13354.018003), (400.0, 46819.099799), (900.0, 228117.326425)):
         row = at(trade, speed * RPM, rows[0])
         assert row.certified
         assert read(row, "K1") == pytest.approx(stiffness, rel=1e-10)
-    found = front_read.read(trade, rows)
+    found = read_front(trade, rows)
     assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
     assert found.changes[0]["kind"] == "kink"
     assert found.values("speed")[-1] == pytest.approx(900 * RPM)
@@ -269,7 +270,7 @@ def test_the_end_of_an_axis_that_has_one_need_not_be_named():
 def test_a_range_that_no_point_lies_in_is_told(axis, low, high, reached):
     study = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance", ranges={axis: (low, high)}, points=4)
     with pytest.raises(BadInput, match=re.escape(f"lies in the range; it comes to {reached}")) as error:
-        runs.run(study)
+        run.run(study)
     assert error.value.key == axis
 
 
@@ -287,7 +288,7 @@ def test_the_moment_of_inertia_costs_what_its_counterweight_does(mass):
 def test_what_the_least_change_from_today_buys():
     """Today's machine has no counterweight: its radius counts as a change, its largest does not stand for none."""
     trade = front.trade(lo.load("beatup"), ("peak_torque", "change"), points=3)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert all(row.certified for row in found.rows)
     assert len(found.values("change")) >= 3
     for before, row in itertools.pairwise(found.rows):
@@ -297,7 +298,7 @@ def test_what_the_least_change_from_today_buys():
 
 def test_two_axes_that_do_not_conflict():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"))
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert len(found.rows) == 1
     assert found.values("m4e") == [0.0]
     assert found.message == "peak_torque and m4e do not conflict: one design is best in both."
@@ -325,7 +326,7 @@ def test_an_end_without_a_least_asks_for_a_range():
 )
 def test_a_range_ends_the_front(ranges, axis, reached):
     trade = front.trade(loose(), ("K1", "X0"), ranges=ranges, points=3)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert (found.values(axis)[0], found.values(axis)[-1]) == pytest.approx(reached)
 
 

@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from loomopt.studies import front_plan
-from loomopt.studies.front_plan import NARROW, Scale
-from loomopt.studies.rows import Row
+from loomopt.studies.front import plan
+from loomopt.studies.front.plan import NARROW, Scale
+from loomopt.studies.run.rows import Row
 
 SCALE = Scale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
 
@@ -25,7 +25,7 @@ ENDS = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0)]
 
 
 def planned(rows, points=40):
-    return [each.b for each in front_plan.following(rows, SCALE, points)]
+    return [each.b for each in plan.following(rows, SCALE, points)]
 
 
 def computed(answer, points=40):
@@ -36,19 +36,19 @@ def computed(answer, points=40):
         return row(point, b, a, slope if point else 0.0, active, asked=asked, **more)
 
     rows = [answered(0, 1.0), answered(1, 0.0)]
-    while batch := front_plan.following(rows, SCALE, points):
+    while batch := plan.following(rows, SCALE, points):
         for each in batch:
             rows.append(answered(len(rows), each.b, again=each.again, fine=each.fine, parent=each.near[0]))
     return rows
 
 
 def told(rows):
-    return front_plan.told(front_plan.spots(rows, SCALE)[0], SCALE)
+    return plan.told(plan.spots(rows, SCALE)[0], SCALE)
 
 
 def test_the_first_round_is_spread_evenly_over_one_gap():
     found = planned(ENDS)
-    assert len(found) == front_plan.BATCH
+    assert len(found) == plan.BATCH
     assert found == sorted(found)
     assert max(b - a for a, b in itertools.pairwise([0.0, *found, 1.0])) <= 0.25
 
@@ -62,11 +62,11 @@ def test_the_widest_gap_in_either_axis_is_halved_first():
 
 def test_what_another_dominates_is_solved_again_from_it_once():
     rows = [*ENDS, row(2, 0.5, 0.4), row(3, 0.6, 0.45)]
-    first = front_plan.following(rows, SCALE, 40)[0]
+    first = plan.following(rows, SCALE, 40)[0]
     assert (first.again, first.near, first.b) == (3, (2,), 0.6)
     rows.append(row(4, 0.6, 0.3, again=3, parent=2))
-    assert all(each.again is None for each in front_plan.following(rows, SCALE, 40))
-    assert [spot.point for spot in front_plan.spots(rows, SCALE)[0]] == [1, 2, 4, 0]
+    assert all(each.again is None for each in plan.following(rows, SCALE, 40))
+    assert [spot.point for spot in plan.spots(rows, SCALE)[0]] == [1, 2, 4, 0]
 
 
 def test_a_point_that_was_missed_is_not_asked_for_again():
@@ -77,7 +77,7 @@ def test_a_point_that_was_missed_is_not_asked_for_again():
 
 def test_both_neighbours_lend_their_designs_where_they_touch_others():
     rows = [*ENDS, row(2, 0.5, 0.5, active=("l2 max",)), row(3, 0.25, 0.75)]
-    near = {each.b: each.near for each in front_plan.following(rows, SCALE, 8)}
+    near = {each.b: each.near for each in plan.following(rows, SCALE, 8)}
     assert near[0.375] == (2, 3)
     assert near[0.75] == (0, 2)
 
@@ -91,10 +91,10 @@ def test_either_side_of_a_change_is_solved_from_the_other_before_it_is_narrowed_
         row(3, 0.6, 0.4, active=("l2 max",)),
         row(4, 0.8, 0.2, active=("l2 max",)),
     ]
-    found = front_plan.following(rows, SCALE, 5)
+    found = plan.following(rows, SCALE, 5)
     assert [(each.again, each.near, each.fine) for each in found] == [(2, (3,), False), (3, (2,), False)]
     rows += [row(5, 0.3, 0.7, again=2, parent=3), row(6, 0.6, 0.4, active=("l2 max",), again=3, parent=2)]
-    (middle,) = front_plan.following(rows, SCALE, 5)
+    (middle,) = plan.following(rows, SCALE, 5)
     assert middle.fine
     assert middle.b == pytest.approx(0.45)
 
@@ -149,9 +149,9 @@ def test_a_plan_ends():
     def answer(b):
         return b, 1 - b, -1.0, (f"l{math.floor(1000 * b)} min",)
 
-    assert len(computed(answer, points=10)) <= front_plan.MOST_MORE * 10 + front_plan.BATCH
+    assert len(computed(answer, points=10)) <= plan.MOST_MORE * 10 + plan.BATCH
 
 
 def test_ends_that_are_one_have_no_width():
     rows = {0: row(0, 0.3, 0.5), 1: row(1, 0.3 + 1e-9, 0.5)}
-    assert front_plan.scaled(rows, ("a", "b"), (1, 1), (1.0, 1.0)).width == (0.0, 0.0)
+    assert plan.scaled(rows, ("a", "b"), (1, 1), (1.0, 1.0)).width == (0.0, 0.0)

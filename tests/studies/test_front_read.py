@@ -3,7 +3,9 @@
 import pytest
 
 import loomopt as lo
-from loomopt.studies import front, front_read, runs
+from loomopt.studies.front import front
+from loomopt.studies.front.trade import read_front
+from loomopt.studies.run import run
 
 AXES = "pulse_rms", "peak_torque"
 
@@ -16,13 +18,13 @@ def heavy():
 
 def test_ends_that_agree_to_the_accuracy_that_was_asked_do_not_conflict(heavy):
     trade = front.trade(heavy, AXES, accuracy=1e-6)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert len(found.rows) == 1
     assert "do not conflict: one design is best in both. Its ends are 3e-07 of their size apart" in found.message
 
 
 def test_a_front_that_shown_digits_do_not_tell_from_one_design_says_so(heavy):
     trade = front.trade(heavy, AXES, points=4)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert len(found.rows) >= 4
     assert found.message.endswith("Its ends are 3e-07 of their size apart; 1e-08 was asked.")

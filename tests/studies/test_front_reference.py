@@ -7,8 +7,8 @@ import pytest
 
 from loomopt.jobs.registry import load
 from loomopt.scene import packaged
+from loomopt.studies import check
 from loomopt.studies import check as study
-from loomopt.studies import front_reference, references
 
 NAME = "shedding.K1-against-X0.csv"
 KNOWN = {
@@ -24,7 +24,7 @@ KNOWN = {
 
 
 def front(name):
-    return references.read(packaged.results_path() / name)
+    return check.read_reference(packaged.results_path() / name)
 
 
 @pytest.fixture
@@ -37,11 +37,11 @@ def copy(tmp_path):
 @pytest.fixture(scope="module")
 def shedding():
     """Return the front of the scene, built once."""
-    return front_reference.trade(load("shedding"))
+    return check.reference_trade(load("shedding"))
 
 
 def differences(folder, trade):
-    return [text for _, found in front_reference.checked(trade, references.read(folder / NAME)) for text in found]
+    return [text for _, found in check.checked_front(trade, check.read_reference(folder / NAME)) for text in found]
 
 
 def edited(folder, line, column, new):
@@ -66,16 +66,16 @@ def test_ends_of_the_fronts_are_the_published_ones(name):
     assert [paid[0], paid[-1]] == pytest.approx(sorted(ends), rel=1e-6, abs=1e-9)
     assert [sought[0], sought[-1]] == pytest.approx([ends[key] for key in sorted(ends)], rel=2e-9)
     assert set(found["status"]) == {"optimal"}
-    assert len(found) > front_reference.POINTS
+    assert len(found) > check.POINTS
 
 
 def test_a_front_stands_for_the_scene_that_is_named_after_its_job():
-    stands = {name for name in packaged.problem_names() if front_reference.trade(load(name))}
+    stands = {name for name in packaged.problem_names() if check.reference_trade(load(name))}
     assert stands == {"beatup", "rapier", "shedding"}
 
 
 def test_five_designs_are_solved_again_and_nothing_differs(shedding, copy):
-    found = list(front_reference.checked(shedding, references.read(copy / NAME)))
+    found = list(check.checked_front(shedding, check.read_reference(copy / NAME)))
     assert found == [("optimal", [])] * 5
 
 
@@ -101,7 +101,7 @@ def test_a_number_that_is_changed_is_named_with_its_point(shedding, copy, line, 
 
 
 def test_a_number_between_the_ends_counts_too(shedding, copy):
-    values = [float(value) for value in references.read(copy / NAME)["X0 [m]"]]
+    values = [float(value) for value in check.read_reference(copy / NAME)["X0 [m]"]]
     middle = min(range(len(values)), key=lambda k: abs(values[k] - (values[0] + values[-1]) / 2))
     edited(copy, middle, "K1", larger(2e-8))
     (found,) = differences(copy, shedding)

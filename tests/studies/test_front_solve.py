@@ -9,9 +9,11 @@ import pytest
 import loomopt as lo
 from loomopt import results
 from loomopt.base.errors import BadInput
-from loomopt.studies import front, front_plan, front_read, front_solve, runs
-from loomopt.studies.front_solve import Asking
-from loomopt.studies.plan import Task
+from loomopt.studies.front import front, plan
+from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.trade import read_front
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Task
 
 RPM = math.pi / 30
 
@@ -33,7 +35,7 @@ def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_
     asking = Asking(0, (None, 3.0))
     found = solver.solve(asking, [], False)
     assert found.status == "optimal"
-    monkeypatch.setattr(front_solve, "FEASIBLE", -0.01)
+    monkeypatch.setattr(solver, "FEASIBLE", -0.01)
     above = solver.solve(asking, [found.warm], False)
     assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
 
@@ -44,23 +46,23 @@ def test_of_designs_of_the_least_power_an_end_has_the_least_radius():
     _, least = ends("beatup", ("r4", "peak_power"))
     mass, radius = scene.mechanism["m4"], scene.mechanism["r4"]
     assert least.certified
-    assert front_plan.value(least, "peak_power") == pytest.approx(5173.394990630681, rel=1e-9)
+    assert plan.value(least, "peak_power") == pytest.approx(5173.394990630681, rel=1e-9)
     assert least.design["m4e"] == pytest.approx(12.4)
-    assert front_plan.value(least, "r4") == pytest.approx(mass * radius / (mass + 12.4), rel=1e-8)
+    assert plan.value(least, "r4") == pytest.approx(mass * radius / (mass + 12.4), rel=1e-8)
 
 
 @pytest.mark.parametrize("axes", [("l6", "peak_acceleration"), ("peak_acceleration", "l6")])
 def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
     shortest = ends("rapier", axes)[axes.index("l6")]
     assert shortest.certified
-    assert front_plan.value(shortest, "l6") == pytest.approx(0.12)
-    assert front_plan.value(shortest, "peak_acceleration") == pytest.approx(0.606149142, rel=1e-8)
+    assert plan.value(shortest, "l6") == pytest.approx(0.12)
+    assert plan.value(shortest, "peak_acceleration") == pytest.approx(0.606149142, rel=1e-8)
 
 
 def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     """The least l3 needs the shortest crank, whose price what is held of l3 may carry too."""
     trade = front.trade(lo.load("beatup"), ("l1", "l3"))
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert found.message.startswith("l1 and l3 do not conflict: one design is best in both.")
     assert found.values("l1") == pytest.approx([0.03])
     assert found.values("l3") == pytest.approx([0.147938261848])
@@ -69,14 +71,14 @@ def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
 def test_stiffness_against_the_speed_up_to_which_contact_holds():
     ranges = {"contact_speed": (10 * RPM, 900 * RPM)}
     trade = front.trade(lo.load("shedding"), ("K1", "contact_speed"), ranges=ranges, points=3)
-    rows = runs.run(trade)
+    rows = run.run(trade)
     for speed, stiffness in ((200.0, 13354.018003), (400.0, 46819.099799), (900.0, 228117.326425)):
         row = at(trade, speed * RPM, rows[0])
         assert row.certified
-        assert front_plan.value(row, "K1") == pytest.approx(stiffness, rel=1e-10)
+        assert plan.value(row, "K1") == pytest.approx(stiffness, rel=1e-10)
         assert row.figures["contact_speed"] == pytest.approx(speed * RPM, rel=1e-10)
         assert row.figures["speed"] == pytest.approx(600 * RPM)
-    found = front_read.read(trade, rows)
+    found = read_front(trade, rows)
     assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
     assert found.changes[0]["kind"] == "kink"
 
@@ -85,14 +87,14 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
 def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_read_at_the_scenes_speed(axes):
     scene = lo.load("shedding")
     trade = front.trade(scene, axes, points=4)
-    found = front_read.read(trade, runs.run(trade))
+    found = read_front(trade, run.run(trade))
     assert len(found.rows) >= 4
     assert all(row.certified for row in found.rows)
     assert min(found.values("contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
     for row in found.rows:
         there = lo.evaluate(scene, row.design).figures
         for axis in axes:
-            assert front_plan.value(row, axis) == pytest.approx(row.figures[axis], rel=1e-9)
+            assert plan.value(row, axis) == pytest.approx(row.figures[axis], rel=1e-9)
             assert there[axis] == pytest.approx(row.figures[axis], rel=1e-9)
     for one, other in itertools.pairwise(found.values(axes[0])):
         assert one < other

@@ -7,7 +7,7 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.scene import numbers
-from loomopt.studies.lattice import COARSE, Lattice
+from loomopt.studies.sweep import COARSE, Lattice
 
 
 def line(count):

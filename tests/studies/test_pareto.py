@@ -17,8 +17,8 @@ from loomopt import results
 from loomopt.base.errors import BadInput
 from loomopt.design_study import DesignStudy
 from loomopt.jobs import registry
-from loomopt.studies import front
-from loomopt.studies.store import Store
+from loomopt.studies.front import front
+from loomopt.studies.run.store import Store
 
 AXES = ("peak_torque", "m4e")
 KILLED = """

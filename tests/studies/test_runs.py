@@ -10,9 +10,9 @@ import pytest
 from made_up_study import Chain
 
 from loomopt.base.errors import BadInput
-from loomopt.studies import executors, runs, workers
-from loomopt.studies.rows import Row, digest
-from loomopt.studies.store import Store
+from loomopt.studies.run import executors, run
+from loomopt.studies.run.rows import Row, digest
+from loomopt.studies.run.store import Store
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def values(rows):
 
 def test_rows_come_in_the_order_of_points_each_after_its_parent(chain):
     seen: list[Row] = []
-    rows = runs.run(chain, on_row=seen.append)
+    rows = run.run(chain, on_row=seen.append)
     assert [row.point for row in rows] == list(range(24))
     assert [row.parent for row in rows] == [None] * 8 + list(range(16))
     assert values(rows)[16] == 0.1 * 16 + (0.1 * 8 + 0.0)
@@ -35,20 +35,20 @@ def test_rows_come_in_the_order_of_points_each_after_its_parent(chain):
 
 
 def test_threads_and_processes_give_the_same_digest(chain):
-    expected = digest(runs.run(chain))
+    expected = digest(run.run(chain))
     with ThreadPoolExecutor(3) as threads:
-        assert digest(runs.run(chain, threads)) == expected
+        assert digest(run.run(chain, threads)) == expected
     with ProcessPoolExecutor(2, get_context("spawn")) as processes:
-        assert digest(runs.run(chain, processes)) == expected
+        assert digest(run.run(chain, processes)) == expected
         assert processes.submit(int, 7).result() == 7, "a caller's executor goes on living"
-    assert digest(runs.run(chain, executors.workers(2))) == expected
+    assert digest(run.run(chain, executors.workers(2))) == expected
 
 
 def test_workers_begin_each_round_with_the_points_that_take_long(chain):
-    expected = digest(runs.run(chain))
+    expected = digest(run.run(chain))
     long = replace(chain, log=chain.log.with_name("long"), long=(3, 14))
     with ThreadPoolExecutor(1) as alone:
-        assert digest(runs.run(long, alone)) == expected
+        assert digest(run.run(long, alone)) == expected
     assert long.solves()[:3] == [3, 0, 1]
     assert long.solves()[8:11] == [14, 8, 9]
 
@@ -62,35 +62,35 @@ def test_a_worker_has_imported_what_solves_need_before_its_first_task():
 
 
 def test_a_point_that_fails_is_a_row_with_its_reason_and_the_others_go_on(chain):
-    rows = runs.run(replace(chain, raises=(3,)))
+    rows = run.run(replace(chain, raises=(3,)))
     assert (rows[3].status, rows[3].reason, rows[3].certified) == ("failed", "no such point", False)
     assert {row.status for row in rows if row.point != 3} == {"optimal"}
     assert rows[11].parent == 3
 
 
 def test_a_worker_that_dies_costs_a_new_pool_and_no_row(chain):
-    expected = digest(runs.run(replace(chain, log=chain.log.with_name("other"))))
+    expected = digest(run.run(replace(chain, log=chain.log.with_name("other"))))
     dying = replace(chain, kills_once=(2, 13))
-    assert digest(runs.run(dying, executors.workers(2))) == expected
+    assert digest(run.run(dying, executors.workers(2))) == expected
     assert dying.solves().count(2) == dying.solves().count(13) == 2
 
 
 def test_a_point_that_kills_three_workers_is_a_failed_row(chain):
     lethal = replace(chain, kills=(5,))
-    rows = runs.run(lethal, executors.workers(2))
+    rows = run.run(lethal, executors.workers(2))
     assert lethal.solves().count(5) == 3
-    assert (rows[5].status, rows[5].reason) == ("failed", workers.DIED)
+    assert (rows[5].status, rows[5].reason) == ("failed", run.DIED)
     assert {row.status for row in rows if row.point != 5} == {"optimal"}
 
 
 def test_a_broken_executor_of_the_callers_is_told(chain):
     with ProcessPoolExecutor(1, get_context("spawn")) as processes, pytest.raises(BrokenProcessPool):
-        runs.run(replace(chain, kills=(0,)), processes)
+        run.run(replace(chain, kills=(0,)), processes)
 
 
 @pytest.mark.parametrize("make", [None, ThreadPoolExecutor], ids=["serial", "threads"])
 def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_nothing(chain, tmp_path, make):
-    expected = digest(runs.run(replace(chain, log=tmp_path / "other")))
+    expected = digest(run.run(replace(chain, log=tmp_path / "other")))
 
     def stop(row):
         if row.point == 11:
@@ -99,21 +99,21 @@ def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_nothing(chain, 
     with Store(tmp_path / "s.db") as store:
         store.begin(chain.key, {})
         with pytest.raises(KeyboardInterrupt):
-            runs.run(chain, make and make(1), store, stop)
+            run.run(chain, make and make(1), store, stop)
         kept = [row.point for row in store.rows(chain.key)]
         assert set(range(12)) <= set(kept)
     with Store(tmp_path / "s.db") as store:
-        assert digest(runs.run(chain, None, store)) == expected
+        assert digest(run.run(chain, None, store)) == expected
     assert sorted({*chain.solves()}) == list(range(24))
     assert all(chain.solves().count(point) == 1 for point in kept)
 
 
 def test_tasks_are_told_again_from_rows(chain):
-    rows = runs.run(chain)
-    again = list(runs.tasks(chain, rows))
+    rows = run.run(chain)
+    again = list(run.tasks(chain, rows))
     assert [task.point for task, _ in again] == list(range(24))
     assert all(parent == (rows[task.parent] if task.parent is not None else None) for task, parent in again)
-    assert len(list(runs.tasks(chain, rows[:10]))) == 10
+    assert len(list(run.tasks(chain, rows[:10]))) == 10
 
 
 def test_a_digest_leaves_out_seconds_and_order_and_nothing_else():

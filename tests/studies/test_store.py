@@ -5,8 +5,8 @@ import sqlite3
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.studies.rows import Row
-from loomopt.studies.store import Store
+from loomopt.studies.run.rows import Row
+from loomopt.studies.run.store import Store
 
 ROW = Row(
     2, {"operation.M0": 0.1 + 0.2}, 1, "optimal", None, {"l1": 1 / 3}, {"a": None, "b": 5e-324}, {"a per l1 min": -0.0},

@@ -15,9 +15,10 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.solve.answer.solution import Solution
-from loomopt.studies import runs, sweep
-from loomopt.studies.rows import digest
-from loomopt.studies.store import Store
+from loomopt.studies import sweep
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import digest
+from loomopt.studies.run.store import Store
 
 OVER = {"operation.M0": "600:900:15 N*m"}
 KILLED = """
@@ -48,7 +49,7 @@ def test_every_point_is_certified_and_as_good_as_a_search_from_scratch(serial, e
     assert sum(row.parent is None for row in serial.rows) == 4
     rows = serial.rows[::every]
     over = {"operation.M0": [f"{row.place['operation.M0']!r} N*m" for row in rows]}
-    cold = runs.run(replace(sweep.planned(lo.load("beatup"), over), cold=True))
+    cold = run.run(replace(sweep.planned(lo.load("beatup"), over), cold=True))
     assert all(row.parent is None for row in cold)
     for row, other in zip(rows, cold, strict=True):
         assert row.place == other.place

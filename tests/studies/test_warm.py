@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solve import engine
-from loomopt.studies import warm
+from loomopt.studies.run import warm
 
 SCENE = lo.load("beatup")
 NEXT = SCENE.set("operation.M0", "760 N*m")

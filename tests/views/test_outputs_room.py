@@ -145,7 +145,7 @@ def test_several_files_appear_together_or_not_at_all(tmp_path):
 
 
 def test_a_study_that_cannot_be_written_is_not_begun(here, capsys, monkeypatch):
-    from loomopt.studies import accuracy
+    from loomopt.studies.accuracy import accuracy
 
     monkeypatch.setattr(accuracy, "climbs", lambda *_: pytest.fail("it was begun"))
     assert run(["accuracy", "beatup", "--out", "no/such/rows.csv"]) == 2

@@ -10,8 +10,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.studies import front, sweep
-from loomopt.studies.rows import Row
+from loomopt.studies import sweep
+from loomopt.studies.front import front
+from loomopt.studies.run.rows import Row
 from loomopt.views import study_figure
 
 PLAN = sweep.planned(lo.load("beatup"), {"operation.M0": "700:740:10 N*m"}, "torque")

@@ -6,7 +6,7 @@ import pytest
 
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import NO_MASS
-from loomopt.studies import front
+from loomopt.studies.front import front
 
 BEATUP = registry.load("beatup")
 JOB = registry.of(BEATUP)

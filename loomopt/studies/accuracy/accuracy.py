@@ -13,9 +13,9 @@ from loomopt.model import model
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
 from loomopt.solve.options import check_sought
-from loomopt.studies import optima, readings
-from loomopt.studies.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
-from loomopt.studies.subject import Subject
+from loomopt.studies.accuracy import optima, readings
+from loomopt.studies.accuracy.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
+from loomopt.studies.accuracy.subject import Subject
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,31 +1,148 @@
-"""What each effect is worth: how far it moves the objectives of a target, and how much worse a design without it is.
-
-The reference has all effects on that combine. An effect's shift is read at the design of the reference, its regret from
-the design that is found without it and judged in the reference; both are shares of the objectives' natural sizes.
-"""
+"""The effects that a study of them knows: those whose values stand in the scene, and which of these combine."""
 
 import functools
 import json
 import math
-from collections.abc import Collection, Mapping, Sequence
+import shlex
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.jobs import registry
+from loomopt.physics.effects.declared import Fault, faults
+from loomopt.physics.effects.kinds import Effect, Event, Speed, State
+from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene import designs
+from loomopt.scene import answers, designs
+from loomopt.scene.document import looked_up, replaced
 from loomopt.scene.numbers import files
 from loomopt.scene.provenance import versions
-from loomopt.scene.scene import Scene
+from loomopt.scene.scene import Scene, build
+from loomopt.scene.tables import effects as read
 from loomopt.solve import engine
 from loomopt.solve.options import OMITTED, check_numbers, target_name
-from loomopt.studies import effects_known
-from loomopt.studies.effects_worth import Judge, Worth
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.effects.worth import Judge, Worth
+from loomopt.studies.run.rows import Row, Task
 from loomopt.studies.sweep import reason
+
+YIELDING = (State, Speed, Event)
+"""Kinds that yield to any other where both cannot be on together."""
+
+
+class Together(NamedTuple):
+    """Effects that combine, in the order of the job; out: those that stay out, each with the reason."""
+
+    effects: tuple[Effect, ...]
+    out: Mapping[str, str]
+
+
+def known(scene: Scene) -> dict[Effect, Table]:
+    """Return the effects of [effects] and [available] with their values, in the order of the job."""
+    off = read(scene.document.get("available", {}), scene.schema, scene.origin, "available")
+    found = {**off, **dict(zip(scene.active, scene.effects.values(), strict=True))}
+    order = list(scene.schema.effects)
+    return dict(sorted(found.items(), key=lambda pair: (order.index(pair[0].path[0]), pair[0].name)))
+
+
+def without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
+    """Return the job's other effects, each with what it takes to study it: nothing is invented."""
+    there = {effect.path[0] for effect in given}
+    return {name: _asked(effect) for name, effect in scene.schema.effects.items() if name not in there}
+
+
+def _asked(effect: Effect) -> str:
+    own = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
+    keys = [f"{own}.{key}" for key, info in effect.own.model_fields.items() if info.is_required()]
+    return f"no values: set {', '.join(keys)}" if keys else f"it has no values to set: --with {effect.name}"
+
+
+def combined(given: Mapping[Effect, Table], scene: Scene) -> Together:
+    """Return which effects can be on together.
+
+    Of two that cannot, a state, a speed or an event yields to any other kind, else the later one in the order of the
+    job. What needs a number of the scene that is not there, or an effect that stays out, stays out too.
+    """
+    out = {e.name: text for e in given if (text := _lacking(e, scene))}
+    while True:
+        chosen, yielding = _chosen({e: own for e, own in given.items() if e.name not in out})
+        fault = next((each for each in faults(chosen) if each.missing), None)
+        if fault is None:
+            return Together(tuple(e for e in given if e in chosen), {**out, **yielding})
+        out[fault.effect.name] = f"it needs the effect {fault.other}"
+
+
+def _chosen(given: Mapping[Effect, Table]) -> tuple[dict[Effect, Table], dict[str, str]]:
+    chosen: dict[Effect, Table] = {}
+    out: dict[str, str] = {}
+    for effect in sorted(given, key=lambda each: isinstance(each, YIELDING)):
+        fault = next((each for each in faults({**chosen, effect: given[effect]}) if not each.missing), None)
+        if fault:
+            out[effect.name] = f"it yields to {_other(fault, effect)}: {fault.problem}"
+        else:
+            chosen[effect] = given[effect]
+    return chosen, out
+
+
+def _other(fault: Fault, effect: Effect) -> str:
+    return fault.other if fault.effect is effect else fault.effect.name
+
+
+def _lacking(effect: Effect, scene: Scene) -> str:
+    """Return what of the scene an effect lacks; "" where it has all it needs."""
+    given = {f"{table}.{key}" for table, own in scene.tables.items() for key, value in own if value is not None}
+    keys = [key for key in effect.needs if key not in given]
+    return f"it needs {', '.join(keys)}" if keys else ""
+
+
+def with_only(scene: Scene, names: Collection[str]) -> Scene:
+    """Return a scene with these of its known effects on, the others in [available]. Raises BadInput."""
+    document = {**scene.document, "effects": {}, "available": {}}
+    for effect in known(scene):
+        own = [looked_up(scene.document, (table, *effect.path)) for table in ("effects", "available")]
+        values = own[1] if own[0] is None else own[0]
+        table = "effects" if effect.name in names else "available"
+        document = replaced(document, (table, *effect.path), values, scene.origin, f"{table}.{effect.name}")
+    return build(document, scene.jobs, scene.origin, scene.paths)
+
+
+def command(scene: Scene, target: str, names: Collection[str]) -> str | None:
+    """Return the call of the shell that solves a scene with these effects alone; None for a scene without a file."""
+    problem = _problem(scene)
+    try:
+        file = registry.load(problem)
+    except BadInput:
+        return None
+    words = ["loomopt", "solve", problem, "--target", target]
+    before, after = dict(answers.values(file.document)), dict(answers.values(scene.document))
+    if before.keys() - after.keys():
+        return None  # what was taken out of a scene no option takes out
+    idle = tuple(f"effects.{effect.name}." for effect in known(scene) if effect.name not in names)
+    changes = {key: value for key, value in after.items() if before.get(key) != value and not key.startswith(idle)}
+    changes.pop("problem.name", None)
+    for key, value in changes.items():
+        if isinstance(value, list):
+            return None
+        words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    on = {*file.effects, *(effect.name for effect in known(scene) if _set(effect.name, changes))}
+    for option, asked in (("--with", set(names) - on), ("--without", on - set(names))):
+        words += [word for effect in known(scene) if effect.name in asked for word in (option, effect.name)]
+    return shlex.join(words)
+
+
+def _problem(scene: Scene) -> str:
+    """Return what the command line calls a scene: a packaged name, or its file."""
+    name = scene.origin.removesuffix(".toml")
+    file = registry.problems().get(name)
+    return name if file and file.parent.absolute() == scene.paths.folder else scene.origin
+
+
+def _set(effect: str, changes: Collection[str]) -> bool:
+    """Say whether a change is one of an effect's own values, which puts it on."""
+    return any(key.startswith(f"effects.{effect}.") for key in changes)
+
 
 REFUSED = "refused"
 """The status of what solve does not take."""
@@ -61,7 +178,7 @@ class Effects:
 
         settings = {
             "study": self.name,
-            "scene": effects_known.with_only(self.scene, self.together).hash,
+            "scene": with_only(self.scene, self.together).hash,
             "given": self.scene.hash,
             "files": files(self.scene),
             "target": self.target,
@@ -74,7 +191,7 @@ class Effects:
 
     def without(self, off: Off) -> Scene:
         """Return the scene of the effects that combine, but for some. Raises BadInput where these cannot be off."""
-        return effects_known.with_only(self.scene, [name for name in self.together if name not in off])
+        return with_only(self.scene, [name for name in self.together if name not in off])
 
     def batch(self, rows: Sequence[Row]) -> list[Task]:
         """Return the tasks of the next round, from all rows of earlier ones."""
@@ -126,13 +243,13 @@ def planned(
     allowed, remedy = "a share, more than 0", "Write 0.01 for 1 %, or leave it out"
     if not 0.0 < arguments.number(tolerance, "tolerance", allowed, remedy) < math.inf:
         raise refusal("the tolerance is out of range", "", "tolerance", tolerance, allowed, remedy)
-    given = effects_known.known(scene)
-    together = effects_known.combined(given, scene)
+    given = known(scene)
+    together = combined(given, scene)
     names = tuple(effect.name for effect in together.effects)
-    unknown = effects_known.unknown(scene, given)
+    unknown = without_values(scene, given)
     numbers = float(tolerance), float(accuracy), int(seed)
     study = Effects(scene, name, numbers[0], names, together.out, unknown, *numbers[1:])
-    plain = frozenset(e.name for e in together.effects if isinstance(e, effects_known.YIELDING))
+    plain = frozenset(e.name for e in together.effects if isinstance(e, YIELDING))
     served = study.without(plain)
     registry.of(served).demand(served, name)
     return study
@@ -149,7 +266,7 @@ class Course:
     def __init__(self, study: Effects, rows: Sequence[Row]) -> None:
         self.study = study
         self.rows = {frozenset(row.place): row for row in rows}
-        self.effects = {effect.name: effect for effect in effects_known.known(study.scene)}
+        self.effects = {effect.name: effect for effect in known(study.scene)}
         self.measured, self.aside = Off(), Off()
         self.needed: dict[Off, str] = {}
         self.worths: dict[str, Worth] = {}
@@ -164,9 +281,7 @@ class Course:
 
     def _referred(self) -> tuple[Off | None, list[Off]]:
         """Return the effects that the reference leaves off, None without it, and what must be solved to know."""
-        moving = [
-            name for name in reversed(self.study.together) if isinstance(self.effects[name], effects_known.YIELDING)
-        ]
+        moving = [name for name in reversed(self.study.together) if isinstance(self.effects[name], YIELDING)]
         for off in (Off(), *(self._closed({name}) for name in moving), self._closed(moving)):
             if off not in self.rows:
                 return None, [off]

@@ -14,7 +14,7 @@ from types import TracebackType
 
 from loomopt.base import files
 from loomopt.base.errors import BadInput
-from loomopt.studies.rows import Row
+from loomopt.studies.run.rows import Row
 
 APPLICATION, VERSION = 0x6C6F6F6D, 1
 """What the file's head says: "loom", and the version of its tables."""

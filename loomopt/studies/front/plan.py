@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.studies.rows import Row
+from loomopt.studies.run.rows import Row
 
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""

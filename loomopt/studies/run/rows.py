@@ -1,8 +1,8 @@
 """The rows of a study: plain records that are the same numbers in memory, in a store and in a worker process."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Protocol
 
 from loomopt.base.records import freeze
 
@@ -71,3 +71,32 @@ def digest(rows: Iterable[Row]) -> str:
     ordered = sorted(rows, key=lambda row: row.point)
     data = [{name: value for name, value in row.as_dict().items() if name != UNTIMED} for row in ordered]
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Task:
+    """One point to be solved.
+
+    place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
+    ask: what else is asked, as JSON data; length: how long it takes beside others of its batch, roughly.
+    """
+
+    point: int
+    parent: int | None
+    place: Mapping[str, float]
+    ask: Mapping[str, Any] = field(default_factory=dict)
+    length: int = 1
+
+
+class Study(Protocol):
+    """A plan of points: small, and it pickles; the same study has the same key, and the same rows."""
+
+    @property
+    def key(self) -> str:
+        """A hash of all that its rows depend on."""
+
+    def batch(self, rows: Sequence[Row]) -> Sequence[Task]:
+        """Return the next tasks, from all rows of earlier batches and from nothing else; none at the end."""
+
+    def solved(self, task: Task, parent: Row | None) -> Row:
+        """Return the row of a task, from its arguments and from nothing else."""

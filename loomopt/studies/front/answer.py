@@ -20,8 +20,8 @@ from loomopt.solve.answer.words import Words
 from loomopt.solve.certificate.certificate import certify
 from loomopt.solve.certificate.verdict import Binding, Certificate
 from loomopt.solve.nlp.point import Settings
-from loomopt.studies import warm
-from loomopt.studies.front_solve import CAPPED, Asking, Reached, Solver
+from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
+from loomopt.studies.run import warm
 
 if TYPE_CHECKING:
     from loomopt.solve.proof.whole_cycle import Proofs

@@ -1,4 +1,4 @@
-"""Who computes the rows of a study: this process, or workers of any executor; a worker may die, a pool may break."""
+"""Run a study: its batches in turn, each row kept as soon as it is there; the same rows whoever computes them."""
 
 import functools
 import pickle
@@ -11,16 +11,66 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from loomopt.base.refusals import refusal
+from loomopt.studies.run.rows import Row, Study, Task
 
 if TYPE_CHECKING:
-    from loomopt.studies.plan import Study, Task
-    from loomopt.studies.rows import Row
+    from loomopt.studies.run.rows import Row, Study, Task
+    from loomopt.studies.run.store import Store
 
     Work = tuple[Task, Row | None]
     """A task with the row of its parent."""
 
+OnRow = Callable[[Row], None]
+
+
 Making = Callable[[], Executor]
 """Makes an executor, again where the one before has broken."""
+
+
+def run(
+    study: Study,
+    executor: Executor | Making | None = None,
+    store: "Store | None" = None,
+    on_row: OnRow | None = None,
+) -> tuple[Row, ...]:
+    """Return the rows of a study in the order of its points, the same whatever the executor.
+
+    executor: any of `concurrent.futures`, or a function that makes one, so that a broken one is built again; one task
+    after the other here without it. store: where each row is written as it comes, and from which rows that are there
+    are taken. on_row: called with each row, read or computed, as it is there. Raises KeyboardInterrupt on Ctrl-C.
+    """
+    known = {row.point: row for row in store.rows(study.key)} if store else {}
+    rows: dict[int, Row] = {}
+
+    def kept(row: Row, fresh: bool = True) -> None:
+        if store and fresh:
+            store.add(study.key, row)
+        rows[row.point] = row
+        if on_row:
+            on_row(row)
+
+    with Crew(study, executor) as crew:
+        while tasks := study.batch(list(rows.values())):
+            there = [known.pop(task.point) for task in tasks if task.point in known]
+            for row in there:
+                kept(row, fresh=False)
+            left = [task for task in tasks if task.point not in rows]
+            crew.work([(task, None if task.parent is None else rows[task.parent]) for task in left], kept)
+            rows = dict(sorted(rows.items()))
+    return tuple(rows.values())
+
+
+def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[Task, Row | None]]:
+    """Yield every task of a study that was run, with the row of its parent."""
+    known, done = {row.point: row for row in rows}, dict[int, Row]()
+    while batch := study.batch(list(done.values())):
+        for task in batch:
+            if task.point not in known:
+                return
+            yield task, None if task.parent is None else known[task.parent]
+        done = dict(sorted({**done, **{task.point: known[task.point] for task in batch}}.items()))
+
+
 MOST_DEATHS = 3
 """Worker processes that may die of one point."""
 IN_FLIGHT = 256
@@ -52,16 +102,16 @@ def _unpickled(study: bytes) -> "Study":
     return found
 
 
-def _read(text: str) -> "Row":
+def _unpacked_row(text: str) -> "Row":
     import json
 
-    from loomopt.studies.rows import Row
+    from loomopt.studies.run.rows import Row
 
     return Row.from_dict(json.loads(text))
 
 
 def _failed(task: "Task", reason: str, seconds: float = 0.0) -> "Row":
-    from loomopt.studies.rows import Row
+    from loomopt.studies.run.rows import Row
 
     return Row(task.point, task.place, task.parent, "failed", reason, seconds=seconds)
 
@@ -100,7 +150,7 @@ class Crew:
         """
         if self.executor is None and self.make is None:
             for task, parent in tasks:
-                kept(_read(solved(self.payload, task, parent)))
+                kept(_unpacked_row(solved(self.payload, task, parent)))
             return
         try:
             for row in self._rows(deque(sorted(tasks, key=lambda work: -work[0].length))):
@@ -108,7 +158,7 @@ class Crew:
         except KeyboardInterrupt:
             for future in self.running:
                 if future.done() and not future.cancelled() and future.exception() is None:
-                    kept(_read(future.result()))
+                    kept(_unpacked_row(future.result()))
             raise
 
     def _rows(self, waiting: "deque[Work]") -> "Iterator[Row]":
@@ -122,7 +172,7 @@ class Crew:
             for future in wait(self.running, return_when=FIRST_COMPLETED).done if self.running else ():
                 work, error = self.running.pop(future), future.exception()
                 if error is None:
-                    yield _read(future.result())
+                    yield _unpacked_row(future.result())
                 elif isinstance(error, BrokenExecutor) and self.make:
                     lost.append(work)
                 elif type(error).__name__ == KILLED:

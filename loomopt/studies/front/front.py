@@ -18,7 +18,7 @@ from loomopt.scene import numbers
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.words import Words
 from loomopt.solve.options import check_numbers, check_sought, target_name
-from loomopt.studies.front_trade import POINTS, Trade
+from loomopt.studies.front.trade import POINTS, Trade
 
 FEWEST = 3
 """Points of a front."""

@@ -13,9 +13,9 @@ from loomopt.solve.answer.solution import Solution
 from loomopt.solve.nlp import exchange
 from loomopt.solve.nlp.calls import Calls
 from loomopt.solve.nlp.point import Point, Settings
-from loomopt.studies import digits
-from loomopt.studies.ladders import Ladder, Outcome, Reference, Setting
-from loomopt.studies.subject import Subject, Target
+from loomopt.studies.accuracy import reference_digits
+from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference, Setting
+from loomopt.studies.accuracy.subject import Subject, Target
 
 EXCHANGE, UNIFORM, TOLERANCE, HESSIAN = "exchange", "uniform points", "IPOPT tolerance", "Hessian"
 CLAIM = "claimed peak"
@@ -93,7 +93,7 @@ def _unrefined(target: Target, sampler: Sampler) -> float:
     rows = {row: o.scale for o in program.objectives if o.form == "peak" for row in o.rows}
     rows |= {limit.row: limit.scale for limit in program.limits if limit.family == "cycle"}
     for name, scale in rows.items():
-        worst = max(worst, abs(float(digits.peak(sampler, name) - sampler.peak(name)) / scale))
+        worst = max(worst, abs(float(reference_digits.peak(sampler, name) - sampler.peak(name)) / scale))
     return worst
 
 

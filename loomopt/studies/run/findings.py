@@ -5,8 +5,7 @@ from typing import NamedTuple, Protocol
 
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.solution import Solution
-from loomopt.studies.plan import Study, Task
-from loomopt.studies.rows import Row
+from loomopt.studies.run.rows import Row, Study, Task
 
 
 class Change(NamedTuple):

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Threads of linear algebra would wait for each other longer than matrices as small as these take."""
-NEEDED = "casadi", "loomopt.studies.front_trade", "loomopt.studies.sweep"
+NEEDED = "casadi", "loomopt.studies.front.trade", "loomopt.studies.sweep"
 """What a worker imports while it starts."""
 MOST_WORKERS = 1024
 RETRIES = 3

@@ -20,7 +20,7 @@ from loomopt.solve.nlp.point import Settings
 from loomopt.solve.search import least_change
 from loomopt.solve.search.multistart import searched, spread, tied
 from loomopt.solve.search.search import Judged, Search, judged, objectives, tried
-from loomopt.studies import warm
+from loomopt.studies.run import warm
 
 CAPPED = " at most as asked"
 """What the limit on an axis is called, after the axis."""

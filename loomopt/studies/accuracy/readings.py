@@ -13,9 +13,9 @@ from loomopt.model.sampling import Sampler, Tally
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.solve.nlp import expressions
-from loomopt.studies import digits
-from loomopt.studies.ladders import Ladder, Outcome, Reference
-from loomopt.studies.subject import POSITIONS, Subject
+from loomopt.studies.accuracy import reference_digits
+from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference
+from loomopt.studies.accuracy.subject import POSITIONS, Subject
 from loomopt.studies.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
 
 SAMPLED, REFINED = "sampled points", "refined points"
@@ -109,7 +109,7 @@ def _crossed(subject: Subject, crossing: Crossing) -> Number:
     """Return the crank angle, rad, of a crossing in many digits, by Newton's method."""
     near = subject.job.figures(subject.scene, subject.job.today(subject.scene))[crossing.figure] or 0.0
     exact, cycle = subject.exact, subject.sampler.cycle
-    switch, step = cycle.switch(cycle.place(near)[0]), digits.tiny(exact.maths, REFERENCE_SLOPE)
+    switch, step = cycle.switch(cycle.place(near)[0]), reference_digits.tiny(exact.maths, REFERENCE_SLOPE)
     angle, level = exact.maths.number(near), exact.given.values[crossing.level]
     for _ in range(EXTREME_STEPS):
         low, value, high = (exact.quantity(crossing.quantity, angle + k * step, switch) for k in (-1, 0, 1))
@@ -179,7 +179,7 @@ def _numbers(subject: Subject) -> Ladder:
 
     def run(system: str) -> dict[str, Any]:
         Tally.positions += POSITIONS + len(known)
-        exact = digits.precise(sampler) if system == "mpmath 40" else sampler.read(systems.FLOAT)
+        exact = reference_digits.precise(sampler) if system == "mpmath 40" else sampler.read(systems.FLOAT)
         single = {figure: exact.single(figure) for figure in known}
         if system != "NumPy":
             return {name: subject.motion(exact.maths, exact.given), **single}

@@ -21,8 +21,9 @@ from loomopt.scene import designs
 from loomopt.scene.scene import Scene
 from loomopt.solve import engine
 from loomopt.solve.answer.solution import Solution
-from loomopt.studies import check, digits
-from loomopt.studies.ladders import Reference
+from loomopt.studies import check
+from loomopt.studies.accuracy import reference_digits
+from loomopt.studies.accuracy.ladders import Reference
 from loomopt.studies.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS
 
 POSITIONS = 24
@@ -68,7 +69,7 @@ class Subject:
     @functools.cached_property
     def exact(self) -> Reading:
         """Today's machine in more digits than any method has."""
-        return digits.precise(self.sampler, CLOSED_DIGITS)
+        return reference_digits.precise(self.sampler, CLOSED_DIGITS)
 
     def reference(self, quantity: str) -> Reference | None:
         """Return what a reading of today's machine truly is, in 40 digits; closed forms in 60."""
@@ -78,7 +79,7 @@ class Subject:
         if quantity in self.studied.static:
             return Reference(self.exact.single(quantity))
         if quantity in self.peaks:
-            return Reference(digits.peak(self.sampler, *self.peaks[quantity]))
+            return Reference(reference_digits.peak(self.sampler, *self.peaks[quantity]))
         return None
 
 
@@ -119,12 +120,12 @@ class Target:
         return engine.solve(self.scene, self.name, accuracy=REFERENCE_ACCURACY)
 
     @functools.cached_property
-    def optimum(self) -> digits.Optimum | None:
+    def optimum(self) -> reference_digits.Optimum | None:
         """The optimum in 40 digits; None without a certified answer, or of several rows that are no peaks."""
         known = all(o.form == "peak" or not o.others for o in self.program.objectives)
         if self.answer.status != "optimal" or not known:
             return None
-        return digits.optimum(self.program, self.answer.point, self.variables(self.answer))
+        return reference_digits.optimum(self.program, self.answer.point, self.variables(self.answer))
 
     def reference(self, what: str) -> Reference | None:
         """Return the true optimum's figure, or its design in natural sizes; None where it is not unique."""

@@ -21,12 +21,11 @@ from loomopt.scene.provenance import versions
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.solution import Solution
 from loomopt.solve.answer.words import Words
-from loomopt.studies import front_answer, front_plan, front_read
-from loomopt.studies.findings import Change, Findings
-from loomopt.studies.front_plan import ENDS, Next, Scale
-from loomopt.studies.front_solve import Asking, Reached, Solver
-from loomopt.studies.plan import Task
-from loomopt.studies.rows import Row
+from loomopt.studies.front import answer, plan
+from loomopt.studies.front.plan import ENDS, Next, Scale
+from loomopt.studies.front.solver import Asking, Reached, Solver
+from loomopt.studies.run.findings import Change, Findings
+from loomopt.studies.run.rows import Row, Task
 
 PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
@@ -150,7 +149,7 @@ class Trade:
         scale = self.scale(rows)
         if not all(scale.width):
             return []
-        found = front_plan.following(rows, scale, self.points)
+        found = plan.following(rows, scale, self.points)
         wide = _spread(len(found)) if len(rows) == len(ENDS) else set()
         first = len(rows)
         return [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
@@ -171,7 +170,7 @@ class Trade:
 
     def scale(self, rows: Sequence[Row]) -> Scale:
         """Return the scale of finished rows."""
-        return front_plan.scaled({row.point: row for row in rows}, self.axes, self.signs, self.sizes, self.accuracy)
+        return plan.scaled({row.point: row for row in rows}, self.axes, self.signs, self.sizes, self.accuracy)
 
     def _refuse(self, rows: Mapping[int, Row]) -> None:
         """Raise BadInput where an end has no least value: then a number without a bound runs away from its size."""
@@ -216,7 +215,7 @@ class Trade:
 
     def read(self, rows: Sequence[Row]) -> Findings:
         """Return the points of the front in the order of the second axis, then those without a design."""
-        found = front_read.read(self, rows)
+        found = read_front(self, rows)
         changes = (Change(each["between"], each["kind"], tuple(each["limits"]), each["at"]) for each in found.changes)
         slope = f"{self.solver.slope} is the slope of the front."
         message = f"{found.message} {slope}" if len(found.values(self.axes[1])) > 1 else found.message
@@ -230,7 +229,7 @@ class Trade:
         """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()
         found, asking, _ = self.reach(task, parent)
-        return front_answer.answer(self.solver, self.target, found, asking, began)
+        return answer.answer(self.solver, self.target, found, asking, began)
 
     def solved(self, task: Task, parent: Row | None) -> Row:
         """Return the row of a task; it depends on nothing but its arguments."""
@@ -288,7 +287,7 @@ class Trade:
 
     def _clash(self, asking: Asking) -> str:
         """Return which limits clash, and why; "" where that is not found."""
-        limits = front_answer.clashing(self.solver, self.solver.program(asking)).limits
+        limits = answer.clashing(self.solver, self.solver.program(asking)).limits
         why = registry.of(self.scene).explain(self.scene, limits)
         return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
 
@@ -306,7 +305,7 @@ class Trade:
 def _kept(found: Reached, held: Sequence[float]) -> Reached:
     """Return what was reached, infeasible where what the target holds is not as good as along the front."""
     now = found.warm.get("held", held)
-    if found.certified and any(one > other + front_plan.ALIKE for one, other in zip(now, held, strict=True)):
+    if found.certified and any(one > other + plan.ALIKE for one, other in zip(now, held, strict=True)):
         return Reached("infeasible", "what the target holds is out of reach here")
     return found
 
@@ -314,3 +313,60 @@ def _kept(found: Reached, held: Sequence[float]) -> Reached:
 def _spread(count: int) -> set[int]:
     """Return which of so many points are searched for widely: evenly spread, the ends' neighbours apart."""
     return {round((k + 1) * (count + 1) / (SEARCHED + 1)) - 1 for k in range(SEARCHED)} if count else set()
+
+
+UNSEEN = 1e-6
+"""Share of an axis' natural size that shown digits do not tell: six of them."""
+
+
+@dataclass(frozen=True)
+class Front:
+    """A front: its rows in the order of the second axis, then those without a design; SI.
+
+    message: what it comes to in a sentence; changes, gaps: of contract.
+    """
+
+    trade: "Trade"
+    rows: tuple[Row, ...]
+    message: str
+    changes: tuple[Mapping[str, Any], ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
+
+    def values(self, axis: str) -> list[float]:
+        """Return an axis of the certified rows, SI."""
+        return [plan.value(row, axis) for row in self.rows if row.certified]
+
+
+def read_front(study: "Trade", rows: Sequence[Row]) -> Front:
+    """Return the front that finished rows make."""
+    by_point = {row.point: row for row in rows}
+    failed = tuple(row for row in rows if not row.certified)
+    if not all(end in by_point for end in ENDS):
+        return Front(study, tuple(rows), "No front yet: an end is not solved.")
+    if not all(by_point[end].certified for end in ENDS):
+        found = [row for row in rows if row.certified]
+        return Front(study, (*found, *failed), "No front: an end has no certified design.")
+    scale = study.scale(rows)
+    first, second = study.labels
+    if not all(scale.width):
+        said = f"{first} and {second} do not conflict: one design is best in both."
+        return Front(study, (by_point[ENDS[0]],), said + _apart(study, rows))
+    spots, _ = plan.spots(rows, scale)
+    changes, gaps = plan.told(spots, scale)
+    best = tuple(by_point[spot.point] for spot in spots)
+    message = f"{len(best)} designs between the {study.senses[1]} {second} and the {study.senses[0]} {first}."
+    message += _apart(study, rows)
+    # In the order of the figure itself, whichever way is sought.
+    order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
+    changes.sort(key=lambda change: change["at"])
+    return Front(study, (*order, *failed), message, tuple(changes), tuple(sorted(gaps)))
+
+
+def _apart(study: "Trade", rows: Sequence[Row]) -> str:
+    """Say how far apart both ends are where that is not seen in shown digits; "" for more, and for nothing."""
+    ends = [row for row in rows if row.point in ENDS]
+    pairs = ((plan.value(row, axis) for row in ends) for axis in study.axes)
+    apart = max(abs(one - other) / size for (one, other), size in zip(pairs, study.sizes, strict=True))
+    if not SAME_OBJECTIVE < apart < UNSEEN:
+        return ""
+    return f" Its ends are {apart:.1g} of their size apart; {study.accuracy:g} was asked."

@@ -1,0 +1,1 @@
+"""What each effect is worth, and what may be left out."""

@@ -1,0 +1,1 @@
+"""What two figures of a machine cost each other: certified fronts."""

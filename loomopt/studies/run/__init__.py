@@ -1,0 +1,1 @@
+"""How studies run: tasks, rows, workers, a durable store."""
