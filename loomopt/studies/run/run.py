@@ -14,15 +14,12 @@ from loomopt.base.refusals import refusal
 from loomopt.studies.run.rows import Row, Study, Task
 
 if TYPE_CHECKING:
-    from loomopt.studies.run.rows import Row, Study, Task
     from loomopt.studies.run.store import Store
 
     Work = tuple[Task, Row | None]
     """A task with the row of its parent."""
 
 OnRow = Callable[[Row], None]
-
-
 Making = Callable[[], Executor]
 """Makes an executor, again where the one before has broken."""
 
