@@ -174,7 +174,7 @@ def finite(data: object) -> None:
 
 def called(arguments: list[str]) -> str:
     """Run the command; return whether it read what it was given or refused it, and check how it said so."""
-    from loomopt.cli import run
+    from loomopt.interface.cli.app import run
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

@@ -38,7 +38,7 @@ app()"""
 COMMANDS = ("--version", "list", "evaluate beatup", "solve beatup --starts 1", "solve beatup")
 SOLVE, REST = "loomopt solve beatup --starts 1", "loomopt solve beatup, less the solve"
 TOLD = """import sys, time
-from loomopt import api; from loomopt import cli
+from loomopt.interface import api; from loomopt.interface.cli import app as cli
 solve = api.solve
 def timed(*arguments, **options):
     import casadi
@@ -70,7 +70,7 @@ def one_round(cache):
     """Return the processor's milliseconds of each command, run once."""
     found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
     for words in COMMANDS:
-        found[f"loomopt {words}"] = spent("from loomopt.cli import main; main()", words.split(), cache)[0]
+        found[f"loomopt {words}"] = spent("from loomopt.interface.cli.app import main; main()", words.split(), cache)[0]
     whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
     found[REST] = whole - float(solved)
     return {name: 1e3 * seconds for name, seconds in found.items()}

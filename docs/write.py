@@ -14,13 +14,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from unittest import mock
 
-from loomopt import api
-from loomopt.cli import run
+from loomopt.interface import api
+from loomopt.interface.cli.app import run
+from loomopt.interface.files import outputs, svg
+from loomopt.interface.tables import rows
+from loomopt.interface.text import glossary
+from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.solve.answer.words import Words
-from loomopt.tables import rows
-from loomopt.views import glossary, outputs, svg
-from loomopt.views.layout import Grid
 
 DOCS = Path(__file__).parent
 README = DOCS.parent / "README.md"

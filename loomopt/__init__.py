@@ -6,32 +6,43 @@
 
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
-    from loomopt.api import Answer, Evaluation, effects, evaluate, load, pareto, prove, scene, simulate, solve, sweep
     from loomopt.base.errors import BadInput
-    from loomopt.design_study import DesignStudy
-    from loomopt.effects_study import EffectsStudy
+    from loomopt.interface.api import (
+        Answer,
+        Evaluation,
+        effects,
+        evaluate,
+        load,
+        pareto,
+        prove,
+        scene,
+        simulate,
+        solve,
+        sweep,
+    )
+    from loomopt.interface.finished import DesignStudy, EffectsStudy
     from loomopt.scene.scene import Scene
     from loomopt.solve.proof.whole_cycle import Proofs
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Answer": "loomopt.api",
+    "Answer": "loomopt.interface.api",
     "BadInput": "loomopt.base.errors",
-    "DesignStudy": "loomopt.design_study",
-    "EffectsStudy": "loomopt.effects_study",
-    "Evaluation": "loomopt.api",
+    "DesignStudy": "loomopt.interface.finished",
+    "EffectsStudy": "loomopt.interface.finished",
+    "Evaluation": "loomopt.interface.api",
     "Proofs": "loomopt.solve.proof.whole_cycle",
     "Scene": "loomopt.scene.scene",
-    "effects": "loomopt.api",
-    "evaluate": "loomopt.api",
-    "load": "loomopt.api",
-    "pareto": "loomopt.api",
-    "prove": "loomopt.api",
-    "scene": "loomopt.api",
-    "simulate": "loomopt.api",
-    "solve": "loomopt.api",
-    "sweep": "loomopt.api",
+    "effects": "loomopt.interface.api",
+    "evaluate": "loomopt.interface.api",
+    "load": "loomopt.interface.api",
+    "pareto": "loomopt.interface.api",
+    "prove": "loomopt.interface.api",
+    "scene": "loomopt.interface.api",
+    "simulate": "loomopt.interface.api",
+    "solve": "loomopt.interface.api",
+    "sweep": "loomopt.interface.api",
 }
 
 __all__ = [

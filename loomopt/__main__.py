@@ -14,9 +14,9 @@ def main() -> None:
         from loomopt.base import interrupts
 
         interrupts.leave_at_once()
-        from loomopt import cli
+        from loomopt.interface.cli import app
 
-        cli.main()
+        app.main()
     except KeyboardInterrupt:
         from loomopt.base import interrupts
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 import loomopt as lo
+from loomopt.interface.files import outputs
 from loomopt.scene import answers
-from loomopt.views import outputs
 
 SCENE = lo.load("beatup")
 CHANGED = SCENE.set("operation.M0", "700 N*m").with_effect("gravity").without_effect("resistance")

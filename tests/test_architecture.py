@@ -125,8 +125,8 @@ def test_imports_run_upward_only():
 @pytest.mark.parametrize(
     "source",
     [
-        "from loomopt.views import svg",
-        "from loomopt import tables; from loomopt.base import errors",
+        "from loomopt.interface.files import svg",
+        "from loomopt.interface import tables; from loomopt.base import errors",
         "def f():\n    import loomopt.solve.engine",
         "import importlib\nimportlib.import_module('loomopt.solve.nlp.exchange')",
     ],
@@ -137,7 +137,7 @@ def test_an_import_from_above_is_found(source):
 
 def test_imports_of_a_module_below_or_beside_are_allowed():
     below = "from loomopt.model import sampling\nfrom loomopt.base.errors import BadInput"
-    for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.views import svg"
+    for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.interface.files import svg"
     assert climbing("jobs.beatup.model", below) == climbing("jobs.beatup.model", for_reading) == []
 
 

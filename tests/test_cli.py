@@ -12,9 +12,10 @@ import sys
 
 import pytest
 
-from loomopt import api, shell
 from loomopt.base.quantities import read
-from loomopt.cli import run
+from loomopt.interface import api
+from loomopt.interface.cli import shell
+from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
@@ -229,7 +230,7 @@ def test_help_and_version_go_to_stdout(cli, arguments):
 
 @pytest.mark.parametrize("outcome", ["succeeds", "differs"])
 def test_the_shell_sees_the_exit_status(outcome):
-    command = [sys.executable, "-c", "from loomopt.cli import main; main()"]
+    command = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()"]
     arguments, status = (["list"], 0) if outcome == "succeeds" else (["solve", "betup"], 2)
     done = subprocess.run([*command, *arguments], capture_output=True, text=True)
     assert done.returncode == status
@@ -237,7 +238,7 @@ def test_the_shell_sees_the_exit_status(outcome):
 
 
 def test_a_reader_that_leaves_is_no_error():
-    code = "from loomopt.cli import main; main()"
+    code = "from loomopt.interface.cli.app import main; main()"
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run([sys.executable, "-c", code, "list"], stdout=writing, stderr=subprocess.PIPE, text=True)

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 GRAVITY = ("--with", "gravity", "--set", "operation.M0=700 N*m")
 TABLED = ("evaluate", "simulate", "prove", "export")

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 
 TEMPLATE = registry.template("beatup")

@@ -6,9 +6,9 @@ import shlex
 import pytest
 import uncoiled
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.cli.studies import outcome
 from loomopt.studies.effects.study import Effects
-from loomopt.study_commands import outcome
 
 KEYS = ["effect", "shift", "regret", "may_go", "nodes", "build_s", "solve_s", "status", "why"]
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 
 def solve(capsys, *words):

@@ -5,8 +5,8 @@ import json
 import pandas as pd
 import pytest
 
-from loomopt import study_commands
-from loomopt.cli import run
+from loomopt.interface.cli import studies
+from loomopt.interface.cli.app import run
 from loomopt.studies.front.trade import Trade
 
 MASS = ("--minimise", "peak_torque", "--against", "m4e")
@@ -122,7 +122,7 @@ def test_axes_that_do_not_conflict_are_one_point(cli):
 )
 def test_the_most_of_an_axis(cli, monkeypatch, arguments, axes):
     asked: dict[str, Trade] = {}
-    monkeypatch.setattr(study_commands, "carried_out", lambda study, how: len(asked.setdefault("study", study).axes))
+    monkeypatch.setattr(studies, "carried_out", lambda study, how: len(asked.setdefault("study", study).axes))
     assert cli("beatup", *arguments)[0] == 2
     trade = asked["study"]
     assert dict(zip(trade.axes, trade.senses, strict=True)) == axes

@@ -9,7 +9,7 @@ import re
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.solve.certificate import taylor_bounds
 
 KEYS = ["limit", "text", "status", "margin", "slack", "boxes", "angle"]

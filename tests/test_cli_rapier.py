@@ -6,7 +6,7 @@ import math
 import pandas as pd
 import pytest
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]

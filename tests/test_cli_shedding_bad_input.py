@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.text import answers, layout, scenes
 from loomopt.scene import packaged
-from loomopt.views import layout, scene_view, terminal
 
 ezdxf: Any = importlib.import_module("ezdxf")
 
@@ -107,7 +107,7 @@ def test_show_lists_words_and_numbers(cli):
 def test_show_takes_a_law_of_coefficients(answer):
     law = list(answer.design["law"])
     scene = lo.load("shedding").update({"mechanism.law": "spline", "mechanism.law_coefficients": law})
-    shown = layout.render(scene_view.parts(scene), None)
+    shown = layout.render(scenes.parts(scene), None)
     (line,) = [line for line in shown.splitlines() if line.startswith("mechanism.law_coefficients")]
     assert f"9 numbers, {min(law):.3g} ... {max(law):.3g}" in line
 
@@ -122,14 +122,14 @@ def test_show_simulate_and_evaluate_print_every_scene(cli, name):
 
 def test_a_free_law_is_one_short_line(answer):
     scene = lo.load("shedding")
-    shown = layout.render(terminal.solution(answer, scene), 100)
+    shown = layout.render(answers.solution(answer, scene), 100)
     law = answer.design["law"]
     line = f"law: s'' at 9 knots, {min(law):.6g} ... {max(law):.6g}; all in design"
     assert shown.splitlines().count(line) == 1
-    evaluated = layout.render(terminal.evaluation(lo.evaluate(scene, answer.design), scene, None), 100)
+    evaluated = layout.render(answers.evaluation(lo.evaluate(scene, answer.design), scene, None), 100)
     assert line in evaluated.splitlines()
     for name in ("shedding", "beatup"):
-        assert terminal.lists(lo.evaluate(lo.load(name)), lo.load(name)) == []
+        assert answers.lists(lo.evaluate(lo.load(name)), lo.load(name)) == []
 
 
 def test_a_free_law_goes_from_answer_to_workshop_and_figure(cli, answer, tmp_path):

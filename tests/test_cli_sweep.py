@@ -5,7 +5,7 @@ import json
 import pandas as pd
 import pytest
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.studies.sweep import Sweep
 
 M0 = ("--over", "operation.M0=700:800:50 N*m")

@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import LONGEST_MESSAGE, BadInput, clean
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 PARTS = ("problem", "file", "key", "value", "allowed", "remedy")
 LONG = ["x" * 5000, "\x1b[2J" * 2000, "\u2028" * 3000, "织" * 4000]

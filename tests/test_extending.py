@@ -40,7 +40,7 @@ def run(tmp_path_factory):
 
     def call(words):
         path = os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))
-        command = [sys.executable, "-c", "from loomopt.cli import main; main()", *words[1:]]
+        command = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()", *words[1:]]
         environment = {**os.environ, "PYTHONPATH": path}
         done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr

@@ -8,13 +8,14 @@ import inch
 import pytest
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
-from loomopt.cli import run
+from loomopt.interface import tables
+from loomopt.interface.cli.app import run
+from loomopt.interface.text import answers, layout, scenes
+from loomopt.interface.text.scenes import curves, parts
 from loomopt.jobs import registry
 from loomopt.scene import packaged
 from loomopt.solve.answer.words import Words
-from loomopt.views import layout, scene_view, terminal
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
 TABLE = {"targets__match__table": str(WISH)}
@@ -92,9 +93,9 @@ def _inner(value):
 
 
 def test_what_a_person_sees_differs_in_units_only(pair):
-    shown = [masked(terminal.solution(answer, answer.scene)) for answer in pair]
+    shown = [masked(answers.solution(answer, answer.scene)) for answer in pair]
     assert shown[0] == shown[1]
-    text = layout.render(terminal.solution(pair[1], pair[1].scene), None)
+    text = layout.render(answers.solution(pair[1], pair[1].scene), None)
     assert not re.search(r" (mm|N\*m|N|N/m|kg)\b", text)
     own, inches = (set(answer.table()["unit"]) for answer in pair)
     assert ("mm" in own, "in" in inches, "mm" in inches) == (True, True, False)
@@ -129,11 +130,11 @@ def test_show_and_evaluate_differ_in_units_only(name):
     scenes = lo.load(name), in_inches(name)
     evaluated = [lo.evaluate(scene) for scene in scenes]
     assert evaluated[0].as_dict() == evaluated[1].as_dict()
-    told = [masked(terminal.evaluation(found, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
+    told = [masked(answers.evaluation(found, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
     assert told[0] == told[1]
-    curves = [masked(scene_view.curves(scene, {}, None)[1:]) for scene in scenes]
+    curves = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
     assert curves[0].count("U") == curves[1].count("U") > 2
-    shown = [scene_view.parts(scene) for scene in scenes]
+    shown = [parts(scene) for scene in scenes]
     own, inches = ([part for part in parts if isinstance(part, layout.Grid)] for parts in shown)
     numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (own, inches)]
     assert numbers[0] == numbers[1], "SI is the same"
@@ -167,7 +168,7 @@ def seen(scene):
     """Return the tables of a scene that a person sees, each as its units."""
     found = lo.evaluate(scene)
     yield [row["unit"] for row in tables.rows(found, scene)]
-    grids = [part for part in scene_view.curves(scene, {}, None) if isinstance(part, layout.Grid)]
+    grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, layout.Grid)]
     heads = [head for grid in grids for head in grid.columns]
     yield [head.partition("[")[2].rstrip("]") for head in heads]
     yield [scene.shown_in(kind) for kind in SI_UNIT]

@@ -40,7 +40,7 @@ raise SystemExit(interrupts.stoppable(run))
 """
 ENDED = """
 import os, signal, sys
-from loomopt import cli; from loomopt import shell
+from loomopt.interface.cli import app as cli; from loomopt.interface.cli import shell
 
 def say(self, text):
     if text.startswith("2 of"):
@@ -68,8 +68,9 @@ def is_stopped(done):
 
 @pytest.mark.parametrize(
     "module",
-    ["loomopt.cli", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job", "loomopt.scene.scene",
-     "numpy.linalg", "casadi", "numpy", "loomopt.solve.certificate.certificate", "rich.table", "loomopt.solve.engine"],
+    ["loomopt.interface.cli.app", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job",
+     "loomopt.scene.scene", "numpy.linalg", "casadi", "numpy", "loomopt.solve.certificate.certificate",
+     "rich.table", "loomopt.solve.engine"],
 )  # fmt: skip
 def test_ctrl_c_during_an_import_stops_cleanly(module):
     assert is_stopped(called(sys.executable, "-c", HIT, module, "solve", "beatup"))

@@ -12,14 +12,15 @@ import pytest
 from reference import crank_rocker_synthesis
 
 import loomopt as lo
-from loomopt.jobs import registry, sources
+from loomopt.interface.text import glossary
+from loomopt.jobs import registry
 from loomopt.jobs.rapier.model import HeadPose
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 
-ROWS = {row.key: row._asdict() for row in sources.read("rapier").figures}
+ROWS = {row.key: row._asdict() for row in glossary.read("rapier").figures}
 RAPIER = lo.load("rapier")
 JOB = registry.of(RAPIER)
 DRAWN = 3e-3

@@ -9,10 +9,10 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.jobs import sources
+from loomopt.interface.text import glossary
 from loomopt.physics.effects.shedding import inertia, warp_tension, weight
 
-ROWS = {row.key: row._asdict() for row in sources.read("shedding").figures}
+ROWS = {row.key: row._asdict() for row in glossary.read("shedding").figures}
 STATIC, MOVING, SHORT = (lo.load(name) for name in ("shedding-static", "shedding", "shedding-printed-travel"))
 SPRINGS, RESERVE = 2, 1.3
 READ_OFF = 1e-3

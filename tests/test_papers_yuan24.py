@@ -16,11 +16,12 @@ import pytest
 from reference import crank_rocker_synthesis
 
 import loomopt as lo
-from loomopt.jobs import registry, sources
+from loomopt.interface.text import glossary
+from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
 
-ROWS = {row.key: row._asdict() for row in sources.read("beatup").figures}
+ROWS = {row.key: row._asdict() for row in glossary.read("beatup").figures}
 BEATUP = lo.load("beatup")
 HALF = 0.0005
 REFERENCE, LIGHTER, HEAVIER = (0.031, 0.065, 0.155, 0.167), (0.030, 0.084, 0.151, 0.167), (0.032, 0.062, 0.158, 0.167)

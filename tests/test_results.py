@@ -12,8 +12,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import loomopt as lo
-from loomopt.cli import run
-from loomopt.views.shown_figure import ShownFigure
+from loomopt.interface.cli.app import run
+from loomopt.interface.figures.figure import ShownFigure
 
 PNG = b"\x89PNG"
 

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from loomopt import shell
 from loomopt.base.errors import BadInput
+from loomopt.interface.cli import shell
 
 CLEARED = "\x1b[K"
 

@@ -18,7 +18,7 @@ MODULES, OWN = 530, 137
 STEADY = {f"loomopt.{name}" for name in ("effects.steady", "program.settled", "program.states")}
 """What only a scene with a state needs."""
 LISTED = """import sys
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 code = run(sys.argv[1:])
 print(*sys.modules, file=sys.stderr)
 sys.exit(code)"""
@@ -114,7 +114,8 @@ def test_solving_the_beatup_imports_no_module_of_another_job_no_study_and_no_pic
 @pytest.mark.parametrize(("given", "expected"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
 def test_the_command_runs_its_linear_algebra_in_one_thread_unless_it_is_told_otherwise(given, expected):
     """Before NumPy is imported: afterwards it would not listen."""
-    script = "import sys, os, loomopt.cli; print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['MKL_NUM_THREADS'])"
+    threads = "os.environ['OPENBLAS_NUM_THREADS'], os.environ['MKL_NUM_THREADS']"
+    script = f"import os, loomopt.interface.cli.app; print({threads})"
     own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**own, **given})
     assert done.stdout.split() == [expected, "1"]

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt import tables
-from loomopt.table_frame import TableFrame
+from loomopt.interface import tables
+from loomopt.interface.tables import TableFrame
 
 EXPONENT = re.compile(r"\d[eE][-+]\d")
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.units import factor, parse_unit
+from loomopt.interface import tables
+from loomopt.interface.files import outputs
 from loomopt.scene import provenance
-from loomopt.views import outputs
 
 SCENE = lo.load("beatup")
 

@@ -72,7 +72,7 @@ class Copy:
 
     def loomopt(self, *words):
         """Return what the command prints."""
-        done = self.python("-c", "from loomopt.cli import main; main()", *words)
+        done = self.python("-c", "from loomopt.interface.cli.app import main; main()", *words)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

@@ -9,7 +9,7 @@ import casadi
 import pytest
 
 import loomopt as lo
-from loomopt import cli, versions
+from loomopt.interface.cli import app, versions
 
 
 def test_the_line_names_the_casadi_and_the_ipopt_that_run(capfd):
@@ -17,7 +17,7 @@ def test_the_line_names_the_casadi_and_the_ipopt_that_run(capfd):
     options: dict[str, Any] = {"print_time": False, "ipopt": {"sb": "yes", "print_level": 5, "max_iter": 0}}
     casadi.nlpsol("s", "ipopt", {"x": x, "f": x**2}, options)(x0=1.0)
     banner = re.search(r"Ipopt version ([\d.]+\d)", capfd.readouterr().out)
-    assert cli.run(["--version"]) == 0
+    assert app.run(["--version"]) == 0
     line = f"loomopt {lo.__version__} (CasADi {casadi.CasadiMeta.version()}, IPOPT {banner[1]})\n"
     assert capfd.readouterr().out == line
 
@@ -36,7 +36,7 @@ def test_an_ipopt_that_does_not_tell_is_not_made_up(content, tmp_path, monkeypat
 
 
 def test_no_completion_is_offered_that_is_not_there(capsys):
-    assert cli.run(["--help"]) == 0
+    assert app.run(["--help"]) == 0
     assert "completion" not in capsys.readouterr().out
-    assert cli.run(["--install-completion"]) == 2
-    assert cli.run(["--show-completion"]) == 2
+    assert app.run(["--install-completion"]) == 2
+    assert app.run(["--show-completion"]) == 2

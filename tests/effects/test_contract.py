@@ -9,7 +9,8 @@ import pytest
 from contract import LOOSE, every_job, sampler, scene_of, solve
 
 import loomopt as lo
-from loomopt import cli, tables
+from loomopt.interface import tables
+from loomopt.interface.cli import app
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.model.sampling import Sampler
@@ -155,7 +156,7 @@ def test_equations_have_a_term_and_a_reading(job, capsys):
     given = {"made_up_drive.b": "0.01", "made_up_output.c": "0.02", "made_up_output.a": "0.3"}
     given |= {f"made_up_check.{key}": value for key, value in LOOSE.items()}
     sets = [word for key, value in given.items() for word in ("--set", f"effects.{key}={value}")]
-    assert cli.run(["show", job, *sets, "--equations"]) == 0
+    assert app.run(["show", job, *sets, "--equations"]) == 0
     written = capsys.readouterr().out
 
     def after(title):

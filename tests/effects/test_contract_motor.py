@@ -9,7 +9,7 @@ import pytest
 from contract import LOADS, every_job, sampler
 
 import loomopt as lo
-from loomopt import tables
+from loomopt.interface import tables
 from loomopt.jobs import registry
 from loomopt.maths import systems
 

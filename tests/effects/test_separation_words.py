@@ -11,13 +11,13 @@ import pytest
 from flying_frames import JOB, ON, RUBBED, SLOW, figures
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.errors import BadInput
 from loomopt.base.units import factor
+from loomopt.interface import tables
+from loomopt.interface.text import scenes
 from loomopt.jobs import registry
 from loomopt.physics.effects.shedding import separation, weight
 from loomopt.studies.accuracy import accuracy
-from loomopt.views import scene_view
 
 
 def test_curves_show_frame_and_cam_apart():
@@ -146,23 +146,23 @@ def test_proofs_and_the_study_of_accuracy_say_what_they_leave_out():
 
 
 def test_the_scenes_own_equations_have_flight_and_landing():
-    told = dict(text.split("\n    ", 1) for text in scene_view.equations(RUBBED.with_effect("spring_inertia")))
+    told = dict(text.split("\n    ", 1) for text in scenes.equations(RUBBED.with_effect("spring_inertia")))
     terms = "N_damping + N_dry_friction + N_inertia + N_return_spring + N_spring_inertia + N_warp_tension + N_weight"
     assert told["flight"].startswith(f"{terms} = 0 while X > X_cam")
     assert "X'_after = X'_cam - restitution*(X'_before - X'_cam)" in told["landing"]
     assert told["at rest in flight"].endswith("no more than F")
     assert told["landing_energy"] == "landing_energy = landing_speed^2*(M + m_s/3)/2"
-    plain = dict(text.split("\n    ", 1) for text in scene_view.equations(ON))
+    plain = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
     assert "at rest in flight" not in plain
     assert not {"flight", "landing"} & {
-        text.split("\n")[0] for text in scene_view.equations(ON.without_effect("separation"))
+        text.split("\n")[0] for text in scenes.equations(ON.without_effect("separation"))
     }
 
 
 @pytest.mark.parametrize(("words", "flown"), [([], False), (["--with", "separation"], True)])
 def test_flight_is_imported_only_where_a_scene_needs_it(words, flown):
     code = (
-        "import sys; from loomopt import cli\n"
+        "import sys; from loomopt.interface.cli import app as cli\n"
         f"cli.run(['evaluate', 'shedding', '--json', *{words!r}])\n"
         "names = [name for name in sys.modules if 'loomopt.physics.motion' in name or 'parting' in name]\n"
         "print(names, file=sys.stderr)"

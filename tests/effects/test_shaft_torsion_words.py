@@ -7,9 +7,9 @@ import pytest
 from twisting_shafts import CENTRES, HALF, J4, OMEGA, PLAIN, read, sampler, shaft, twist
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.quantities import exact
-from loomopt.cli import run
+from loomopt.interface import tables
+from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.model.model import _with, with_words_fixed

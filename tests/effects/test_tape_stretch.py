@@ -7,8 +7,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.text import scenes
 from loomopt.jobs import registry
-from loomopt.views import scene_view
 
 ON = lo.load("rapier").with_effect("tape_stretch", "head_inertia")
 JOB = registry.of(ON)
@@ -59,5 +59,5 @@ def test_a_head_that_swings_too_slowly_is_remarked_upon(stiffness, remarked):
 
 
 def test_its_equation_is_written():
-    told = dict(text.split("\n    ", 1) for text in scene_view.equations(ON))
+    told = dict(text.split("\n    ", 1) for text in scenes.equations(ON))
     assert told["tape_stretch"] == "head_overrun = -S''_stroke*head_inertia.mass*omega^2/stiffness"

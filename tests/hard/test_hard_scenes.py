@@ -11,7 +11,7 @@ import pytest
 from hard_digits import MP, centres, exact
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 
 SIZES = ("l1", "l2", "l3", "l4", "r4")
 

@@ -12,10 +12,10 @@ from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.files import outputs
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
 from loomopt.scene import packaged
-from loomopt.views import outputs
 
 NAMES = packaged.problem_names()
 MACHINES = 12

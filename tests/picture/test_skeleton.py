@@ -2,9 +2,9 @@
 
 import math
 
+from loomopt.interface.files import svg
 from loomopt.picture.drawing import JOINT, Skeleton
 from loomopt.picture.shapes import Circle, Drawing, Line, Point
-from loomopt.views import svg
 
 OUT, IN = "front dead centre", "rear dead centre"
 PRESS = Skeleton(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 PRESS = Path(__file__).parent / "press"
-COMMAND = [sys.executable, "-c", "from loomopt.cli import main; main()"]
+COMMAND = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()"]
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import tables
+from loomopt.interface import tables
 from loomopt.jobs import registry
 
 OUTPUT = {"beatup": ("psi", "rad"), "rapier": ("S", "m"), "shedding": ("X", "m")}

@@ -10,8 +10,8 @@ from rapier_by_hand import Drive
 from shedding_cases import plain, programmed
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.errors import BadInput
+from loomopt.interface import tables
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import GAUSS_NODES
 

@@ -12,7 +12,7 @@ import loomopt as lo
 
 HOOKED = """
 import os, signal, sys
-from loomopt import cli
+from loomopt.interface.cli import app as cli
 from loomopt.solve import engine
 
 genuine, hits = engine.solve, []
@@ -93,7 +93,7 @@ def test_the_folder_asked_for_holds_no_partial_files(tmp_path):
 
 
 def test_files_of_an_earlier_answer_stay_as_they_were(tmp_path):
-    code = "from loomopt.cli import main; main()"
+    code = "from loomopt.interface.cli.app import main; main()"
     command = [sys.executable, "-c", code, "solve", "beatup", "--out", str(tmp_path)]
     subprocess.run(command, capture_output=True, check=True)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

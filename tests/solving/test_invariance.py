@@ -127,7 +127,7 @@ def test_the_same_scene_gives_the_same_digits_twice(problem, target):
 
 def test_another_process_gives_the_same_digits():
     """Whatever this one has solved before, and whatever its hash seed."""
-    command = [sys.executable, "-c", "from loomopt.cli import main; main()", "solve", "beatup", "--json"]
+    command = [sys.executable, "-c", "from loomopt.interface.cli.app import main; main()", "solve", "beatup", "--json"]
     ours = json.loads(told(lo.solve(lo.load("beatup"))))
     for seed in ("0", "12345"):
         environment = os.environ | {"PYTHONHASHSEED": seed}

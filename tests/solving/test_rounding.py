@@ -6,9 +6,10 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.units import factor
+from loomopt.interface.text import layout
+from loomopt.interface.text.answers import evaluation
 from loomopt.solve.answer.report import LEAST_DIGITS, digits, roundings
 from loomopt.solve.answer.words import Words
-from loomopt.views import layout, terminal
 
 CASES = [("beatup", "retrofit"), ("beatup-heavy", "torque"), ("rapier", "stroke-dwell"), ("shedding", "speed")]
 LIGHT = lo.load("beatup-light")
@@ -109,7 +110,7 @@ def test_a_reader_and_a_script_see_the_difference(answers):
     answer = answers["rapier", "stroke-dwell"]
     scene, found = answer.scene, lo.evaluate(answer.scene, retyped(answer, 6), answer.target)
     rounded = [limit.name for limit in found.limits if limit.rounding]
-    shown = layout.render(terminal.evaluation(found, scene, None), 120)
+    shown = layout.render(evaluation(found, scene, None), 120)
     held = "all limits held, but for the rounding of the digits given"
     assert shown.startswith(f"rapier: {held}: {', '.join(rounded)}\n")
     assert shown.count("<- exceeded by rounding") == len(rounded)
@@ -118,4 +119,4 @@ def test_a_reader_and_a_script_see_the_difference(answers):
     assert {name for name, limit in told.items() if limit.get("rounding")} == set(rounded)
     assert all(list(limit) == ["name", "value", "min", "max", "ok"] for limit in told.values() if limit["ok"])
     worse = lo.evaluate(scene, {**retyped(answer, 6), "C0x": 0.39}, answer.target)
-    assert layout.render(terminal.evaluation(worse, scene, None), 120).startswith("rapier: NOT admissible: C0x")
+    assert layout.render(evaluation(worse, scene, None), 120).startswith("rapier: NOT admissible: C0x")

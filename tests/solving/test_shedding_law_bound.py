@@ -14,7 +14,7 @@ import pytest
 from shedding_cases import CYCLOID, TRAVELS, freed, plain, product, programmed
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.scene.packaged import problems
 
 study = importlib.import_module("shedding_law")

@@ -5,7 +5,7 @@ import json
 import pytest
 from few_settings import SMALL
 
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.studies.accuracy import accuracy, optima, readings
 
 pytestmark = pytest.mark.slow

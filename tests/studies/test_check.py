@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.scene import packaged

@@ -10,8 +10,8 @@ import pytest
 import uncoiled
 
 import loomopt as lo
-from loomopt import effects_study
 from loomopt.base.errors import BadInput
+from loomopt.interface import finished
 from loomopt.solve import engine
 from loomopt.studies.effects import study
 from loomopt.studies.run import run
@@ -42,7 +42,7 @@ def rows(plan):
 
 @pytest.fixture(scope="module")
 def beatup(plan, rows):
-    return effects_study.concluded(plan, rows)
+    return finished.concluded_effects(plan, rows)
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import loomopt as lo
-from loomopt import results
 from loomopt.base.errors import BadInput
+from loomopt.interface import results
 from loomopt.studies.front import front, plan
 from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import read_front

@@ -13,9 +13,9 @@ import inch
 import pytest
 
 import loomopt as lo
-from loomopt import results
 from loomopt.base.errors import BadInput
-from loomopt.design_study import DesignStudy
+from loomopt.interface import results
+from loomopt.interface.finished import DesignStudy
 from loomopt.jobs import registry
 from loomopt.studies.front import front
 from loomopt.studies.run.store import Store

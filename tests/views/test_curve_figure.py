@@ -9,12 +9,13 @@ import pytest
 from matplotlib.text import Text
 
 import loomopt as lo
-from loomopt import tables
 from loomopt.base.units import factor
+from loomopt.interface import tables
+from loomopt.interface.figures import curves
+from loomopt.interface.files import outputs
 from loomopt.jobs import registry
 from loomopt.picture.panels import Panel
 from loomopt.scene import packaged
-from loomopt.views import curve_figure, outputs
 from tests import inch
 from tests.views import overlaps
 
@@ -89,7 +90,7 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
     for axes in figure.axes:
         lines = curves_of(axes)
         own = [line.get_label() for line in lines if not line.get_label().endswith(", today")]
-        dashed = {line.get_label() for line in lines if line._unscaled_dash_pattern == curve_figure.DASHED}
+        dashed = {line.get_label() for line in lines if line._unscaled_dash_pattern == curves.DASHED}
         assert dashed == {f"{label}, today" for label in own} != set()
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["design", "today, dashed"]
@@ -128,7 +129,7 @@ def test_peaks_stand_where_the_figures_say_and_limits_are_levels():
         ("transmission angle mu [deg]", "mu_min >= 56.5 deg", {56.5}),
     ):
         assert text in said(panels[title])
-        flat = {round(line.get_ydata()[0], 9) for line in panels[title].lines if line.get_color() == curve_figure.LIMIT}
+        flat = {round(line.get_ydata()[0], 9) for line in panels[title].lines if line.get_color() == curves.LIMIT}
         assert flat == levels
 
 
@@ -190,7 +191,7 @@ def frame():
 
 
 def test_each_column_with_a_unit_has_a_panel_in_degrees(frame):
-    panels = titled(curve_figure.curves(frame, None, "t"))
+    panels = titled(curves.curves(frame, None, "t"))
     assert set(panels) == {"psi [deg]", "psi 1", "psi 2", "M R [N*m]", "M3 [N*m]", "Md [N*m]"}
     (line,) = curves_of(panels["psi [deg]"])
     assert line.get_ydata()[0] == pytest.approx(np.degrees(2.7))
@@ -198,7 +199,7 @@ def test_each_column_with_a_unit_has_a_panel_in_degrees(frame):
 
 @pytest.mark.parametrize("count", [2, 7])
 def test_marks_stand_where_they_belong(frame, count):
-    figure = curve_figure.curves(frame.iloc[:, :count], None, "t", MARKS)
+    figure = curves.curves(frame.iloc[:, :count], None, "t", MARKS)
     assert overlaps.found(figure) == []
     axes = figure.axes[0]
     at = sorted(line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
@@ -211,7 +212,7 @@ def test_marks_stand_where_they_belong(frame, count):
 
 def test_marks_and_pulse_are_found_a_turn_later_on_an_axis_that_starts_late(frame):
     late = frame.assign(**{"phi [rad]": frame["phi [rad]"] + 1.0})
-    axes = curve_figure.curves(late, None, "t", MARKS).axes[0]
+    axes = curves.curves(late, None, "t", MARKS).axes[0]
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
     low, high = np.degrees([1.0, 1.0 + 2 * np.pi])
     assert spans == [pytest.approx((low, np.degrees(1.41))), pytest.approx((np.degrees(0.89) + 360, high))]
@@ -220,7 +221,7 @@ def test_marks_and_pulse_are_found_a_turn_later_on_an_axis_that_starts_late(fram
 def test_a_stretch_through_zero_is_shaded_on_both_sides_and_undefined_marks_are_left_out(frame):
     marks = {"front dead centre": 0.0, "hand-over": np.radians(182.5), "lost": float("nan")}
     marks |= {"dwell begins": np.radians(323.4), "dwell ends": np.radians(35.9), "pause before begins": 5.0}
-    axes = curve_figure.curves(frame, None, "t", marks).axes[0]
+    axes = curves.curves(frame, None, "t", marks).axes[0]
     spans = sorted((patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches)
     assert spans == [pytest.approx((0, 35.9)), pytest.approx((323.4, 360))]
     upright = sorted(line.get_xdata()[0] for line in axes.lines if np.ptp(line.get_xdata()) == 0)
@@ -231,7 +232,7 @@ def test_a_stretch_through_zero_is_shaded_on_both_sides_and_undefined_marks_are_
 
 def test_a_level_far_from_the_curves_is_said_not_drawn(frame):
     levels = {"near": (800.0,), "far": (1e5,)}
-    axes = curve_figure.curves(frame, None, "t", panels=(Panel(("M3 [N*m]",), levels=levels),)).axes[0]
+    axes = curves.curves(frame, None, "t", panels=(Panel(("M3 [N*m]",), levels=levels),)).axes[0]
     assert said(axes) == ["near 800 N*m", "far 100000 N*m, beyond the scale"]
     assert axes.get_ylim()[1] < 2000
 
@@ -239,14 +240,14 @@ def test_a_level_far_from_the_curves_is_said_not_drawn(frame):
 def test_what_is_nowhere_known_or_marked_nowhere_has_no_point(frame):
     unknown = frame.assign(**{"M3 [N*m]": math.nan})
     panel = Panel(("M3 [N*m]",), marked=("peak", "front dead centre"))
-    assert said(curve_figure.curves(unknown, None, "t", MARKS, (panel,)).axes[0]) == []
-    assert said(curve_figure.curves(frame, None, "t", {}, (panel,)).axes[0]) == ["peak 700 N*m at 0.00 deg"]
+    assert said(curves.curves(unknown, None, "t", MARKS, (panel,)).axes[0]) == []
+    assert said(curves.curves(frame, None, "t", {}, (panel,)).axes[0]) == ["peak 700 N*m at 0.00 deg"]
 
 
 def test_a_table_without_curves_is_refused(tmp_path, frame):
     for empty in (frame[["phi [rad]"]], frame[["psi [rad]"]]):
         with pytest.raises(ValueError, match="phi"):
-            curve_figure.curves(empty, tmp_path / "a.png", "t")
+            curves.curves(empty, tmp_path / "a.png", "t")
 
 
 def test_crank_angles_are_in_the_unit_of_all_angles():

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 import loomopt as lo
+from loomopt.interface.files import dxf, outputs, svg
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Circle, Drawing, Point
-from loomopt.views import dxf, outputs, svg
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

@@ -7,9 +7,10 @@ from xml.etree import ElementTree
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.files import outputs, svg
+from loomopt.interface.text import notebook
 from loomopt.solve.answer.solution import Finding
-from loomopt.views import notebook, outputs, svg
 
 TOO_WIDE = {"limits.swing.min": "30 deg", "limits.swing.max": "31 deg"}
 

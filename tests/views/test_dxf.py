@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from loomopt.interface.files import dxf
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.shapes import LAYERS, Drawing, Line, Point
-from loomopt.views import dxf
 
 ezdxf: Any = importlib.import_module("ezdxf")
 
@@ -16,7 +16,7 @@ PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 WRITE = """
 import sys
 from pathlib import Path
-from loomopt.views import dxf
+from loomopt.interface.files import dxf
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 dxf.write(crank_rocker_drawing.linkage(dict(l1=0.031, l2=0.065, l3=0.155, l4=0.167), "t"), Path(sys.argv[1]))
 """

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from loomopt.base.errors import BadInput
+from loomopt.interface.figures import curves, figure
+from loomopt.interface.files import svg
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-from loomopt.views import curve_figure, figure, svg
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 MARKS = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse begins": 0.89, "pulse ends": 1.41}
@@ -28,7 +29,7 @@ def frame():
 def test_drawing_and_curves_are_written_in_the_format_asked_for(tmp_path, frame, ending):
     for name, write in (
         ("d", lambda path: figure.draw(crank_rocker_drawing.linkage(PAPER, "A $title_ <&"), path)),
-        ("c", lambda path: curve_figure.curves(frame, path, "A $title_ <&", MARKS)),
+        ("c", lambda path: curves.curves(frame, path, "A $title_ <&", MARKS)),
     ):
         path, again = tmp_path / f"{name}{ending}", tmp_path / f"{name}2{ending}"
         write(path)
@@ -59,19 +60,19 @@ def test_another_ending_is_bad_input(tmp_path, frame):
     with pytest.raises(BadInput, match=r"\.png, \.pdf, \.svg"):
         figure.draw(crank_rocker_drawing.linkage(PAPER, "t"), tmp_path / "a.jpg")
     with pytest.raises(BadInput, match=r"\.png, \.pdf, \.svg"):
-        curve_figure.curves(frame, tmp_path / "a.jpg", "t")
+        curves.curves(frame, tmp_path / "a.jpg", "t")
     assert not list(tmp_path.iterdir())
 
 
 def test_the_users_settings_do_not_change_a_figure_and_stay(tmp_path, frame):
-    curve_figure.curves(frame, tmp_path / "a.png", "t", MARKS)
+    curves.curves(frame, tmp_path / "a.png", "t", MARKS)
     with matplotlib.rc_context({"axes.facecolor": "black", "font.size": 30}):
-        curve_figure.curves(frame, tmp_path / "b.png", "t", MARKS)
+        curves.curves(frame, tmp_path / "b.png", "t", MARKS)
         assert matplotlib.rcParams["font.size"] == 30
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_matplotlib_is_imported_only_when_something_is_drawn():
-    script = "import sys, loomopt.views.figure as f; print('matplotlib' in sys.modules)"
+    script = "import sys, loomopt.interface.figures.figure as f; print('matplotlib' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     assert run.stdout == "False\n"

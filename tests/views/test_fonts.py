@@ -6,8 +6,9 @@ import warnings
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
-from loomopt.views import fonts, outputs
+from loomopt.interface.cli.app import run
+from loomopt.interface.figures import figure
+from loomopt.interface.files import outputs
 
 CHINESE = "织机打纬机构"
 FRAKTUR = "\U0001d51a"
@@ -15,14 +16,14 @@ FRAKTUR = "\U0001d51a"
 
 
 def test_a_text_is_written_in_the_first_font_that_has_it():
-    assert fonts.families("Webstuhl, métier à tisser, ткацкий станок: φ ± 5°") == [fonts.OWN]
-    assert len(fonts.families(f"a{FRAKTUR}")) == 2
-    assert fonts.families("") == [fonts.OWN]
+    assert figure.families("Webstuhl, métier à tisser, ткацкий станок: φ ± 5°") == [figure.OWN]
+    assert len(figure.families(f"a{FRAKTUR}")) == 2
+    assert figure.families("") == [figure.OWN]
 
 
 def test_what_no_font_has_takes_no_font_of_boxes():
-    assert fonts.BOXES not in fonts.families("\U0010fffd" + CHINESE)
-    assert fonts._characters(__file__) == frozenset()
+    assert figure.BOXES not in figure.families("\U0010fffd" + CHINESE)
+    assert figure._characters(__file__) == frozenset()
 
 
 @pytest.mark.parametrize(

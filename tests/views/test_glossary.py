@@ -8,10 +8,10 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.quantities import quantity_of
-from loomopt.cli import run
-from loomopt.jobs import registry, sources
+from loomopt.interface.cli.app import run
+from loomopt.interface.text import glossary
+from loomopt.jobs import registry
 from loomopt.model.curves import split
-from loomopt.views import glossary
 
 JOBS = registry.own_names()
 
@@ -74,7 +74,7 @@ def test_a_scene_that_cannot_be_drawn_has_its_symbols_too():
 @pytest.mark.parametrize("job", JOBS)
 def test_sources_name_every_printed_figure_with_the_verdict_and_why(job, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
-    found = sources.read(job)
+    found = glossary.read(job)
     assert found.citation == lo.load(job).source
     assert run(["show", job, "--sources"]) == 0
     out = capsys.readouterr().out

@@ -11,13 +11,13 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.units import DISPLAY_UNIT
+from loomopt.interface.text import scenes
+from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import LAYERS
 from loomopt.scene import packaged
-from loomopt.views import scene_view
-from loomopt.views.layout import Grid
 
 
 def test_every_job_has_its_views():
@@ -52,7 +52,7 @@ def shown(monkeypatch, marks):
     job = SimpleNamespace(today=lambda scene: {}, curves=lambda scene, design: columns, views=views)
     monkeypatch.setattr(registry, "of", lambda scene: job)
     drive: Any = SimpleNamespace(title="Drive", shown_in=DISPLAY_UNIT.__getitem__, unit_for=lambda si: si)
-    head, table = scene_view.curves(drive, {}, None)
+    head, table = scenes.curves(drive, {}, None)
     assert isinstance(table, Grid)
     return head, [float(line[0]) for line in table.lines]
 

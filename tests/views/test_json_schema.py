@@ -14,11 +14,11 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Quantity, foreign, pattern_schema, read
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.text import json_schema
 from loomopt.jobs import registry
 from loomopt.scene import packaged
 from loomopt.scene.scene import TABLES
-from loomopt.views import json_schema
 
 JOBS = registry.own_names()
 SCENES = {name: tomllib.loads(path.read_text("utf-8")) for name, path in packaged.problems().items()}

@@ -3,7 +3,7 @@
 import pytest
 
 import loomopt as lo
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
 from loomopt.scene import packaged
 
 RESULTS = [path.stem.rpartition(".") for path in packaged.results_path().glob("*.csv")]

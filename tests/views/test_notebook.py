@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 import pytest
 
 import loomopt as lo
-from loomopt.views import notebook
-from loomopt.views.layout import Grid
+from loomopt.interface.text import notebook
+from loomopt.interface.text.layout import Grid
 
 EVIL = 'A "loom" <script>alert(1)</script> & more'
 

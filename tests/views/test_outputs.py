@@ -14,9 +14,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.files import outputs
 from loomopt.solve.answer.solution import Evaluation, Finding
-from loomopt.views import outputs
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

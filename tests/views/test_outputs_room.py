@@ -11,9 +11,9 @@ import pytest
 import loomopt as lo
 from loomopt.base import files
 from loomopt.base.errors import BadInput
-from loomopt.cli import run
+from loomopt.interface.cli.app import run
+from loomopt.interface.files import outputs
 from loomopt.solve import engine
-from loomopt.views import outputs
 
 NAMES = ["answer.json", "curves.csv", "linkage.svg", "table.csv"]
 

@@ -10,10 +10,10 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.figures import study
 from loomopt.studies import sweep
 from loomopt.studies.front import front
 from loomopt.studies.run.rows import Row
-from loomopt.views import study_figure
 
 PLAN = sweep.planned(lo.load("beatup"), {"operation.M0": "700:740:10 N*m"}, "torque")
 TODAY = lo.evaluate("beatup")
@@ -29,7 +29,7 @@ def row(point, certified=True):
 
 
 def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs():
-    figure = study_figure.plot(PLAN, [row(0), row(1), row(2, certified=False), row(3), row(4)])
+    figure = study.plot(PLAN, [row(0), row(1), row(2, certified=False), row(3), row(4)])
     axes = figure.axes
     assert [each.get_ylabel() for each in axes[:2]] == ["peak_torque [N*m]", "l2 [mm]"]
     curve = axes[0].get_lines()[0].get_ydata()
@@ -45,7 +45,7 @@ def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs(
 
 def test_without_a_certified_row_there_is_nothing_to_draw():
     with pytest.raises(BadInput, match="no row is certified"):
-        study_figure.plot(PLAN, [row(0, certified=False)])
+        study.plot(PLAN, [row(0, certified=False)])
 
 
 def test_several_lines_have_their_legend_off_the_data():
@@ -53,7 +53,7 @@ def test_several_lines_have_their_legend_off_the_data():
     plan = sweep.planned(lo.load("beatup"), over, "torque")
     places = [(700.0, 0.084), (700.0, 0.085), (710.0, 0.084), (710.0, 0.085)]
     rows = [replace(row(k), place=dict(zip(over, place, strict=True))) for k, place in enumerate(places)]
-    figure = study_figure.plot(plan, rows)
+    figure = study.plot(plan, rows)
     assert [axes.get_legend() for axes in figure.axes] == [None] * len(figure.axes)
     legend = figure.subfigs[0].legends[0]
     assert [text.get_text() for text in legend.get_texts()] == ["bounds.l2.max 84 mm", "bounds.l2.max 85 mm"]
@@ -85,7 +85,7 @@ JUMPING = (
 
 
 def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
-    figure = study_figure.plot(FRONT, JUMPING)
+    figure = study.plot(FRONT, JUMPING)
     panel, listed, *designs = figure.axes
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("m4e [kg]", "peak_torque [N*m]")
     x, y = panel.get_lines()[0].get_data()
@@ -114,7 +114,7 @@ def test_many_changes_close_together_are_numbered_without_meeting():
         spot(k + 2, mass, mass, 96.0 - 3 * mass, [f"{long} max" if k % 2 else "l4 max"])
         for k, mass in enumerate(masses[1:-1])
     ]
-    figure = study_figure.plot(FRONT, rows)
+    figure = study.plot(FRONT, rows)
     panel, listed = figure.axes[:2]
     numbers = [text for text in panel.texts if text.get_text().isdigit()]
     assert len(numbers) >= 23
@@ -125,13 +125,13 @@ def test_many_changes_close_together_are_numbered_without_meeting():
 
 def test_one_design_that_is_best_in_both_is_drawn():
     alone = (replace(JUMPING[0], point=0), replace(JUMPING[0], point=1))
-    figure = study_figure.plot(FRONT, alone)
+    figure = study.plot(FRONT, alone)
     assert [each.get_title() for each in figure.axes[1:]] == ["A: m4e 2 kg\npeak_torque 90 N*m"]
     assert overlaps.found(figure) == []
 
 
 def test_a_front_of_an_inch_machine_is_drawn_in_inches():
     scene = inch.scene("beatup", operation__speed="350 rpm")
-    figure = study_figure.plot(replace(FRONT, scene=front.trade(scene, FRONT.axes, ranges=RANGES).scene), JUMPING)
+    figure = study.plot(replace(FRONT, scene=front.trade(scene, FRONT.axes, ranges=RANGES).scene), JUMPING)
     assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("m4e [lb]", "peak_torque [lbf*in]")
     assert overlaps.found(figure) == []

@@ -4,9 +4,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from loomopt.interface.files import svg
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Drawing, Line, Point, Text
-from loomopt.views import svg
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
 SPACE = "{http://www.w3.org/2000/svg}"

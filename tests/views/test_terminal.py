@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt import api
 from loomopt.base.quantities import read
+from loomopt.interface import api
+from loomopt.interface.text import answers, layout, scenes
+from loomopt.interface.text.layout import Grid
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
 from loomopt.solve.answer.words import Words
-from loomopt.views import layout, scene_view, terminal
-from loomopt.views.layout import Grid
 
 SCENE = load("beatup-light")
 EFFECTS = declared.of("loomopt.physics.effects.beatup")
@@ -96,7 +96,7 @@ def test_the_width_is_the_terminals_and_none_in_a_pipe(monkeypatch, capsys):
 
 
 def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
-    shown = text(*terminal.solution(answer, SCENE))
+    shown = text(*answers.solution(answer, SCENE))
     assert row(shown, "l1") == ["l1", "31", "30", "mm", "30", "...", "35", "min"]
     assert row(shown, "M3_fdc")[-1] == "no", "balance is out of reach"
     assert row(shown, "mu_min") == ["mu_min", "57.0694", "63.8961", "deg", ">=", "56.5"]
@@ -111,15 +111,15 @@ def test_an_optimum_shows_today_design_limits_prices_and_certificate(answer):
 
 def test_rounding_is_shown_as_zero_but_a_small_number_is_not():
     scene = load("beatup")
-    shown = text(*terminal.solution(api.solve(scene), scene))
+    shown = text(*answers.solution(api.solve(scene), scene))
     assert row(shown, "M3_fdc")[1:3] == ["10.0152", "0"]
     tiny = scene.set("effects.inertia.J4", "1e-10 kg*m^2")
-    table = text(terminal.comparison(api.evaluate(tiny), tiny, None, "today"))
+    table = text(answers.comparison(api.evaluate(tiny), tiny, None, "today"))
     assert row(table, "J4")[1] == "1e-10"
 
 
 def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
-    shown = text(*terminal.solution(infeasible, SCENE))
+    shown = text(*answers.solution(infeasible, SCENE))
     assert infeasible.status == "infeasible"
     assert "No admissible design exists" in shown
     assert all(limit in shown for limit in infeasible.clash)
@@ -131,7 +131,7 @@ def test_an_infeasible_target_shows_what_clashes_and_what_helps(infeasible):
 def test_an_uncertified_answer_says_so_first_and_last(answer):
     certificate = dataclasses.replace(answer.certificate, passed=False, reasons=("no minimum",))
     doubtful = dataclasses.replace(answer, status="uncertified", message="Not sure.", certificate=certificate)
-    shown = text(*terminal.solution(doubtful, SCENE))
+    shown = text(*answers.solution(doubtful, SCENE))
     assert shown.startswith("beatup-light, balance: uncertified\nNot sure.")
     assert "Certificate NOT passed: no minimum" in shown
 
@@ -141,21 +141,21 @@ def test_starts_that_ended_elsewhere_are_told(answer):
     told = dataclasses.replace(
         answer, optima=((better, 3), (worse, 2)), solver={**answer.solver, "starts": 5, "starts_at_best": 3}
     )
-    shown = text(*terminal.solution(told, SCENE), columns=None)
+    shown = text(*answers.solution(told, SCENE), columns=None)
     assert "Starts: 3 of 5 reached the best. Other optima: " in shown
     assert "peak_torque 99 N*m (2)" in shown
 
 
 def test_an_evaluated_design_stands_beside_today_and_names_what_it_breaks(answer):
     found = api.evaluate(SCENE, {**answer.design, "l1": 0.02})
-    shown = text(*terminal.evaluation(found, SCENE, api.evaluate(SCENE)))
+    shown = text(*answers.evaluation(found, SCENE, api.evaluate(SCENE)))
     assert shown.startswith("beatup-light: NOT admissible: l1")
     assert row(shown, "l1")[:3] == ["l1", "31", "20"]
-    assert "all limits held" in text(*terminal.evaluation(api.evaluate(SCENE), SCENE, None))
+    assert "all limits held" in text(*answers.evaluation(api.evaluate(SCENE), SCENE, None))
 
 
 def test_a_scene_shows_every_number_with_its_unit():
-    shown = text(*scene_view.parts(SCENE))
+    shown = text(*scenes.parts(SCENE))
     assert row(shown, "operation.speed") == ["operation.speed", "600", "rpm", "62.8318531", "rad/s"]
     assert row(shown, "limits.swing.min") == ["limits.swing.min", "22.9", "deg", "0.399680399", "rad"]
     assert row(shown, "effects.resistance.pulse")[1:3] == ["29.8", "deg"]
@@ -166,8 +166,8 @@ def test_a_scene_shows_every_number_with_its_unit():
 
 @pytest.mark.parametrize("effect", sorted(set(EFFECTS) - set(SCENE.effects)))
 def test_equations_are_short_and_hold_only_what_is_on(effect):
-    off = text(*scene_view.equations(SCENE), columns=None)
-    on = text(*scene_view.equations(SCENE.with_effect(effect)), columns=None)
+    off = text(*scenes.equations(SCENE), columns=None)
+    on = text(*scenes.equations(SCENE.with_effect(effect)), columns=None)
     assert len(off) < 4000
     assert effect not in off
     assert f"\n{effect}\n" in f"\n{on}\n"
@@ -177,10 +177,10 @@ def test_equations_are_short_and_hold_only_what_is_on(effect):
 def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
     scene = SCENE.with_effect("bearing_friction").with_effect("gravity").with_effect("rod_inertia")
     for columns in (80, 120):
-        shown = text(*scene_view.curves(scene, {}, columns), columns=columns)
+        shown = text(*scenes.curves(scene, {}, columns), columns=columns)
         assert max(map(len, shown.splitlines())) <= columns
         assert all(name in shown for name in ("psi_2", "bearing_friction", "M3", "Md"))
-    wide = text(*scene_view.curves(scene, {}, None), columns=None)
+    wide = text(*scenes.curves(scene, {}, None), columns=None)
     front = [line for line in wide.splitlines() if line.startswith(" 65.925 ")]
     assert len(front) == 2
     assert front[0] != front[1]
@@ -190,7 +190,7 @@ def test_curves_fit_the_width_and_show_both_sides_of_a_jump():
 @pytest.mark.parametrize("name", ["beatup-light", "rapier", "shedding", "shedding-static"])
 def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
     found = api.solve(name)
-    shown = text(*terminal.solution(found, found.scene))
+    shown = text(*answers.solution(found, found.scene))
     (line,) = re.findall(r"^to retype: (\{.*?\})", shown, re.MULTILINE | re.DOTALL)
     words, typed = Words(found.scene), json.loads(line)
     assert list(typed) == list(found.design)
@@ -203,10 +203,10 @@ def test_the_design_to_retype_is_the_design_to_the_last_digit(name):
 
 
 def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(answer):
-    assert "Proven" not in text(*terminal.solution(answer, SCENE))
+    assert "Proven" not in text(*answers.solution(answer, SCENE))
     found = api.solve(SCENE, prove=True)
     assert found.proofs.passed
-    shown = text(*terminal.solution(found, SCENE), columns=None)
+    shown = text(*answers.solution(found, SCENE), columns=None)
     lines = shown[shown.index("Proven at every crank angle") :].splitlines()
     block = [lines[0], *(line for line in lines if line.startswith("    "))]
     boxes = sum(proof.boxes for proof in found.proofs.proofs)
@@ -219,12 +219,12 @@ def test_what_was_proven_is_told_in_a_few_lines_and_only_where_it_was_asked_for(
 def test_what_was_not_proven_is_told_beside_what_was(answer):
     found = api.prove(SCENE, {**answer.design, "l1": 0.02})
     assert not found.passed
-    shown = text(*terminal.proven(found), columns=None)
+    shown = text(*answers.proven(found), columns=None)
     missed = [proof for proof in found.proofs if proof.status != "proven"]
     assert shown.splitlines()[-1] == "NOT proven: " + ", ".join(f"{each.text} ({each.status})" for each in missed)
     assert all(each.text not in shown.splitlines()[1] for each in missed)
     none = dataclasses.replace(found, proofs=tuple(missed))
-    assert text(*terminal.proven(none)).startswith("NOT proven: ")
+    assert text(*answers.proven(none)).startswith("NOT proven: ")
 
 
 def test_the_proofs_stand_in_the_json_as_prove_prints_them():

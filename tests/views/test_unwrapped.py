@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt.views import layout
-from loomopt.views.layout import Grid
+from loomopt.interface.text import layout
+from loomopt.interface.text.layout import Grid
 
 LETTERS = st.text("ab  φ²·-≤˙1" + layout.JOINED, max_size=9)
 CELLS = st.lists(LETTERS, min_size=1, max_size=2).map("\n".join)
@@ -66,7 +66,7 @@ def test_what_does_not_fit_or_is_not_as_wide_as_long_is_left_to_rich(part, colum
 
 def test_every_character_that_is_said_to_take_one_cell_takes_one():
     script = (
-        "import sys\nfrom rich.cells import cell_len\nfrom loomopt.views.layout import ONE_CELL\n"
+        "import sys\nfrom rich.cells import cell_len\nfrom loomopt.interface.text.layout import ONE_CELL\n"
         "said = [c for c in map(chr, range(sys.maxunicode + 1)) if ONE_CELL.fullmatch(c)]\n"
         "print(len(said), [c for c in said if cell_len(c) != 1 or c.isspace() and c != ' '])"
     )

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from loomopt.base.errors import BadInput
+from loomopt.interface.figures import figure
+from loomopt.interface.files import dxf, svg
 from loomopt.jobs.rapier import drawing as rapier_drawing
 from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
 from loomopt.maths import systems
@@ -17,7 +19,6 @@ from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
-from loomopt.views import dxf, figure, svg
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

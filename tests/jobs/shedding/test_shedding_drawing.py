@@ -13,6 +13,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.files import dxf, svg
 from loomopt.jobs import registry
 from loomopt.jobs.shedding import drawing as cam_curves
 from loomopt.jobs.shedding import drawing as shedding_drawing
@@ -20,7 +21,6 @@ from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.scene import designs
-from loomopt.views import dxf, svg
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt import tables
+from loomopt.interface import tables
+from loomopt.interface.figures import figure
+from loomopt.interface.files import outputs
+from loomopt.interface.text import scenes
+from loomopt.interface.text.layout import Grid
 from loomopt.model.curves import split
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.scene import designs
-from loomopt.views import figure, outputs, scene_view
-from loomopt.views.layout import Grid
 
 LEAST = {"K1": 102602.609425357, "X0": 0.08}
 PACKAGED = ("shedding", "shedding-static", "shedding-printed-travel")
@@ -148,7 +150,7 @@ def test_a_columns_unit_is_what_stands_in_brackets():
 
 
 def test_the_table_of_curves_leaves_unknown_forces_empty():
-    head, table = scene_view.curves(lo.load("shedding-static"), {}, None)
+    head, table = scenes.curves(lo.load("shedding-static"), {}, None)
     assert isinstance(head, str)
     assert isinstance(table, Grid)
     assert "least cam force at 300.000 deg" in head

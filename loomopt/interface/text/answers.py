@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.quantities import exact
 from loomopt.base.units import factor
+from loomopt.interface.tables import rows
+from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.solution import Evaluation, Solution, remedies
 from loomopt.solve.answer.words import Words
 from loomopt.solve.certificate.verdict import GlobalBound
-from loomopt.tables import rows
-from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:
     from loomopt.solve.proof.whole_cycle import Proofs

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
+from loomopt.interface.text.layout import Grid, joined
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
 from loomopt.solve.answer.words import Words
 from loomopt.studies.effects.worth import LIMITS, Found, Worth
-from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -139,7 +139,7 @@ def frame(found: Found, si: bool = False) -> "pd.DataFrame":
     """Return one line per effect; si: in SI, so that studies of machines in different units can be compared."""
     import pandas as pd
 
-    from loomopt.table_frame import TableFrame
+    from loomopt.interface.tables import TableFrame
 
     words, rows = Words(found.scene), found.rows
     cells: dict[str, object] = {}

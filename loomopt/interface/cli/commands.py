@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from loomopt.base.errors import BadInput
-from loomopt.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
+from loomopt.interface.cli.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
 
 if TYPE_CHECKING:
     from loomopt.scene.designs import Design as DesignGiven
@@ -40,16 +40,16 @@ def remarked(scene: "Scene", design: "DesignGiven") -> None:
 
 def printed(found: "Evaluation") -> None:
     """Print one JSON object."""
-    from loomopt.views import outputs
+    from loomopt.interface.files import outputs
 
     print(outputs.document(found))
 
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
+    from loomopt.interface.text import layout, scenes
     from loomopt.jobs import registry
     from loomopt.scene import packaged
-    from loomopt.views import layout, listing
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
@@ -59,7 +59,7 @@ def list_problems() -> None:
         others, wrong = registry.brought()
         read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
         heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
-    layout.show(listing.grid(sorted(heads)))
+    layout.show(scenes.grid(sorted(heads)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
@@ -88,8 +88,8 @@ def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lis
     """Print the JSON Schema of a scene, for editors."""
     import json
 
+    from loomopt.interface.text import json_schema
     from loomopt.jobs import registry
-    from loomopt.views import json_schema
 
     print(json.dumps(json_schema.scene(registry.declared(job)), indent=1, ensure_ascii=False))
 
@@ -105,17 +105,18 @@ def show(
     off: Without = None,
 ) -> None:
     """Show a scene: as read, its equations, symbols, sources; draw it."""
-    from loomopt.views import glossary, layout, outputs, scene_view
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import glossary, layout, scenes
 
     scene = read_scene(problem, sets, on, off)
     for path in figure or ():
         outputs.picture(path, scene, {})
         remark(f"Wrote {path}")
-    shown: list[str | layout.Grid] = [*scene_view.equations(scene)] if equations else []
+    shown: list[str | layout.Grid] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
     shown += glossary.printed(scene) if sources else []
     if shown or not figure:
-        layout.show(*(shown or scene_view.parts(scene)))
+        layout.show(*(shown or scenes.parts(scene)))
 
 
 def evaluate(
@@ -128,7 +129,7 @@ def evaluate(
     as_json: Json = False,
 ) -> None:
     """Show the figures of a design (today's without one)."""
-    from loomopt import api
+    from loomopt.interface import api
 
     scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
     found = api.evaluate(scene, given, name)
@@ -136,9 +137,9 @@ def evaluate(
     if as_json:
         printed(found)
         return
-    from loomopt.views import layout, terminal
+    from loomopt.interface.text import answers, layout
 
-    layout.show(*terminal.evaluation(found, scene, api.evaluate(scene, None, name) if given else None))
+    layout.show(*answers.evaluation(found, scene, api.evaluate(scene, None, name) if given else None))
 
 
 def prove(
@@ -152,8 +153,9 @@ def prove(
     as_json: Json = False,
 ) -> None:
     """Prove limits and peaks at every crank angle, or show where not."""
-    from loomopt import api
-    from loomopt.views import layout, outputs, terminal
+    from loomopt.interface import api
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import answers, layout
 
     scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
     with Progress() as progress:
@@ -162,7 +164,7 @@ def prove(
     if as_json:
         print(outputs.json_text(found.as_dict()))
     else:
-        layout.show(*terminal.proofs(found))
+        layout.show(*answers.proofs(found))
     raise typer.Exit(0 if found.passed else DIFFERS)
 
 
@@ -182,9 +184,10 @@ def simulate(
     off: Without = None,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
-    from loomopt import api
+    from loomopt.interface import api
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import layout, scenes
     from loomopt.solve.options import check_numbers
-    from loomopt.views import layout, outputs, scene_view
 
     scene, given, name, status = read_asked(problem, design, target, sets, on, off)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
@@ -195,7 +198,7 @@ def simulate(
         outputs.curves(path, scene, given, asked, name, said)
         remark(f"Wrote {path}")
     if not out:
-        layout.show(*scene_view.curves(scene, given, layout.width()))
+        layout.show(*scenes.curves(scene, given, layout.width()))
     remarked(scene, given)
 
 
@@ -211,8 +214,8 @@ def export(
     off: Without = None,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
-    from loomopt import api
-    from loomopt.views import outputs
+    from loomopt.interface import api
+    from loomopt.interface.files import outputs
 
     scene, given, name, status = read_asked(problem, design, target, sets, on, off)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else ""

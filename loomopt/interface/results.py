@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from loomopt.interface.text.notebook import Sketch
     from loomopt.solve.proof.whole_cycle import Proofs
-    from loomopt.views.notebook import Sketch
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,7 +36,7 @@ class Evaluation(solution.Evaluation, records.Shown):
 
     def table(self) -> "pd.DataFrame":
         """Return design and figures, a row each, beside today's machine and the limits, in the scene's own units."""
-        from loomopt import tables
+        from loomopt.interface import tables
 
         return tables.answer(self, self.scene)
 
@@ -45,7 +45,7 @@ class Evaluation(solution.Evaluation, records.Shown):
 
         si: in SI, so that rows of scenes in different units have the same columns; else in the scene's own units.
         """
-        from loomopt import tables
+        from loomopt.interface import tables
 
         return tables.row(self, self.scene, self.sought, self._outcome, si=si)
 
@@ -58,13 +58,14 @@ class Evaluation(solution.Evaluation, records.Shown):
 
         path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
         """
-        from loomopt.views import outputs
+        from loomopt.interface.files import outputs
 
         return outputs.plot(self, self.scene, self.target, None if path is None else Path(path))
 
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
-        from loomopt.views import notebook, outputs
+        from loomopt.interface.files import outputs
+        from loomopt.interface.text import notebook
 
         return notebook.sketch(self.scene, self.design, outputs.what(self))
 
@@ -73,7 +74,7 @@ class Evaluation(solution.Evaluation, records.Shown):
 
         path: .dxf or .svg at true scale; .csv for the joints or the profile.
         """
-        from loomopt.views import outputs
+        from loomopt.interface.files import outputs
 
         outputs.linkage(Path(path), self.scene, self.design, outputs.what(self))
         return Path(path)
@@ -87,7 +88,7 @@ class Evaluation(solution.Evaluation, records.Shown):
 
     def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
         """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`. Raises BadInput."""
-        from loomopt import tables
+        from loomopt.interface import tables
 
         if accuracy is not None:
             check_numbers(accuracy, 1)
@@ -151,7 +152,7 @@ class Answer(Evaluation, solution.Solution):
 
 
 def _html(thing: records.Shown) -> str:
-    from loomopt.views import notebook
+    from loomopt.interface.text import notebook
 
     return notebook.html(thing)
 

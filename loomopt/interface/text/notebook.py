@@ -5,14 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from loomopt.interface.files import outputs, svg
+from loomopt.interface.text import answers, scenes
+from loomopt.interface.text.layout import Grid, spaced
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
 from loomopt.scene.designs import Design
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.solution import Evaluation, Solution
 from loomopt.solve.proof.whole_cycle import Proofs
-from loomopt.views import outputs, scene_view, svg, terminal
-from loomopt.views.layout import Grid, spaced
 
 PAGE = 720
 """Longer side of a drawing on a page of a notebook, pixels."""
@@ -55,13 +56,13 @@ def html(thing: object) -> str:
     """
     match thing:
         case Scene():
-            return page(scene_view.parts(thing), _drawn(thing, {}))
+            return page(scenes.parts(thing), _drawn(thing, {}))
         case Solution(scene=Scene() as scene):
-            return page(terminal.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(answers.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
         case Evaluation(scene=Scene() as scene):
-            return page(terminal.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
+            return page(answers.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
         case Proofs():
-            return page(terminal.proofs(thing))
+            return page(answers.proofs(thing))
     raise TypeError(f"a {type(thing).__name__} is not shown")
 
 

@@ -1,18 +1,20 @@
 """A finished study to work with: its rows as a table, a figure and files, and the whole answer of any row."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt.base import arguments
 from loomopt.base.records import lazy
 from loomopt.base.refusals import refusal
-from loomopt.results import Answer, solved
+from loomopt.interface import study_table
+from loomopt.interface.results import Answer, solved
 from loomopt.scene.scene import Scene
-from loomopt.studies import study_table
+from loomopt.studies.effects import worth
+from loomopt.studies.effects.study import Effects
 from loomopt.studies.run import executors, run
 from loomopt.studies.run.findings import Findings, SceneStudy, counted
 from loomopt.studies.run.rows import Row, digest
@@ -72,9 +74,9 @@ class DesignStudy:
 
         path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
         """
-        from loomopt.views import study_figure
+        from loomopt.interface.figures import study
 
-        drawn: Figure = study_figure.plot(self.study, self.solved, None if path is None else Path(path))
+        drawn: Figure = study.plot(self.study, self.solved, None if path is None else Path(path))
         return drawn
 
     def as_dict(self) -> dict[str, object]:
@@ -148,3 +150,51 @@ def told(study: SceneStudy) -> Mapping[str, object]:
     from loomopt.scene.document import copied
 
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}
+
+
+class EffectsStudy(worth.Found):
+    """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Return one line per effect, units in the column names; si: in SI, else in the scene's own units."""
+        from loomopt.interface.text import effects
+
+        return effects.frame(self, si)
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return the bars of shift and regret beside the tolerance; the figure shows itself in Jupyter.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        """
+        from loomopt.interface.figures import effects
+
+        drawn: Figure = effects.plot(self, None if path is None else Path(path))
+        return drawn
+
+    def __repr__(self) -> str:
+        left = ", ".join(self.left_out) or "nothing"
+        return f"<EffectsStudy {self.scene.name}, {self.target}: at {100 * self.tolerance:g} % {left} may be left out>"
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import effects, notebook
+
+        return notebook.page(effects.parts(self, timed=False))
+
+
+def concluded_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
+    """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
+    found = worth.concluded(study, rows)
+    return EffectsStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
+
+
+def conducted_effects(
+    study: Effects,
+    executor: Executor | run.Making | None = None,
+    count: int | None = None,
+    on_row: run.OnRow | None = None,
+) -> EffectsStudy:
+    """Return a study after running it; count: of worker processes, where there is no executor.
+
+    Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    return concluded_effects(study, run.run(study, who(executor, count), None, on_row))

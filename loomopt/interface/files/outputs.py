@@ -9,9 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt import __version__, tables
+from loomopt import __version__
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
+from loomopt.interface import tables
 from loomopt.jobs import registry
 from loomopt.scene import provenance
 from loomopt.scene.designs import Design, flat
@@ -74,7 +75,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
 
     All of them or, where one cannot be written, none. Returns the files. Raises BadInput.
     """
-    from loomopt.views import svg
+    from loomopt.interface.files import svg
 
     contents = {
         "answer.json": document(solution) + "\n",
@@ -144,7 +145,7 @@ def curves(
     elif ending == ".parquet":
         atomically(path, tables.filed(frame, scene).to_parquet)
     else:
-        from loomopt.views import figure
+        from loomopt.interface.figures import figure
 
         drawn = plotted(frame, scene, flat(design), said)
         atomically(path, functools.partial(figure.save, drawn))
@@ -152,7 +153,7 @@ def curves(
 
 def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Figure":
     """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
-    from loomopt.views import figure
+    from loomopt.interface.figures import figure
 
     if path:
         suffix(path, PICTURES)
@@ -168,8 +169,8 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], sa
 
     design: SI; today's without one. said: what it is, as `what` says it.
     """
+    from loomopt.interface.figures import curves
     from loomopt.picture.panels import in_units
-    from loomopt.views import curve_figure
 
     job, view = registry.of(scene), registry.of(scene).views
     now = job.today(scene)
@@ -180,7 +181,7 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], sa
     subject = name or (GIVEN if design else TODAY)
     title = f"{scene.name}: {subject}{', limits not held' if broken else ''}, curves over the cycle"
     unit = scene.shown_in("angle")
-    drawn: Figure = curve_figure.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
+    drawn: Figure = curves.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
 
 
@@ -208,7 +209,7 @@ def drawing(scene: Scene, design: Design, said: str = "") -> "Drawing":
 
 def linkage(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
-    from loomopt.views import dxf, svg
+    from loomopt.interface.files import dxf, svg
 
     ending = suffix(path, DRAWINGS)
     if ending == ".csv":
@@ -221,7 +222,7 @@ def linkage(path: Path, scene: Scene, design: Design, said: str = "") -> None:
 
 def picture(path: Path, scene: Scene, design: Design, said: str = "") -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
-    from loomopt.views import figure
+    from loomopt.interface.figures import figure
 
     suffix(path, PICTURES)
     atomically(path, functools.partial(figure.draw, drawing(scene, design, said)))

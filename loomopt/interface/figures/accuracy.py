@@ -8,14 +8,14 @@ from typing import Any
 
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
+from loomopt.interface.figures.figure import COLOURS, STYLES, blank, own_style, save
+from loomopt.interface.figures.heads import Entry, head
+from loomopt.interface.files import outputs
+from loomopt.interface.text.layout import Grid, joined
 from loomopt.scene import provenance
 from loomopt.studies.accuracy.accuracy import Study, in_time
 from loomopt.studies.accuracy.ladders import Row, grouped, told
 from loomopt.studies.accuracy.readings import NUMBERS
-from loomopt.views import outputs
-from loomopt.views.figure import COLOURS, STYLES, blank, own_style, save
-from loomopt.views.heads import Entry, head
-from loomopt.views.layout import Grid, joined
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
 LEAST = 1e-17

@@ -20,11 +20,11 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "
 
 import typer
 
-from loomopt import commands, study_commands
 from loomopt.base import interrupts
 from loomopt.base.errors import BadInput
-from loomopt.commands import Free, Json, Problem, Set, With, Without, printed, remarked
-from loomopt.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
+from loomopt.interface.cli import commands, studies
+from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without, printed, remarked
+from loomopt.interface.cli.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
 
 UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
@@ -40,7 +40,7 @@ def start(
 ) -> None:
     """Show the version, or what there is to do."""
     if version:
-        from loomopt import versions
+        from loomopt.interface.cli import versions
 
         print(versions.line())
         raise typer.Exit
@@ -67,7 +67,7 @@ def solve(
     ] = None,
 ) -> None:
     """Solve a problem and certify the answer."""
-    from loomopt import api
+    from loomopt.interface import api
 
     scene = read_scene(problem, sets, on, off, free)
     settings: dict[str, Any] = {"accuracy": read_number("--accuracy", accuracy, float)}
@@ -76,7 +76,7 @@ def solve(
     settings |= {"prove": proven, "everywhere": everywhere}
     out = only("--out", outs)
     if out:
-        from loomopt.views import outputs
+        from loomopt.interface.files import outputs
 
         outputs.check_folder(out)
     with Progress() as progress:
@@ -91,9 +91,9 @@ def solve(
     if as_json:
         printed(answer)
     else:
-        from loomopt.views import layout, terminal
+        from loomopt.interface.text import answers, layout
 
-        layout.show(*terminal.solution(answer, scene))
+        layout.show(*answers.solution(answer, scene))
     if unwritten:
         raise unwritten
     unproven = answer.global_bound is not None and not answer.global_bound.proven
@@ -112,11 +112,13 @@ def accuracy(
     ] = None,
 ) -> None:
     """Show what accuracy costs in time, method by method."""
+    from loomopt.interface.figures import accuracy
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import layout
     from loomopt.studies.accuracy import accuracy as study
-    from loomopt.views import accuracy_figure, layout, outputs
 
     for path in out or ():
-        accuracy_figure.check(path)
+        accuracy.check(path)
     scene = read_scene(problem, sets, on, off)
     climbs: list[study.Climb] = []
     try:
@@ -128,9 +130,9 @@ def accuracy(
             if as_json:
                 print(outputs.json_text(found.as_dict()))
             else:
-                layout.show(*accuracy_figure.parts(found))
+                layout.show(*accuracy.parts(found))
     for path in out or ():
-        accuracy_figure.write(found, path)
+        accuracy.write(found, path)
         remark(f"Wrote {path}")
 
 
@@ -139,8 +141,8 @@ def check(
     write: Annotated[Path | None, typer.Option(metavar="DIR", help="Write new reference tables there instead.")] = None,
 ) -> None:
     """Solve the packaged problems again; compare with results/."""
+    from loomopt.interface.text import layout
     from loomopt.studies import check as study
-    from loomopt.views import layout
 
     if write:
         with Progress() as progress:
@@ -165,7 +167,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     **commands.FIRST,
     "solve": solve,
     **commands.OF_A_DESIGN,
-    **study_commands.STUDIES,
+    **studies.STUDIES,
     "accuracy": accuracy,
     "check": check,
 }

@@ -1,13 +1,17 @@
 """Every symbol that a table shows, in words, and every figure that a source prints."""
 
+import csv
 import math
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from loomopt.base.errors import BadInput
 from loomopt.base.quantities import quantity_of
 from loomopt.base.units import SI_UNIT
-from loomopt.jobs import registry, sources
+from loomopt.interface.tables import PER_SECOND
+from loomopt.interface.text.layout import Grid
+from loomopt.jobs import registry
 from loomopt.model.curves import split
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.schema import Figure, Table
@@ -15,8 +19,37 @@ from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.words import Words
-from loomopt.tables import PER_SECOND
-from loomopt.views.layout import Grid
+
+
+class Printed(NamedTuple):
+    """One printed figure: what is computed from which inputs, in which unit; "reproduces" or else why it does not."""
+
+    key: str
+    item: str
+    inputs: str
+    unit: str
+    printed: str
+    computed: str
+    verdict: str
+    remark: str
+
+
+class Source(NamedTuple):
+    """A source and the figures it prints."""
+
+    citation: str
+    figures: tuple[Printed, ...]
+
+
+def read(job: str) -> Source:
+    """Return the source of a job's scenes. Raises BadInput where the job names none."""
+    place = registry.find(job).resources / "sources.csv"
+    if not place.is_file():
+        remedy = "Where a scene's numbers come from stands in its file: see `loomopt show`"
+        raise BadInput(f"job {job} brings no printed figures", key="--sources", remedy=remedy)
+    first, _, rest = place.read_text(encoding="utf-8").partition("\n")
+    return Source(first.removeprefix("# "), tuple(Printed(**row) for row in csv.DictReader(rest.splitlines())))
+
 
 ORDINALS = ("first", "second", "third")
 GREEK = {"alpha": "α", "beta": "β", "theta": "θ", "phi": "φ", "psi": "ψ", "mu": "μ"}
@@ -144,7 +177,7 @@ def labels(scene: Scene) -> frozenset[str]:
 
 def printed(scene: Scene) -> list[str | Grid]:
     """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why."""
-    source = sources.read(scene.job)
+    source = read(scene.job)
     lines = tuple(
         (each.key, each.printed or "not printed", each.computed, "" if each.unit == "-" else each.unit, each.verdict)
         for each in source.figures

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from loomopt.commands import Free, Json, Problem, Set, With, Without
-from loomopt.shell import Progress, read_number, read_scene, remark
+from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without
+from loomopt.interface.cli.shell import Progress, read_number, read_scene, remark
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from loomopt.design_study import DesignStudy
+    from loomopt.interface.finished import DesignStudy
     from loomopt.studies.run.findings import SceneStudy
     from loomopt.studies.run.rows import Row
 
@@ -152,14 +152,14 @@ def _parted(items: list[str], option: str, example: str, form: str) -> dict[str,
 
 def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
-    from loomopt.design_study import DesignStudy, conducted
+    from loomopt.interface.finished import DesignStudy, conducted
+    from loomopt.interface.text import studies
     from loomopt.studies.run.findings import counted
-    from loomopt.views import study_files
 
     for path in how.out or ():
-        study_files.check_table(path)
+        studies.check_table(path)
     for path in how.figure or ():
-        study_files.check_figure(path)
+        studies.check_figure(path)
     _apart(how)
     rows: dict[int, Row] = {}
 
@@ -184,10 +184,10 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
 
 def _write(found: "DesignStudy", how: Run, more: str = "") -> None:
     """Write tables and figures; more: what is said of them beside their name."""
-    from loomopt.views import study_files
+    from loomopt.interface.text import studies
 
     for path in how.out or ():
-        study_files.table(path, found.table(si=how.si))
+        studies.table(path, found.table(si=how.si))
         remark(f"Wrote {path}{more}")
     drawn = any(row.certified for row in found.rows)
     for path in how.figure or ():
@@ -224,12 +224,13 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
 
 
 def _print(found: "DesignStudy", how: Run) -> None:
-    from loomopt.views import layout, outputs, study_files
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import layout, studies
 
     if how.as_json:
         print(outputs.json_text(found.as_dict()))
     else:
-        layout.show(*study_files.parts(found.study, found.solved, how.si))
+        layout.show(*studies.parts(found.study, found.solved, how.si))
 
 
 def status(rows: "tuple[Row, ...]") -> int:
@@ -255,12 +256,13 @@ def effects(
     as_json: Json = False,
 ) -> None:
     """Show what each effect is worth, and what may be left out."""
-    from loomopt import effects_study
+    from loomopt.interface import finished
+    from loomopt.interface.files import outputs
+    from loomopt.interface.text import effects, layout, studies
     from loomopt.studies.effects.study import planned
-    from loomopt.views import effects_table, layout, outputs, study_files
 
     for path in figure or ():
-        study_files.check_figure(path)
+        studies.check_figure(path)
     count = None if workers is None else read_number("--workers", workers, int)
     scene = read_scene(problem, sets, on, off, free)
     study = planned(scene, target, read_number("--tolerance", tolerance, float))
@@ -270,19 +272,19 @@ def effects(
         rows[row.point] = row
         progress.say(f"{len(rows)} solved")
 
-    def told(found: effects_study.EffectsStudy) -> None:
+    def told(found: finished.EffectsStudy) -> None:
         if as_json:
             print(outputs.json_text(found.as_dict()))
         else:
-            layout.show(*effects_table.parts(found))
+            layout.show(*effects.parts(found))
 
     try:
         with _executor(dask, count) as executor, Progress() as progress:
             progress.say("solving with all effects on")
-            found = effects_study.conducted(study, executor, count, kept)
+            found = finished.conducted_effects(study, executor, count, kept)
     except KeyboardInterrupt:
         if rows:
-            told(effects_study.concluded(study, tuple(rows.values())))
+            told(finished.concluded_effects(study, tuple(rows.values())))
         raise
     told(found)
     for path in figure or ():

@@ -1,13 +1,18 @@
 """Figures by matplotlib: a drawing, and what every figure has in common. No window, no global state."""
 
+import functools
 import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from loomopt.base import files
+from loomopt.interface.files import svg
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import (
     CAPITAL,
@@ -24,7 +29,6 @@ from loomopt.picture.shapes import (
     extent,
     plain,
 )
-from loomopt.views import fonts, svg
 
 SUFFIXES = (".png", ".pdf", ".svg")
 """Formats a figure can be written in."""
@@ -100,7 +104,7 @@ def own_style(*texts: str) -> Iterator[None]:
     """Draw texts in matplotlib's own defaults, whatever the user's settings; a character no font has is a box."""
     from matplotlib import style
 
-    own = {**_STYLE, "font.family": fonts.families("".join(texts))}
+    own = {**_STYLE, "font.family": families("".join(texts))}
     with warnings.catch_warnings(), style.context(["default", own]):
         warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         yield
@@ -109,8 +113,6 @@ def own_style(*texts: str) -> Iterator[None]:
 def blank(width: float, height: float) -> Any:
     """Return an empty figure, inches, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    from loomopt.views.shown_figure import ShownFigure
 
     figure = ShownFigure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
@@ -122,3 +124,48 @@ def _save(figure: Any, path: Path) -> None:
     kind = path.suffix.lower().removeprefix(".")
     metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}[kind]
     figure.savefig(path, format=kind, dpi=150, metadata=metadata)
+
+
+OWN, BOXES = "DejaVu Sans", "Last Resort High-Efficiency"
+"""Fonts that come with matplotlib: the usual one, and one that has a box for every character."""
+
+
+def families(text: str) -> list[str]:
+    """Return the fonts to write a text in, the first that has a character first; what none has stays an empty box."""
+    from matplotlib import font_manager
+
+    lacking = {character for character in text if character.isprintable()} - _characters(font_manager.findfont(OWN))
+    found = [OWN]
+    if lacking:
+        plain = (entry for entry in font_manager.fontManager.ttflist if entry.style == "normal" and entry.weight == 400)
+        for name, path in sorted({(entry.name, entry.fname) for entry in plain if entry.name not in (OWN, BOXES)}):
+            had = lacking & _characters(path)
+            if had:
+                found.append(name)
+                lacking -= had
+    return list(dict.fromkeys(found))
+
+
+@functools.cache
+def _characters(path: str) -> frozenset[str]:
+    """Return the characters that a font file has; none where it cannot be read, or holds pictures of one size."""
+    from matplotlib.ft2font import FT2Font
+
+    try:
+        font = FT2Font(path)
+        return frozenset(map(chr, font.get_charmap())) if font.scalable else frozenset()
+    except (OSError, RuntimeError):
+        return frozenset()
+
+
+DOTS = 110
+"""Per inch of a figure on a page of a notebook."""
+
+
+class ShownFigure(Figure):
+    """A figure as any other of matplotlib's."""
+
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        self.savefig(picture, format="png", dpi=DOTS)
+        return picture.getvalue()

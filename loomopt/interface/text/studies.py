@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.files import atomically, check, suffix
 from loomopt.base.units import show
+from loomopt.interface import study_table
+from loomopt.interface.files import outputs
+from loomopt.interface.study_table import Column
+from loomopt.interface.text.layout import Grid, joined
 from loomopt.scene.provenance import csv
-from loomopt.studies import study_table
 from loomopt.studies.run.findings import Change, SceneStudy, counted
 from loomopt.studies.run.rows import Row
-from loomopt.studies.study_table import Column
-from loomopt.views import outputs
-from loomopt.views.layout import Grid, joined
 
 if TYPE_CHECKING:
     import pandas as pd

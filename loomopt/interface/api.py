@@ -4,11 +4,11 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from loomopt import results
 from loomopt.base.refusals import refusal
+from loomopt.interface import results
+from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs.registry import load, scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
-from loomopt.results import Answer, Evaluation
 from loomopt.scene import designs
 from loomopt.scene.designs import Given as Design
 from loomopt.scene.scene import Scene
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from loomopt.design_study import DesignStudy
-    from loomopt.effects_study import EffectsStudy
+    from loomopt.interface.finished import DesignStudy, EffectsStudy
     from loomopt.solve.proof.whole_cycle import Proofs
     from loomopt.studies.front.front import Given as Ranges
     from loomopt.studies.run.rows import Row
@@ -129,7 +128,7 @@ def simulate(
     the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
     without. Raises BadInput.
     """
-    from loomopt import tables
+    from loomopt.interface import tables
 
     if accuracy is not None:
         check_numbers(accuracy, 1)
@@ -158,7 +157,7 @@ def sweep(
     computes them. store: a file that each row is written to as it comes; resume: takes those that are there. accuracy,
     seed: as in `solve`. on_row(row): called as each is there. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.design_study import conducted
+    from loomopt.interface.finished import conducted
     from loomopt.studies.sweep import planned
 
     study = planned(_scene(scene), over, target, accuracy=accuracy, seed=seed)
@@ -183,11 +182,11 @@ def effects(
     computes it. accuracy, seed: as in `solve`. on_row(row): called as each solve is there. Raises BadInput, and
     KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.effects_study import conducted
+    from loomopt.interface.finished import conducted_effects
     from loomopt.studies.effects.study import planned
 
     study = planned(_scene(scene), target, tolerance, accuracy=accuracy, seed=seed)
-    return conducted(study, executor, workers, on_row)
+    return conducted_effects(study, executor, workers, on_row)
 
 
 def pareto(
@@ -214,7 +213,7 @@ def pareto(
     down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value, and
     KeyboardInterrupt on Ctrl-C.
     """
-    from loomopt.design_study import conducted
+    from loomopt.interface.finished import conducted
     from loomopt.studies.front import front
 
     own = _scene(scene)

@@ -8,12 +8,12 @@ from typing import Any
 
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, suffix
+from loomopt.interface.figures.figure import COLOURS, blank, own_style, save
+from loomopt.interface.figures.heads import Entry, head
+from loomopt.interface.files import outputs
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain
 from loomopt.studies.effects.worth import Found
-from loomopt.views import outputs
-from loomopt.views.figure import COLOURS, blank, own_style, save
-from loomopt.views.heads import Entry, head
 
 WIDTH, BAR, ROOM = 7.0, 0.34, 1.25
 """Inches: of the page, of an effect's bars, beside those of a panel."""

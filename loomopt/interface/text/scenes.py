@@ -2,19 +2,20 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from loomopt.base.units import factor
+from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
 from loomopt.scene.designs import Design, flat
 from loomopt.scene.display import KINDS
+from loomopt.scene.packaged import Head
 from loomopt.scene.scene import Scene, given
 from loomopt.solve.answer.words import Words
-from loomopt.views.layout import GAP, Grid
 
 STEP = 15
 """Crank angle between printed rows, deg."""
@@ -153,3 +154,15 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
     texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
     return f"{symbol}\n[{unit}]", texts
+
+
+def grid(heads: Iterable[Head]) -> Grid:
+    """Return title, targets and source of each scene."""
+    lines: list[tuple[str, str]] = []
+    for head in heads:
+        lines += [
+            (head.name, head.title),
+            ("", f"job {head.job}; targets {', '.join(head.targets)}"),
+            ("", f"source: {head.source or 'not given'}"),
+        ]
+    return Grid("", ("problem", "what it is"), tuple(lines))
