@@ -21,7 +21,7 @@ from loomopt.jobs import registry
 from loomopt.model import reading
 from loomopt.model.program import Program
 from loomopt.physics import tolerances
-from loomopt.solve.nlp import exchange, ipopt, transcribe
+from loomopt.solve.nlp import exchange, transcribe
 from loomopt.solve.nlp.point import Settings, sampler_at
 
 NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -40,7 +40,7 @@ IPOPTS = {
     "IPOPT_TOLERANCE": ("tol", "constr_viol_tol", "compl_inf_tol"),
     "IPOPT_SLOPE": ("dual_inf_tol",),
     "WARM_BARRIER": ("mu_init",),
-    "WARM_PUSH": tuple(name for name in ipopt.WARM if name not in ("mu_init", "warm_start_init_point")),
+    "WARM_PUSH": tuple(name for name in transcribe.WARM if name not in ("mu_init", "warm_start_init_point")),
 }
 
 
@@ -92,7 +92,7 @@ def changed(name: str, value: Any) -> Iterator[None]:
     with ExitStack() as stack:
         for module in modules:
             stack.enter_context(mock.patch.object(module, name, value))
-        for said in (ipopt.IPOPT, ipopt.WARM):
+        for said in (transcribe.IPOPT, transcribe.WARM):
             own = {key: value for key in IPOPTS.get(name, ()) if key in said}
             stack.enter_context(mock.patch.dict(said, own))
         reading.gauss.cache_clear()

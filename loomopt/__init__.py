@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     )
     from loomopt.interface.finished import DesignStudy, EffectsStudy
     from loomopt.scene.scene import Scene
-    from loomopt.solve.proof.whole_cycle import Proofs
+    from loomopt.solve.answer.solution import Proofs
 
 __version__ = "0.1.0"
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.interface.finished import DesignStudy, EffectsStudy
-    from loomopt.solve.proof.whole_cycle import Proofs
+    from loomopt.solve.answer.solution import Proofs
     from loomopt.studies.front.front import Given as Ranges
     from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over

@@ -13,7 +13,8 @@ from loomopt.base.refusals import refusal
 from loomopt.interface import study_table
 from loomopt.interface.results import Answer, solved
 from loomopt.scene.scene import Scene
-from loomopt.studies.effects import worth
+from loomopt.studies.effects import found
+from loomopt.studies.effects.found import concluded
 from loomopt.studies.effects.study import Effects
 from loomopt.studies.run import executors, run
 from loomopt.studies.run.findings import Findings, SceneStudy, counted
@@ -152,7 +153,7 @@ def told(study: SceneStudy) -> Mapping[str, object]:
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}
 
 
-class EffectsStudy(worth.Found):
+class EffectsStudy(found.Found):
     """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
@@ -183,7 +184,7 @@ class EffectsStudy(worth.Found):
 
 def concluded_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:
     """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
-    found = worth.concluded(study, rows)
+    found = concluded(study, rows)
     return EffectsStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
 
 

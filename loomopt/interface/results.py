@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from loomopt.interface.text.notebook import Sketch
-    from loomopt.solve.proof.whole_cycle import Proofs
+    from loomopt.solve.answer.solution import Proofs
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,7 +13,7 @@ from loomopt.interface.figures.heads import Entry, head
 from loomopt.interface.files import outputs
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain
-from loomopt.studies.effects.worth import Found
+from loomopt.studies.effects.found import Found
 
 WIDTH, BAR, ROOM = 7.0, 0.34, 1.25
 """Inches: of the page, of an effect's bars, beside those of a panel."""

@@ -15,7 +15,7 @@ from loomopt.solve.answer.words import Words
 from loomopt.solve.certificate.verdict import GlobalBound
 
 if TYPE_CHECKING:
-    from loomopt.solve.proof.whole_cycle import Proofs
+    from loomopt.solve.answer.solution import Proofs
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:

@@ -9,7 +9,8 @@ from loomopt.interface.text.layout import Grid, joined
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scene.provenance import provenance
 from loomopt.solve.answer.words import Words
-from loomopt.studies.effects.worth import LIMITS, Found, Worth
+from loomopt.studies.effects.found import Found
+from loomopt.studies.effects.worth import LIMITS, Worth
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,7 @@ from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
 from loomopt.scene.designs import Design
 from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Evaluation, Solution
-from loomopt.solve.proof.whole_cycle import Proofs
+from loomopt.solve.answer.solution import Evaluation, Proofs, Solution
 
 PAGE = 720
 """Longer side of a drawing on a page of a notebook, pixels."""

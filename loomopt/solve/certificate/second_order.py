@@ -14,7 +14,6 @@ what an earlier one closes by its curvature alone is read where that level stays
 known to an error of its own, within which it counts as none.
 """
 
-import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,61 +24,13 @@ from loomopt.maths.nnls import least_on_cone
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import FAINT, FALL_MARGIN, FALLEN, FLAT, NEWTON_CURVED, NEWTON_DONE, PROBES, RANK
+from loomopt.physics.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
 from loomopt.solve.certificate.active_set import ActiveSet
 from loomopt.solve.certificate.derivatives import Derivatives
-from loomopt.solve.certificate.feasible_curve import FeasibleCurve, Verdict
+from loomopt.solve.certificate.feasible_curve import FeasibleCurve, Lagrangian, Verdict
 from loomopt.solve.certificate.kkt import Multipliers, System
 from loomopt.solve.certificate.valley import Closed
-from loomopt.solve.nlp.point import sampler_at
 from loomopt.solve.search import settle
-
-
-@dataclass(frozen=True)
-class Lagrangian:
-    """One level's objective and what holds it, in natural sizes.
-
-    x: variables, SI; level: the objective's place; prices: multiplier of each limit by its place, and of each earlier
-    objective by its own.
-    """
-
-    program: Program
-    x: Mapping[str, float]
-    level: int
-    prices: Mapping[int, float]
-    held: Mapping[int, float]
-
-    def falls(self, direction: Mapping[str, float], slope: float) -> bool:
-        """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
-        found = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
-        return all(self.is_lower(there, step, slope) for step, there in found)
-
-    def is_lower(self, there: Mapping[str, float], step: float, slope: float, unsure: float = 0.0) -> bool:
-        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains.
-
-        unsure: what it may differ by there, beside rounding.
-        """
-        return self.fall(there) > FALL_MARGIN * slope * step + FALLEN + unsure
-
-    def fall(self, there: Mapping[str, float]) -> float:
-        """Return by how much it is lower at a design (SI); −∞ where either value is unknown."""
-        base, value = self._base, self.value(there)
-        return -math.inf if base is None or value is None else base - value
-
-    @functools.cached_property
-    def _base(self) -> float | None:
-        return self.value(self.x)
-
-    def value(self, there: Mapping[str, float]) -> float | None:
-        """Return its value at a design (SI); None where the linkage has no real position."""
-        sampler = sampler_at(self.program, there)
-        if sampler is None:
-            return None
-        weights = {self.level: 1.0, **self.held}
-        objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
-        value = sum(weight * (sampler.merit(objective) / objective.scale) for weight, objective in objectives)
-        return value + sum(price * sampler.excess(self.program.limits[k]) for k, price in self.prices.items())
-
 
 FOLLOWED = 3
 """Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall

@@ -15,7 +15,8 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.solve.certificate.verdict import GlobalBound, GlobalLevel, Sense
 from loomopt.solve.options import Everywhere
-from loomopt.solve.proof.box_rows import OpenError, Reader
+from loomopt.solve.proof.reading import Reader
+from loomopt.solve.proof.rows import OpenError
 from loomopt.solve.proof.task import Task, reduced, silent
 from loomopt.solve.proof.tree import Question, Tree, grown, multipliers
 from loomopt.solve.search.search import Search, compared, judged, tried

@@ -12,7 +12,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
 from loomopt.model.program import Limit, Move, Program, Variable
 from loomopt.model.sampling import Sampler
-from loomopt.solve.proof.box_rows import BoxRows, OpenError
+from loomopt.solve.proof.rows import BoxRows, OpenError
 
 
 @dataclass(frozen=True)

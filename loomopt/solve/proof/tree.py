@@ -13,7 +13,7 @@ import numpy as np
 from loomopt.maths.intervals import Floats, Interval, interval
 from loomopt.maths.nnls import nnls
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE
-from loomopt.solve.proof.box_rows import LIMIT, Read, Reader
+from loomopt.solve.proof.reading import LIMIT, Read, Reader
 
 WEIGHT = 100.0
 """Weight of the sum of an objective's multipliers, which is 1, against slopes of natural size."""

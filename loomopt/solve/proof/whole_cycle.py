@@ -6,14 +6,13 @@ touches its limit, so it is proven up to a slack: a share of the quantity's larg
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput
-from loomopt.base.records import Shown
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model import model
@@ -23,72 +22,13 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scene import designs
 from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Solution
+from loomopt.solve.answer.solution import Proof, Proofs, Solution
 from loomopt.solve.answer.words import Words
 from loomopt.solve.certificate.taylor_bounds import Boxes
 from loomopt.solve.options import check_sought, target_name
 
 RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""
-
-
-@dataclass(frozen=True)
-class Proof:
-    """What is shown of one limit, SI.
-
-    margin: by how much the refined value stays clear of the limit, negative where it exceeds it; slack: what is left
-    open; boxes: how many it took; angle: a crank angle, rad, where the limit fails.
-    """
-
-    limit: str
-    text: str
-    status: str
-    margin: float
-    slack: float
-    boxes: int
-    angle: float | None = None
-    kind: Literal["limit", "assembly", "peak"] = "limit"
-
-    @property
-    def said(self) -> str:
-        """What it is of, in a few words."""
-        return self.limit.removeprefix(f"{self.kind} ") if self.kind == "peak" else self.text
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
-        return {name: value for name, value in vars(self).items() if name != "kind"}
-
-
-@dataclass(frozen=True, repr=False)
-class Proofs(Shown):
-    """All proofs of one design; in Jupyter they show themselves as a table."""
-
-    problem: str
-    target: str
-    proofs: tuple[Proof, ...]
-    scene: Scene = field(compare=False)
-    uncovered: tuple[str, ...] = ()
-    """What the proofs rest on and do not cover, each a sentence without its full stop."""
-
-    @property
-    def passed(self) -> bool:
-        """Whether everything is proven."""
-        return all(proof.status == "proven" for proof in self.proofs)
-
-    @property
-    def said(self) -> str:
-        """What came of them, in one sentence."""
-        missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
-        return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
-
-    def __repr__(self) -> str:
-        return f"<Proofs {self.problem}, {self.target}: {self.said}>"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the object `prove --json` prints."""
-        proofs = [proof.as_dict() for proof in self.proofs]
-        found = {"problem": self.problem, "target": self.target, "proofs": proofs}
-        return found | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
 
 
 def prove(

@@ -24,7 +24,7 @@ from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
 from loomopt.studies.run import warm
 
 if TYPE_CHECKING:
-    from loomopt.solve.proof.whole_cycle import Proofs
+    from loomopt.solve.answer.solution import Proofs
 
 Cap = tuple[Traded, float]
 """An axis and the largest value of what is sought the least of."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from machines_in_boxes import solved
 
-from loomopt.solve.proof.box_rows import LIMIT, Reader
+from loomopt.solve.proof.reading import LIMIT, Reader
 from loomopt.solve.proof.tree import multipliers, with_cut
 
 

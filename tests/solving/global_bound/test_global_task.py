@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solve.proof.box_rows import OpenError
+from loomopt.solve.proof.rows import OpenError
 from loomopt.solve.proof.task import reduced
 
 
