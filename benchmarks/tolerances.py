@@ -20,9 +20,8 @@ import harness
 from loomopt.jobs import registry
 from loomopt.model import reading
 from loomopt.model.program import Program
-from loomopt.physics import tolerances
 from loomopt.solve.nlp import exchange, transcribe
-from loomopt.solve.nlp.point import Settings, sampler_at
+from loomopt.solve.nlp.point import PENALTY, Settings, sampler_at
 
 NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
     "beatup": ("operation.M0", ("745 N*m", "752 N*m", "770 N*m")),
@@ -71,7 +70,7 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
     for first, *others in programs:
         near = None
         for program in (first, *others):
-            settings = Settings(penalty=tolerances.PENALTY)
+            settings = Settings(penalty=PENALTY)
             point = exchange.solve(program, exchange.starts(program, 1)[0], settings, near)
             sampler = sampler_at(program, point.x)
             iterations += point.iterations
@@ -85,12 +84,16 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
     return Outcome(tuple(found), excess, iterations, left)
 
 
+def bearers(name: str) -> list[Any]:
+    """Return the modules that have or read a number."""
+    return [m for key, m in list(sys.modules.items()) if key.startswith("loomopt") and hasattr(m, name)]
+
+
 @contextmanager
 def changed(name: str, value: Any) -> Iterator[None]:
     """Give a number another value wherever it is read."""
-    modules = [m for key, m in list(sys.modules.items()) if key.startswith("loomopt") and hasattr(m, name)]
     with ExitStack() as stack:
-        for module in modules:
+        for module in bearers(name):
             stack.enter_context(mock.patch.object(module, name, value))
         for said in (transcribe.IPOPT, transcribe.WARM):
             own = {key: value for key in IPOPTS.get(name, ()) if key in said}
@@ -102,7 +105,7 @@ def changed(name: str, value: Any) -> Iterator[None]:
 
 def variations(name: str) -> tuple[Any, ...]:
     """Return the values a number is given."""
-    value = getattr(tolerances, name)
+    value = next(getattr(m, name) for m in bearers(name))
     if isinstance(value, int):
         return max(1, value // 2), 2 * value
     if name == "FIRST_SHARE":

@@ -16,53 +16,22 @@ PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
-ROOMS = (
-    "jets boxes box_series tracing",
-    "maths errors frozen interrupts tolerances lazy showing",
-    "units",
-    "quantity_patterns",
-    "quantities",
-    "schema files",
-    "mechanisms",
-    "motion",
-    "effects",
-    "scene_errors owned scene_schema arguments",
-    "scene_document scene_paths scene_tables scene_display packaged entry_points",
-    "scenes balance cycle",
-    "designs answers",
-    "scene_csv scene_numbers provenance",
-    "program",
-    "picture",
-    "jobs",
-    "nlp",
-    "solving",
-    "tables table_frame",
-    "studies",
-    "views",
-    "results design_study",
-    "effects_study",
-    "api shell commands study_commands cli versions __main__",
-)
-"""From the ground up: a room may import from its own floor and from those below."""
-FLOOR = {name: floor for floor, names in enumerate(ROOMS) for name in names.split()}
+ROOMS = ("base", "maths", "physics", "scene", "model", "picture", "jobs", "solve", "studies", "interface")
+"""In the order of imports: a room takes from itself and from those before it."""
+FACE = ("__init__", "__main__")
+"""What stands beside the rooms and may take from all of them."""
+FLOOR = {name: floor for floor, name in enumerate((*ROOMS, *FACE))}
+MOST_ENTRIES = 14
+"""Files and folders that a reader finds in the package."""
 IN_A_JOB = {"__init__", "job", "scene", "model", "program", "design", "equations", "drawing", "views"}
 """The files that every job's folder has, beside template.toml."""
-LONGEST_FILE, LONGEST_FUNCTION, MEDIAN_FILE, JOBS_TOGETHER = 350, 50, 150, 4330
 WITHOUT_TYPES = {
-    "nlp",
-    "views.figure",
-    "views.curve_figure",
-    "views.heads",
-    "views.pages",
-    "views.dxf",
-    "views.layout",
-    "views.accuracy_figure",
-    "views.study_figure",
-    "views.effects_figure",
-    "views.study_marks",
-    "picture.equations",
+    *("solve.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),
+    *("maths.systems", "picture.equations"),
 }
-"""Rooms and files at the edge of CasADi, matplotlib, ezdxf, Rich and SymPy, where `Any` may stand."""
+"""Folders and files at the edge of CasADi, matplotlib, ezdxf, Rich and SymPy, where `Any` may stand."""
+MAY_SOLVE = {"interface.api", "interface.results"}
+"""The public functions, and answers that are asked for more."""
 MOST_ANY = 12
 """Annotations `Any` elsewhere, maths.Number apart."""
 
@@ -83,18 +52,11 @@ def parsed(path):
     return tree_of(path.read_text(encoding="utf-8"))
 
 
-def for_types(tree):
-    """Return the nodes that stand under `if TYPE_CHECKING`: no imports at run time."""
-    blocks = [n for n in ast.walk(tree) if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
-    return {id(node) for block in blocks for inner in block.body for node in ast.walk(inner)}
-
-
 @functools.cache
 def imports(source):
-    """Return the loomopt modules that source imports at run time, inside functions too, with the line of each."""
-    tree, names = tree_of(source), []
-    apart = for_types(tree)
-    for node in (node for node in ast.walk(tree) if id(node) not in apart):
+    """Return what source imports of loomopt, inside functions and for types too, with the line of each."""
+    names = []
+    for node in ast.walk(tree_of(source)):
         if isinstance(node, ast.Import):
             names += [(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -113,12 +75,14 @@ def climbing(name, source):
     ]
 
 
-def test_every_module_has_a_room():
-    assert {room(name) for name in modules()} - {"__init__"} == set(FLOOR)
+def test_every_module_has_a_room_and_there_are_few():
+    assert {room(name) for name in modules()} == set(FLOOR)
+    entries = [path.name for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()]
+    assert len(entries) <= MOST_ENTRIES
 
 
-def test_imports_run_upward_only():
-    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items() if name != "__init__"}
+def test_imports_run_one_way():
+    sources = {name: path.read_text(encoding="utf-8") for name, path in modules().items()}
     assert [line for name, source in sources.items() for line in climbing(name, source)] == []
 
 
@@ -137,12 +101,11 @@ def test_an_import_from_above_is_found(source):
 
 def test_imports_of_a_module_below_or_beside_are_allowed():
     below = "from loomopt.model import sampling\nfrom loomopt.base.errors import BadInput"
-    for_reading = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from loomopt.interface.files import svg"
-    assert climbing("jobs.beatup.model", below) == climbing("jobs.beatup.model", for_reading) == []
+    assert climbing("jobs.beatup.model", below) == []
 
 
 def arrows():
-    """Return every module with the modules it imports at run time."""
+    """Return every module with the modules it imports."""
     known = {name.removesuffix(".__init__"): path for name, path in modules().items()}
     found_ = {}
     for name, path in known.items():
@@ -166,12 +129,12 @@ def test_no_file_reaches_itself():
     assert [name for name in graph if name in reached(name)] == []
 
 
-def test_views_never_solve_and_know_no_job():
+def test_what_people_see_never_solves_and_knows_no_job():
     for name, path in modules().items():
-        if room(name) == "views":
-            source = path.read_text(encoding="utf-8")
-            taken = {other for other, _ in imports(source)}
-            assert not {other for other in taken if other.startswith(("nlp", "solving.engine"))}, name
+        if name.startswith("interface."):
+            taken = {other for other, _ in imports(path.read_text(encoding="utf-8"))}
+            if name not in MAY_SOLVE:
+                assert not {other for other in taken if other.startswith(("solve.nlp", "solve.engine"))}, name
             assert not {other for other in taken if re.match(rf"jobs\.({'|'.join(JOBS)})\b", other)}, name
 
 
@@ -189,7 +152,10 @@ def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job
     ):  # "inertia" is a kind of quantity too
         word = re.compile(rf"[\"']{name}[\"']")
         strangers = [n for n, path in modules().items() if word.search(path.read_text("utf-8"))]
-        assert set(strangers) <= {*(n for n in modules() if room(n) == "effects"), *(f"jobs.{j}.scene" for j in JOBS)}
+        assert set(strangers) <= {
+            *(n for n in modules() if n.startswith("physics.effects")),
+            *(f"jobs.{j}.scene" for j in JOBS),
+        }
 
 
 def test_jobs_have_the_same_files():
@@ -212,13 +178,13 @@ def mentions_casadi(source):
 
 def test_only_maths_and_the_solver_rooms_use_casadi():
     users = {room(name) for name, path in modules().items() if mentions_casadi(path.read_text(encoding="utf-8"))}
-    assert users == {"maths", "nlp", "solving"}
+    assert users == {"maths", "solve"}
     assert mentions_casadi("from loomopt.maths import systems as maths\nmaths.casadi()")
     assert mentions_casadi("def f():\n    import casadi as ca")
 
 
 def test_every_effect_is_in_a_file_of_its_name():
-    files = {job: {p.stem for p in (PACKAGE / "effects" / job).glob("*.py")} - {"__init__"} for job in JOBS}
+    files = {job: {p.stem for p in (PACKAGE / "physics" / "effects" / job).glob("*.py")} - {"__init__"} for job in JOBS}
     assert files == {job: set(declared.of(f"loomopt.physics.effects.{job}")) for job in JOBS}
 
 
@@ -231,40 +197,10 @@ def test_ranks_of_a_jobs_effects_differ():
 def test_rows_are_read_in_one_place_and_names_are_never_parted():
     for name, path in modules().items():
         source = path.read_text(encoding="utf-8")
-        if room(name) != "program":
+        if room(name) != "model":
             assert ".residual(" not in source, name
-        if room(name) in {"program", "jobs", "nlp", "solving", "studies", "tables", "views"}:
+        if room(name) in {"model", "jobs", "solve", "studies", "interface"}:
             assert not re.search(r"r?(partition|split)\(\"\.\"", source), name
-
-
-def lines_of(path):
-    return len(path.read_text(encoding="utf-8").splitlines())
-
-
-def bodies():
-    """Yield every function of the package with its lines, its documentation apart."""
-    for name, path in modules().items():
-        for node in ast.walk(parsed(path)):
-            if isinstance(node, ast.FunctionDef):
-                doc = ast.get_docstring(node, clean=False)
-                yield f"{name}.{node.name}", node.end_lineno - node.lineno - (doc.count("\n") + 1 if doc else 0)
-
-
-def test_files_and_functions_end_naturally():
-    lengths = {name: lines_of(path) for name, path in modules().items()}
-    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
-    assert sorted(lengths.values())[len(lengths) // 2] <= MEDIAN_FILE
-    assert {name: lines for name, lines in bodies() if lines > LONGEST_FUNCTION} == {}
-
-
-def test_files_of_tests_end_where_those_of_the_package_do():
-    lengths = {name: lines_of(path) for name, path in modules(TESTS).items()}
-    assert Path(__file__).stem in lengths
-    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
-
-
-def test_jobs_are_small():
-    assert sum(lines_of(path) for job in JOBS for path in (PACKAGE / "jobs" / job).glob("*.py")) <= JOBS_TOGETHER
 
 
 def anything(path):
@@ -278,19 +214,24 @@ def anything(path):
 
 
 def test_types_say_what_they_are():
-    inside = {n: path for n, path in modules().items() if not {n, room(n)} & WITHOUT_TYPES}
+    inside = {n: path for n, path in modules().items() if not n.startswith(tuple(WITHOUT_TYPES))}
     spots = {name: len(anything(path)) for name, path in inside.items() if anything(path)}
     assert sum(spots.values()) <= MOST_ANY, spots
     scenes = [name for name, path in modules().items() if re.search(r"\bscene: Any\b", path.read_text("utf-8"))]
     assert scenes == []
 
 
-def test_every_tolerance_has_one_value_and_says_where_it_comes_from():
-    bodies = [parsed(PACKAGE / room / "tolerances.py").body for room in ("", "studies")]
-    assigned = [(body, node) for body in bodies for node in body if isinstance(node, ast.Assign)]
+def test_tolerances_of_several_files_have_one_value_and_say_where_they_come_from():
+    body = parsed(PACKAGE / "physics" / "tolerances.py").body
+    assigned = [(k, node) for k, node in enumerate(body) if isinstance(node, ast.Assign)]
     names = [n.id for _, node in assigned for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
     assert len(set(names)) == len(names)
-    for body, node in assigned:
-        after = body[body.index(node) + 1]
+    for place, node in assigned:
+        after = body[place + 1]
         said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
-        assert said, f"{names} of line {node.lineno}: nothing is said of it"
+        assert said, f"line {node.lineno}: nothing is said of it"
+    users = {name: path.read_text(encoding="utf-8") for name, path in modules().items() if name != "physics.tolerances"}
+    for _, node in assigned:
+        group = [n.id for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
+        readers = {name for name, text in users.items() if any(re.search(rf"\b{each}\b", text) for each in group)}
+        assert len(readers) > 1, f"{group}: a constant of one file stands there"

@@ -10,7 +10,10 @@ from loomopt.model.model import JobModel
 from loomopt.model.reading import Quantities
 from loomopt.model.sampling import Sampler, Tally, sampled
 from loomopt.physics.cycle import Floats, Node
-from loomopt.physics.tolerances import SPEED_AT_REST, SPEED_MET, SPEED_STEPS
+
+SPEED_AT_REST, SPEED_STEPS, SPEED_MET = 1e-12, 30, 1e-8
+"""Largest speed that keeps a bound: share of the largest value by which one at rest may miss it, for rounding; Newton's
+steps at most, and the share of the speed after which there is none left to take: the next would be its square."""
 
 
 def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most: float, slack: float = 0.0) -> float:

@@ -8,8 +8,12 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.physics.effects.kinds import EVALUATED
-from loomopt.physics.tolerances import COARSEST, MOST_STARTS, TIGHTEST
+from loomopt.physics.tolerances import COARSEST, TIGHTEST
 from loomopt.scene.scene import Scene
+
+MOST_STARTS = 10_000
+"""Starts that may be asked for: hours; more is a slip of the pen."""
+
 
 GAP, SECONDS = 1e-3, 60.0
 """What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""

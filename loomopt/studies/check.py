@@ -18,10 +18,14 @@ from loomopt.solve.answer.words import Words, grouped
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row, Task
-from loomopt.studies.tolerances import REPRODUCED_DESIGN, REPRODUCED_OBJECTIVE
 
 if TYPE_CHECKING:
     import pandas as pd
+
+REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
+"""Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
+which moves more than its objective does."""
+
 
 LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""

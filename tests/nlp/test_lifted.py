@@ -9,8 +9,8 @@ import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
-from loomopt.physics.tolerances import BESIDE_STATIONS, FEW_CHOICES, FIRST_SLOTS, LEADING
-from loomopt.solve.nlp.calls import Calls
+from loomopt.physics.tolerances import FEW_CHOICES
+from loomopt.solve.nlp.calls import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
 from loomopt.solve.nlp.expressions import expressions
 from loomopt.solve.nlp.lifted import Lifts, Options, chosen, identity
 from loomopt.solve.nlp.point import Settings

@@ -13,7 +13,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import tables
 from loomopt.jobs import registry
-from loomopt.physics.tolerances import GAUSS_NODES
+from loomopt.model.reading import GAUSS_NODES
 
 ACCURACIES = [10.0**-power for power in range(2, 12)]
 BEST = ACCURACIES[-1]

@@ -4,8 +4,8 @@ import pytest
 import toy
 
 from loomopt.base.errors import BadInput
-from loomopt.physics.tolerances import COARSEST, MOST_STARTS, TIGHTEST
-from loomopt.solve.options import check_numbers, target_name
+from loomopt.physics.tolerances import COARSEST, TIGHTEST
+from loomopt.solve.options import MOST_STARTS, check_numbers, target_name
 
 SCENE = toy.scene_of(toy.ToyJob(toy.program("x", {"f": lambda v: v["x"]})))
 

@@ -8,10 +8,10 @@ import pytest
 import toy
 
 from loomopt.model.sampling import Sampler
-from loomopt.physics.tolerances import COMPLEMENTARY, LARGEST_PRICE, POSITIVE, STATIONARY
+from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solve.certificate import certificate, kkt, second_order
 from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import Cycle, JudgedLevel, certified, certify
+from loomopt.solve.certificate.certificate import COMPLEMENTARY, LARGEST_PRICE, Cycle, JudgedLevel, certified, certify
 from loomopt.solve.certificate.derivatives_jets import Forward
 from loomopt.solve.certificate.derivatives_mp import Exact
 from loomopt.solve.certificate.kkt import Multipliers

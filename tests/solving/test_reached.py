@@ -6,8 +6,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.jobs.beatup.design import BALANCED
 from loomopt.model.program import Goal, Limit, goals
-from loomopt.physics.tolerances import BALANCED, FEASIBLE
+from loomopt.physics.tolerances import FEASIBLE
 
 ASKED = {
     "beatup": {"balance": ["M3_fdc"], "pulse": [], "torque": ["M3_fdc"], "retrofit": ["M3_fdc"]},

@@ -8,11 +8,11 @@ import pytest
 import toy
 from searches import BAD, GOOD, PROGRAM, candidate, certified, empty, solved
 
-from loomopt.physics.tolerances import FEASIBLE, MOST_ALIKE, SAME_OBJECTIVE
+from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.solve.certificate.verdict import Certificate, Level
 from loomopt.solve.nlp.point import Point, Settings
 from loomopt.solve.search import search as searching
-from loomopt.solve.search.search import Search, compared, judged, objectives
+from loomopt.solve.search.search import MOST_ALIKE, Search, compared, judged, objectives
 
 __all__ = ["certified", "solved"]
 

@@ -8,12 +8,11 @@ import toy
 from searches import BAD, certified, empty, solved
 
 import loomopt as lo
-from loomopt.physics.tolerances import MORE_STARTS
 from loomopt.solve.nlp.point import Point, Settings
 from loomopt.solve.search import multistart
-from loomopt.solve.search.multistart import searched
+from loomopt.solve.search.batch import DESIGNS
+from loomopt.solve.search.multistart import BETTER, MORE_STARTS, searched
 from loomopt.solve.search.search import Search
-from loomopt.solve.search.sizes import BETTER, DESIGNS
 
 __all__ = ["certified", "solved"]
 

@@ -11,8 +11,7 @@ import loomopt as lo
 from loomopt.interface.figures import accuracy as accuracy_figure
 from loomopt.jobs.shedding import design as limit_law
 from loomopt.studies.accuracy import accuracy, optima
-from loomopt.studies.accuracy.ladders import grouped
-from loomopt.studies.tolerances import NO_ORDER
+from loomopt.studies.accuracy.ladders import NO_ORDER, grouped
 from tests.views import overlaps
 
 pytestmark = pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Axes in rows and columns on a page: each as high as it is asked to be, as wide as what stands beside it lets it."""
+"""Figures of curves over the crank angle, on a page: every text stands above its axes, so that none hides a curve."""
 
 import math
 from collections.abc import Mapping, Sequence

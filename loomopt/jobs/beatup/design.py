@@ -9,8 +9,12 @@ from loomopt.model.axes import opposite
 from loomopt.model.numbers import Bounds
 from loomopt.model.program import Goal, Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.physics.tolerances import BALANCED, NO_MASS
+from loomopt.physics.tolerances import NO_MASS
 from loomopt.scene.scene import Scene
+
+BALANCED = 1e-8
+"""|M3| at front dead centre below this share of the peak torque is called zero (words of the beat-up only)."""
+
 
 BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
 """What target balance asks, and may find out of reach."""

@@ -21,7 +21,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.mechanisms.cam_follower import Follower, Stations
 from loomopt.physics.mechanisms.cam_motion import Spline
-from loomopt.physics.tolerances import CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED, SHOWN_AS_ZERO
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.drawing import (
     JOINT,
     Label,
@@ -38,6 +38,11 @@ from loomopt.picture.drawing import (
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive, Units, drawn_units
 from loomopt.scene import provenance
 from loomopt.scene.scene import Scene
+
+CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED = 5e-7, 1e-8, 2.0
+"""How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a huge
+machine; and the chord tolerance that is promised over what is measured."""
+
 
 WIDEST = math.radians(2.0)
 """rad; width of the first intervals."""

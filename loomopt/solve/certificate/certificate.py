@@ -13,17 +13,7 @@ import numpy as np
 
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.tolerances import (
-    COMPLEMENTARY,
-    DOUBT,
-    FEASIBLE,
-    FLAT,
-    JET_ERROR,
-    LARGEST_PRICE,
-    LARGEST_VARIABLE,
-    POSITIVE,
-    STATIONARY,
-)
+from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
 from loomopt.solve.certificate import kkt, second_order
 from loomopt.solve.certificate.active_set import active_set
 from loomopt.solve.certificate.derivatives import Derivatives
@@ -34,6 +24,19 @@ from loomopt.solve.certificate.second_order import Curvature, Local
 from loomopt.solve.certificate.taylor_bounds import between_points, cycle_rows, judged
 from loomopt.solve.certificate.verdict import Binding, Certificate, Level
 from loomopt.solve.nlp.point import Settings
+
+COMPLEMENTARY = 1e-8
+"""Multiplier times distance of a limit: what the objective might still gain by meeting it. The usual accuracy."""
+
+
+LARGEST_PRICE = 1e6
+"""Multiplier above which there is no KKT point: STATIONARY times it is a slope of 1. Hock-Schittkowski's degenerate
+problems end at 2e16, every packaged scene below 1e2."""
+
+
+LARGEST_VARIABLE = 1e8
+"""Variable above which slopes cannot be trusted: floats then resolve no better than 1e-8 of a natural size."""
+
 
 SECOND_ORDER_OPEN = "second order open"
 """The reason of a certificate that neither curvature nor higher orders decide."""

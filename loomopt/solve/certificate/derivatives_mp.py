@@ -14,9 +14,14 @@ from loomopt.model.program import Program
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import DIGITS, FIRST_STEP, NEWTON_SHIFT, ROUNDED, SECOND_STEP, THIRD_STEP
+from loomopt.physics.tolerances import NEWTON_SHIFT, ROUNDED, THIRD_STEP
 from loomopt.solve.certificate.active_set import Row
 from loomopt.solve.certificate.derivatives import Derivatives
+
+DIGITS, FIRST_STEP, SECOND_STEP = 40, "1e-20", "1e-12"
+"""Digits of the number system, and the steps of its differences. First, one-sided: error 1e-20 of both kinds. Second,
+central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-24."""
+
 
 Vector = Sequence[Number] | Floats
 

@@ -20,18 +20,22 @@ from loomopt.base.records import lazy
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import (
-    FALL_GROWTH,
-    FALL_MARGIN,
-    FALLEN,
-    FEASIBLE,
-    POLISH_DONE,
-    POLISH_MET,
-    PROBES,
-)
+from loomopt.physics.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET
 from loomopt.solve.certificate.active_set import Row, moved
 from loomopt.solve.certificate.valley import Closed, inverted
 from loomopt.solve.nlp.point import sampler_at
+
+PROBES = 1e-2, 3e-3
+"""Steps along a direction without curvature at which the Lagrangian is read: at both of them it must fall."""
+
+
+FALLEN, FALL_MARGIN = 1e-12, 10.0
+"""Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
+
+
+FALL_GROWTH = 18.0
+"""How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
+to be doubted: of third order it grows 37 times, of higher more, an error by chance (tests/solving/test_valley.py)."""
 
 
 @dataclass(frozen=True)

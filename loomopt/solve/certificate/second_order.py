@@ -24,13 +24,23 @@ from loomopt.maths.nnls import least_on_cone
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import FAINT, FLAT, NEWTON_CURVED, NEWTON_DONE, RANK
+from loomopt.physics.tolerances import FLAT, RANK
 from loomopt.solve.certificate.active_set import ActiveSet
 from loomopt.solve.certificate.derivatives import Derivatives
 from loomopt.solve.certificate.feasible_curve import FeasibleCurve, Lagrangian, Verdict
 from loomopt.solve.certificate.kkt import Multipliers, System
 from loomopt.solve.certificate.valley import Closed
 from loomopt.solve.search import settle
+
+FAINT = 1e-4
+"""Curvature up to which a direction is looked along at PROBES, for what higher orders do there: at a step of 1e-2 a
+cubic term of size 1 outweighs it (toys of tests/solving/test_adversary.py)."""
+
+
+NEWTON_CURVED, NEWTON_DONE = 1e-5, 1e-13
+"""Curvature that Newton's step may follow: a slope of STATIONARY then moves a design by 0.1 at most. Slope and distance
+that leave nothing to correct: a hundred times rounding."""
+
 
 FOLLOWED = 3
 """Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall

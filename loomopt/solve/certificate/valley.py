@@ -16,11 +16,15 @@ import numpy as np
 from loomopt.base.records import lazy
 from loomopt.model.program import Program
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import RANK, SLOPE_ERROR
+from loomopt.physics.tolerances import RANK
 from loomopt.solve.certificate.active_set import Row, moved
 from loomopt.solve.certificate.derivatives import Derivatives
 from loomopt.solve.certificate.derivatives_jets import Forward
 from loomopt.solve.nlp.point import sampler_at
+
+SLOPE_ERROR = 1e-12
+"""Error of a slope by jets, relative to the largest of a row where that exceeds 1: five times what is seen of
+JET_ERROR. Where an earlier level stays least is found to that over its curvature."""
 
 
 class Moves(NamedTuple):

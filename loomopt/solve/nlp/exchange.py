@@ -14,7 +14,7 @@ import numpy as np
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, Cycle, Floats
-from loomopt.physics.tolerances import BINDING, DRAWS, ELASTIC_ROUNDS, EXCHANGE_ROUNDS, NEEDED, STANDS
+from loomopt.physics.tolerances import BINDING, NEEDED
 from loomopt.solve.nlp.calls import Calls
 from loomopt.solve.nlp.follow import follow
 from loomopt.solve.nlp.ipopt import Answer, run
@@ -22,6 +22,19 @@ from loomopt.solve.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sa
 from loomopt.solve.nlp.polish import polish
 from loomopt.solve.nlp.stations import Family
 from loomopt.solve.nlp.transcribe import Transcription
+
+EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
+"""Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
+creep (tests/solving/test_infeasible.py)."""
+
+
+STANDS = 1e-7
+"""Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
+
+
+DRAWS = 200
+"""Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
+
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""

@@ -6,11 +6,20 @@ from typing import Any
 
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
-from loomopt.physics.tolerances import IPOPT_ITERATIONS, IPOPT_SLOPE, IPOPT_TOLERANCE, WARM_BARRIER, WARM_PUSH
 from loomopt.solve.nlp.elimination import Elimination, Solver
 from loomopt.solve.nlp.expressions import expressions
 from loomopt.solve.nlp.point import Settings, sampler_at
 from loomopt.solve.nlp.structure import Structure, structure
+
+IPOPT_TOLERANCE, IPOPT_SLOPE, IPOPT_ITERATIONS = 1e-11, 1e-9, 300
+"""Where IPOPT stops: rows and complementarity three decades below the usual accuracy, slopes three below STATIONARY;
+and where it gives up: no packaged target takes it a hundred iterations from its first start."""
+
+
+WARM_BARRIER, WARM_PUSH = 1e-8, 1e-10
+"""Barrier that a warm start begins with, which keeps a row of multiplier 1 so far from its bound, and how far a start
+is pushed inside: less than what IPOPT itself left."""
+
 
 IPOPT = {
     "tol": IPOPT_TOLERANCE,

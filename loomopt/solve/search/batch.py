@@ -18,7 +18,10 @@ from loomopt.model.program import Limit, Objective, Program
 from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Sampler, Tally
 from loomopt.physics.cycle import Floats, Node, Pieces
-from loomopt.solve.search.sizes import SCREENED_NODES
+
+SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
+"""A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
+steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
 
 
 class BatchReading(Reading):

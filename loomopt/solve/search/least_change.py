@@ -22,7 +22,11 @@ from loomopt.solve.certificate.certificate import certify
 from loomopt.solve.certificate.verdict import Certificate
 from loomopt.solve.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
 from loomopt.solve.search.settle import unchanging, wished
-from loomopt.solve.search.sizes import CHANGE_WEIGHTS
+
+CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
+"""Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
+the first. IPOPT fails at a large one from afar; from one to the next, pivots lead."""
+
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""

@@ -6,16 +6,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from loomopt.physics.tolerances import MORE_STARTS, SAME_OBJECTIVE
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solve.certificate.kkt import figure_of
 from loomopt.solve.nlp import exchange
 from loomopt.solve.nlp.point import Known, Point, sampler_at
+from loomopt.solve.search.batch import SCREENED_STARTS
 from loomopt.solve.search.elastic import least
 from loomopt.solve.search.search import Candidate, OnStart, Search, at, compared, judged, tried
-from loomopt.solve.search.sizes import BETTER, FLIPS, SCREENED_STARTS
 
 if TYPE_CHECKING:
     from loomopt.solve.search.screening import Screening
+
+MORE_STARTS = 8
+"""Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'
+hardest target (tests/solving/test_rapier_starts.py: more than half do)."""
+
+
+BETTER, FLIPS = 1e-8, 2
+"""What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
+flips."""
+
 
 ELSEWHERE = 1e-3
 """Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""

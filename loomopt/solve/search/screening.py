@@ -14,23 +14,21 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.solve.nlp.stations import roots
-from loomopt.solve.search.batch import Batch, Judged
-from loomopt.solve.search.sizes import (
-    APART,
-    CLOSER_TOGETHER,
-    DESIGNS,
-    FAR_END,
-    FEWEST,
-    LEVELS_APART,
-    LONGEST_STEP,
-    MOST_NODES,
-    MOVED_SHARE,
-    PROJECTIONS,
-    REGULAR,
-    SCREENED_STARTS,
-    VIOLATION_WEIGHT,
-    WORST,
-)
+from loomopt.solve.search.batch import DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS, Batch, Judged
+
+MOST_NODES, FEWEST = 65536, 32
+"""Nodes of all designs together, where a cycle has many of its own, and the fewest designs that are looked at."""
+
+
+APART, CLOSER_TOGETHER, FAR_END, LONGEST_STEP = 0.35, 0.6, 0.02, 0.3
+"""Of the box of variables: distance of starts (rms), its factor until there are enough, what a flipped variable stays
+from its end, and the longest step of a projection."""
+
+
+LEVELS_APART, VIOLATION_WEIGHT, WORST, REGULAR = 100.0, 10.0, 10.0, 1e-6
+"""A search's merit in natural sizes: factor between objectives, weight of the worst violation, and what stands for no
+value; share of a row's own size by which its projection is held regular."""
+
 
 Start = dict[str, float]
 

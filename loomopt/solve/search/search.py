@@ -11,21 +11,29 @@ from loomopt.model.program import Program
 from loomopt.physics.tolerances import (
     CORRECTIONS,
     FEASIBLE,
-    HELD_MARGIN,
-    MOST_ALIKE,
     POLISH_FARTHER,
     PRECISE,
     ROUNDING,
     SAME_OBJECTIVE,
     STATIONARY,
-    STRONGER,
-    STRONGEST_PENALTY,
 )
 from loomopt.solve.certificate.certificate import certify
 from loomopt.solve.certificate.verdict import Certificate
 from loomopt.solve.nlp import exchange
 from loomopt.solve.nlp.point import Known, Point, Settings, sampler_at
 from loomopt.solve.search.settle import settle
+
+MOST_ALIKE = 4
+"""Points of one optimum that are put to the certificate where the first does not pass."""
+
+
+STRONGER, STRONGEST_PENALTY = 100.0, 1e7
+"""Factor on the weight between levels where a level gave way; the largest weight that IPOPT still solves to 1e-9."""
+
+
+HELD_MARGIN = 2.0
+"""A level's weight must exceed its multiplier [exact penalty: Nocedal and Wright, section 17.2], by this factor."""
+
 
 OnStart = Callable[[int, int], None]
 

@@ -11,7 +11,19 @@ import numpy as np
 from loomopt.model.program import Limit, Move, Program, Wish
 from loomopt.model.sampling import sampled
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import ACTIVE, BEYOND, GIVES_WAY, MOVED, SETTLE_BISECTIONS, SETTLE_NODES, UNCHANGED
+from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
+
+UNCHANGED = 1e-10
+"""Change of an objective along a move that costs nothing: a hundredth of the usual accuracy (silent levels)."""
+
+
+BEYOND = 1e-3
+"""Share of a variable by which a flat move is tried beyond the design too: a bump at both ends of it would show."""
+
+
+SETTLE_BISECTIONS, SETTLE_NODES = 60, 64
+"""Halvings of a silent level's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
+
 
 Numbers = Mapping[str, float]
 

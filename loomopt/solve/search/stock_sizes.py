@@ -3,10 +3,13 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from loomopt.physics.tolerances import FARTHEST_SIZE, SAME_SIZE
 from loomopt.scene.scene import Scene
 from loomopt.solve.answer.solution import Solution
 from loomopt.solve.answer.words import Words
+
+FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
+"""Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
+
 
 Solve = Callable[[Scene], Solution]
 Tried = tuple[float, Solution]

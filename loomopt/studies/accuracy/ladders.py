@@ -16,7 +16,13 @@ import numpy as np
 from loomopt.base.errors import BadInput
 from loomopt.maths.systems import Number
 from loomopt.model.sampling import Tally
-from loomopt.studies.tolerances import LEAST_ORDER, NO_ORDER, ONE_ORDER, STILL, TIGHTER
+
+TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
+"""Work-precision rows: how many times better a reference is known than the error it judges; errors that are rounding;
+factor of the least error within which errors have stopped falling; factor of the middle slope within which slopes are
+one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 %
+(test_accuracy_ladders)."""
+
 
 Setting = float | int | str
 EPSILON = float(np.finfo(float).eps)

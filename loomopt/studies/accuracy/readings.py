@@ -15,8 +15,8 @@ from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.solve.nlp import expressions
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference
+from loomopt.studies.accuracy.reference_digits import EXTREME_STEPS, REFERENCE_SLOPE
 from loomopt.studies.accuracy.subject import POSITIONS, Subject
-from loomopt.studies.tolerances import EXTREME_STEPS, REFERENCE_SLOPE
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"

@@ -24,7 +24,11 @@ from loomopt.solve.answer.solution import Solution
 from loomopt.studies import check
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Reference
-from loomopt.studies.tolerances import CLOSED_DIGITS, REFERENCE_ACCURACY, REFERENCE_DIGITS
+from loomopt.studies.accuracy.reference_digits import CLOSED_DIGITS, REFERENCE_DIGITS
+
+REFERENCE_ACCURACY = 1e-11
+"""Accuracy of the answers that references start from: the finest that can be asked."""
+
 
 POSITIONS = 24
 """Crank angles, evenly over the turn, at which closed forms are compared."""

@@ -1,4 +1,4 @@
-"""The effects that a study of them knows: those whose values stand in the scene, and which of these combine."""
+"""Studies of what each effect is worth: which effects are known, the plan of the study, its course."""
 
 import functools
 import json
