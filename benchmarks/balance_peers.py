@@ -21,8 +21,8 @@ import plain_beatup as plain
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.nlp import exchange, transcribe
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange, transcribe
+from loomopt.solving.nlp.point import Settings
 
 SWEEP = range(600, 901, 10)
 BEFORE, SINGLE = 590, 745

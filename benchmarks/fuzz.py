@@ -194,7 +194,7 @@ def called(arguments: list[str]) -> str:
 def scenes(draw: random.Random, folder: Path) -> str:
     """Spoil a packaged scene, as tables or as bytes; evaluate what is read, and solve some of it."""
     import loomopt as lo
-    from loomopt.scene import packaged
+    from loomopt.scenes import packaged
 
     problem = draw.choice(PROBLEMS)
     try:

@@ -2,7 +2,7 @@
 
     python benchmarks/mutants.py [--count 150] [--seed 0] [--workers 2] [--only FILE] [--list]
 
-A fixed random choice of small changes in loomopt/solve, loomopt/solve/nlp and loomopt/physics/tolerances.py is made one
+A fixed random choice of small changes in loomopt/solving and loomopt/physics/tolerances.py is made one
 at a time, in a copy of the package, and the tests that mirror the changed file are run against it:
 tests/ROOM/test_FILE*.py (for a tolerance, those of every file that reads it). A mutant that no test notices survives,
 and is printed. Tests that fail without any mutant would notice everything, so each is run on the files as they are
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[1]
-ROOMS = ("solving", "nlp")
+ROOMS = ("solving",)
 TOLERANCES = "loomopt/physics/tolerances.py"
 SECONDS = 600
 """After which a mutant has been noticed: it does not end."""

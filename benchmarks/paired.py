@@ -61,7 +61,7 @@ def case(name: str) -> tuple[Any, str, Any]:
 def work(name: str, what: str) -> Callable[[], Any]:
     """Return one piece of work."""
     import loomopt as lo
-    from loomopt.solve.nlp import transcribe
+    from loomopt.solving.nlp import transcribe
 
     scene, target, neighbour = case(name)
 

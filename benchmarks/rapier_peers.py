@@ -23,8 +23,8 @@ from scipy.optimize import differential_evolution, minimize
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings
 
 KNOWN = 0.6949847535697
 """Best-known peak |S''|, m/rad²: see `best_known`."""

@@ -29,7 +29,7 @@ import plain_shedding as plain
 from mpmath import mp
 
 import loomopt as lo
-from loomopt.solve.nlp import transcribe
+from loomopt.solving.nlp import transcribe
 
 SCENES = {"shedding": plain.PAPER, "shedding-printed-travel": plain.PRINTED}
 SMOOTH = ("cycloidal", "modified_sine", "modified_trapezoid", "polynomial_345")

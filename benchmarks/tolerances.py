@@ -20,8 +20,8 @@ import harness
 from loomopt.jobs import registry
 from loomopt.model import reading
 from loomopt.model.program import Program
-from loomopt.solve.nlp import exchange, transcribe
-from loomopt.solve.nlp.point import PENALTY, Settings, sampler_at
+from loomopt.solving.nlp import exchange, transcribe
+from loomopt.solving.nlp.point import PENALTY, Settings, sampler_at
 
 NEIGHBOURS: dict[str, tuple[str, tuple[str, ...]]] = {
     "beatup": ("operation.M0", ("745 N*m", "752 N*m", "770 N*m")),

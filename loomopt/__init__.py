@@ -21,8 +21,8 @@ if TYPE_CHECKING:
         sweep,
     )
     from loomopt.interface.finished import DesignStudy, EffectsStudy
-    from loomopt.scene.scene import Scene
-    from loomopt.solve.answer.solution import Proofs
+    from loomopt.scenes.scene import Scene
+    from loomopt.solving.answer.solution import Proofs
 
 __version__ = "0.1.0"
 
@@ -32,8 +32,8 @@ _HOMES = {
     "DesignStudy": "loomopt.interface.finished",
     "EffectsStudy": "loomopt.interface.finished",
     "Evaluation": "loomopt.interface.api",
-    "Proofs": "loomopt.solve.proof.whole_cycle",
-    "Scene": "loomopt.scene.scene",
+    "Proofs": "loomopt.solving.proof.whole_cycle",
+    "Scene": "loomopt.scenes.scene",
     "effects": "loomopt.interface.api",
     "evaluate": "loomopt.interface.api",
     "load": "loomopt.interface.api",

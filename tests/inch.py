@@ -6,7 +6,7 @@ from typing import Any
 import loomopt as lo
 from loomopt.base.quantities import exact, read
 from loomopt.base.units import SI_UNIT, QuantityError, parse_unit
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 UNITS = {
     "length": "in",

@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.files import outputs
-from loomopt.scene import answers
+from loomopt.scenes import answers
 
 SCENE = lo.load("beatup")
 CHANGED = SCENE.set("operation.M0", "700 N*m").with_effect("gravity").without_effect("resistance")

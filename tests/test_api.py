@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.scene.packaged import problems
-from loomopt.solve.answer import solution
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.search import search
+from loomopt.scenes.packaged import problems
+from loomopt.solving.answer import solution
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.search import search
 
 SCENE = lo.load("beatup-light")
 

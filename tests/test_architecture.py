@@ -16,7 +16,7 @@ PACKAGE = Path(loomopt.__file__).parent
 TESTS = Path(__file__).parent
 JOBS = registry.own_names()
 
-ROOMS = ("base", "maths", "physics", "scene", "model", "picture", "jobs", "solve", "studies", "interface")
+ROOMS = ("base", "maths", "physics", "scenes", "model", "picture", "jobs", "solving", "studies", "interface")
 """In the order of imports: a room takes from itself and from those before it."""
 FACE = ("__init__", "__main__")
 """What stands beside the rooms and may take from all of them."""
@@ -26,7 +26,7 @@ MOST_ENTRIES = 14
 IN_A_JOB = {"__init__", "job", "scene", "model", "program", "design", "equations", "drawing", "views"}
 """The files that every job's folder has, beside template.toml."""
 WITHOUT_TYPES = {
-    *("solve.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),
+    *("solving.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),
     *("maths.systems", "picture.equations"),
 }
 """Folders and files at the edge of CasADi, matplotlib, ezdxf, Rich and SymPy, where `Any` may stand."""
@@ -91,8 +91,8 @@ def test_imports_run_one_way():
     [
         "from loomopt.interface.files import svg",
         "from loomopt.interface import tables; from loomopt.base import errors",
-        "def f():\n    import loomopt.solve.engine",
-        "import importlib\nimportlib.import_module('loomopt.solve.nlp.exchange')",
+        "def f():\n    import loomopt.solving.engine",
+        "import importlib\nimportlib.import_module('loomopt.solving.nlp.exchange')",
     ],
 )
 def test_an_import_from_above_is_found(source):
@@ -134,7 +134,7 @@ def test_what_people_see_never_solves_and_knows_no_job():
         if name.startswith("interface."):
             taken = {other for other, _ in imports(path.read_text(encoding="utf-8"))}
             if name not in MAY_SOLVE:
-                assert not {other for other in taken if other.startswith(("solve.nlp", "solve.engine"))}, name
+                assert not {other for other in taken if other.startswith(("solving.nlp", "solving.engine"))}, name
             assert not {other for other in taken if re.match(rf"jobs\.({'|'.join(JOBS)})\b", other)}, name
 
 
@@ -178,7 +178,7 @@ def mentions_casadi(source):
 
 def test_only_maths_and_the_solver_rooms_use_casadi():
     users = {room(name) for name, path in modules().items() if mentions_casadi(path.read_text(encoding="utf-8"))}
-    assert users == {"maths", "solve"}
+    assert users == {"maths", "solving"}
     assert mentions_casadi("from loomopt.maths import systems as maths\nmaths.casadi()")
     assert mentions_casadi("def f():\n    import casadi as ca")
 
@@ -199,7 +199,7 @@ def test_rows_are_read_in_one_place_and_names_are_never_parted():
         source = path.read_text(encoding="utf-8")
         if room(name) != "model":
             assert ".residual(" not in source, name
-        if room(name) in {"model", "jobs", "solve", "studies", "interface"}:
+        if room(name) in {"model", "jobs", "solving", "studies", "interface"}:
             assert not re.search(r"r?(partition|split)\(\"\.\"", source), name
 
 

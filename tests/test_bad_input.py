@@ -9,7 +9,7 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs.registry import load, scene
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from loomopt.base.errors import BadInput
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs.registry import load, scene
-from loomopt.scene import packaged
-from loomopt.scene.scene import Scene
+from loomopt.scenes import packaged
+from loomopt.scenes.scene import Scene
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")

@@ -19,9 +19,9 @@ from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
-from loomopt.scene.packaged import problem_names
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.search import search
+from loomopt.scenes.packaged import problem_names
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.search import search
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]

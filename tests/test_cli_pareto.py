@@ -141,7 +141,7 @@ def test_no_admissible_design_is_exit_3(cli):
 
 
 def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
-    from loomopt.scene import packaged
+    from loomopt.scenes import packaged
 
     text = packaged.problems()["shedding"].read_text()
     loose = "\n".join(line for line in text.splitlines() if not line.startswith("K1 = {"))

@@ -10,7 +10,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.cli.app import run
-from loomopt.solve.certificate import taylor_bounds
+from loomopt.solving.certificate import taylor_bounds
 
 KEYS = ["limit", "text", "status", "margin", "slack", "boxes", "angle"]
 DEFAULTS = {"beatup": "balance", "rapier": "stroke-dwell", "shedding": "stiffness"}

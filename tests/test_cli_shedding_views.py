@@ -13,7 +13,7 @@ import pytest
 import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.interface.text import answers, layout, scenes
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

@@ -9,7 +9,7 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs.registry import load
-from loomopt.scene import designs
+from loomopt.scenes import designs
 
 SCENE = load("beatup")
 DESIGN = {"l1": 0.03, "l2": 0.077, "l3": 0.148, "l4": 0.167, "m4e": 6.3, "r4e": 0.08}

@@ -14,8 +14,8 @@ from loomopt.interface.cli.app import run
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.scenes import curves, parts
 from loomopt.jobs import registry
-from loomopt.scene import packaged
-from loomopt.solve.answer.words import Words
+from loomopt.scenes import packaged
+from loomopt.solving.answer.words import Words
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
 TABLE = {"targets__match__table": str(WISH)}

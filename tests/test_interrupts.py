@@ -69,8 +69,8 @@ def is_stopped(done):
 @pytest.mark.parametrize(
     "module",
     ["loomopt.interface.cli.app", "typer", "pydantic", "loomopt.base.errors", "loomopt.jobs.beatup.job",
-     "loomopt.scene.scene", "numpy.linalg", "casadi", "numpy", "loomopt.solve.certificate.certificate",
-     "rich.table", "loomopt.solve.engine"],
+     "loomopt.scenes.scene", "numpy.linalg", "casadi", "numpy", "loomopt.solving.certificate.certificate",
+     "rich.table", "loomopt.solving.engine"],
 )  # fmt: skip
 def test_ctrl_c_during_an_import_stops_cleanly(module):
     assert is_stopped(called(sys.executable, "-c", HIT, module, "solve", "beatup"))

@@ -18,7 +18,7 @@ import loomopt
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -18,9 +18,9 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.scene import RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load, scene
-from loomopt.scene import packaged
-from loomopt.scene.scene import Scene
-from loomopt.scene.tables import Bound, Limit
+from loomopt.scenes import packaged
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import Bound, Limit
 from loomopt.studies.check import served
 
 BEATUP = load("beatup")
@@ -268,7 +268,7 @@ def test_reading_imports_little():
         "import sys, types, pydantic\n"
         "class Warm(pydantic.BaseModel): x: float = 0.0\n"
         "alone = sys.modules['loomopt'] = types.ModuleType('loomopt'); alone.__path__ = [sys.argv[1]]\n"
-        "before = set(sys.modules); import loomopt.scene.scene\n"
+        "before = set(sys.modules); import loomopt.scenes.scene\n"
         "new = set(sys.modules) - before; print(len(new), [name for name in sys.argv[2:] if name in new])"
     )
     heavy = ["numpy", "pint", "scipy", "pandas", "sympy", "matplotlib", "casadi", "importlib.metadata"]

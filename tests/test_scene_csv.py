@@ -9,7 +9,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.base.quantities import plain_number
 from loomopt.jobs.rapier.scene import match_table
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 HEAD = "phi1 [deg],S [mm]\n"
 ROWS = [f"{30 * k},{k}" for k in range(12)]

@@ -5,7 +5,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
-from loomopt.scene.display import KINDS
+from loomopt.scenes.display import KINDS
 
 SHEDDING = lo.load("shedding")
 RAPIER = lo.load("rapier")

@@ -16,8 +16,8 @@ from loomopt.model import numbers
 from loomopt.physics.effects.beatup import inertia, rocker_inertia
 from loomopt.physics.effects.kinds import Clash, Load, label, owned, ranked
 from loomopt.physics.schema import Figure, Table
-from loomopt.scene import scene
-from loomopt.scene.tables import Bound, Limit
+from loomopt.scenes import scene
+from loomopt.scenes.tables import Bound, Limit
 
 BEATUP = load("beatup")
 

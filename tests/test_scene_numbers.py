@@ -4,7 +4,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.scene.numbers import files, quantity
+from loomopt.scenes.numbers import files, quantity
 
 
 @pytest.mark.parametrize(

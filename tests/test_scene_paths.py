@@ -11,8 +11,8 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs.rapier.scene import match_table
-from loomopt.scene import packaged
-from loomopt.scene.document import Paths
+from loomopt.scenes import packaged
+from loomopt.scenes.document import Paths
 
 SECRET = "password=correct-horse-battery"
 SHEDDING = packaged.problems()["shedding"].read_text(encoding="utf-8")

@@ -74,7 +74,9 @@ def test_the_list_reads_heads_of_scenes_and_computes_nothing():
     code, modules = imported("list")
     assert code == 0
     assert packages(modules) <= WORDS | HELPERS
-    assert not {name for name in modules if name.startswith(("loomopt.jobs", "loomopt.scene.scene", "loomopt.physics"))}
+    assert not {
+        name for name in modules if name.startswith(("loomopt.jobs", "loomopt.scenes", "loomopt.physics"))
+    }
 
 
 def test_only_commands_that_solve_import_casadi():

@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.base.units import factor, parse_unit
 from loomopt.interface import tables
 from loomopt.interface.files import outputs
-from loomopt.scene import provenance
+from loomopt.scenes import provenance
 
 SCENE = lo.load("beatup")
 

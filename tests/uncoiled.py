@@ -3,7 +3,7 @@
 import re
 
 import loomopt as lo
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 BOUNDS = ("wire", "diameter", "turns", "initial_tension")
 """Numbers of the coil that these scenes bound."""

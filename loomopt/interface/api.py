@@ -9,12 +9,12 @@ from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs.registry import load, scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
-from loomopt.scene import designs
-from loomopt.scene.designs import Given as Design
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer import solution
-from loomopt.solve.options import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
+from loomopt.scenes import designs
+from loomopt.scenes.designs import Given as Design
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer import solution
+from loomopt.solving.options import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from loomopt.interface.finished import DesignStudy, EffectsStudy
-    from loomopt.solve.answer.solution import Proofs
+    from loomopt.solving.answer.solution import Proofs
     from loomopt.studies.front.front import Given as Ranges
     from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over
@@ -109,7 +109,7 @@ def prove(
     the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
     over the cycle. Raises BadInput.
     """
-    from loomopt.solve.proof import whole_cycle
+    from loomopt.solving.proof import whole_cycle
 
     own = _scene(scene)
     return whole_cycle.prove(own, _design(design, own), target, slack)
@@ -231,7 +231,7 @@ def _design(given: Design | solution.Evaluation | None, scene: Scene) -> dict[st
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
     if isinstance(given, solution.Evaluation):
         if given.scene:
-            from loomopt.scene import answers
+            from loomopt.scenes import answers
 
             answers.check_job(given.scene.job, scene, "<answer>")
         given = given.design

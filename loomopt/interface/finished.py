@@ -12,7 +12,7 @@ from loomopt.base.records import lazy
 from loomopt.base.refusals import refusal
 from loomopt.interface import study_table
 from loomopt.interface.results import Answer, solved
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 from loomopt.studies.effects import found
 from loomopt.studies.effects.found import concluded
 from loomopt.studies.effects.study import Effects
@@ -148,7 +148,7 @@ def who(executor: Executor | run.Making | None, count: int | None) -> Executor |
 
 def told(study: SceneStudy) -> Mapping[str, object]:
     """Return what a store says of a study: what its key is made of, and the scene that makes it again."""
-    from loomopt.scene.document import copied
+    from loomopt.scenes.document import copied
 
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}
 

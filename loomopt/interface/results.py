@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base import records
 from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
-from loomopt.scene import designs
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer import solution
-from loomopt.solve.options import check_numbers, target_name
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer import solution
+from loomopt.solving.options import check_numbers, target_name
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from loomopt.interface.text.notebook import Sketch
-    from loomopt.solve.answer.solution import Proofs
+    from loomopt.solving.answer.solution import Proofs
 
 
 @dataclass(frozen=True, repr=False)
@@ -96,7 +96,7 @@ class Evaluation(solution.Evaluation, records.Shown):
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
-        from loomopt.solve.proof import whole_cycle
+        from loomopt.solving.proof import whole_cycle
 
         design = designs.checked(self.design, self.scene)
         return (
@@ -119,7 +119,7 @@ class Evaluation(solution.Evaluation, records.Shown):
     def _told(self) -> str:
         """What a designer asks first: the figures that the target is about."""
         from loomopt.jobs import registry
-        from loomopt.solve.answer.words import Words
+        from loomopt.solving.answer.words import Words
 
         if self.terms:
             asked = list(self.terms.axes)

@@ -12,11 +12,11 @@ from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.physics.effects.kinds import Event
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
-from loomopt.scene import designs
-from loomopt.scene.provenance import provenance
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Evaluation, Solution
-from loomopt.solve.answer.words import Words
+from loomopt.scenes import designs
+from loomopt.scenes.provenance import provenance
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluation, Solution
+from loomopt.solving.answer.words import Words
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,15 +21,15 @@ from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Event
 from loomopt.picture.job_views import JobViews
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
     from loomopt.model.axes import Asked, Traded
     from loomopt.model.separation import Parted
-    from loomopt.scene.scene import Scene
+    from loomopt.scenes.scene import Scene
 
 
 class Crossing(NamedTuple):

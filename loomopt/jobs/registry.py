@@ -17,10 +17,10 @@ from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
 from loomopt.jobs.base import Job
 from loomopt.physics.effects.kinds import Effect, ranked
-from loomopt.scene import packaged
-from loomopt.scene.document import Paths, read_document
-from loomopt.scene.scene import Scene, build
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes import packaged
+from loomopt.scenes.document import Paths, read_document
+from loomopt.scenes.scene import Scene, build
+from loomopt.scenes.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

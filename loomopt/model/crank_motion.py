@@ -19,7 +19,7 @@ from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion, Speed
 from loomopt.physics.motion.turning import NoTurn, Turning, solved
 from loomopt.physics.schema import Values
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 FLOATS = ("float", "numpy")
 """Number systems of float64."""

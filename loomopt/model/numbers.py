@@ -13,7 +13,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, label, owned
 from loomopt.physics.tolerances import START_ROOM
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 Bounds = Mapping[str, tuple[float, float]]
 """Lower and upper bound of numbers by full name, SI."""

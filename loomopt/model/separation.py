@@ -27,7 +27,7 @@ from loomopt.physics.effects.kinds import Event, Load, State
 from loomopt.physics.motion.flight import Cam, Course, Stretch
 from loomopt.physics.motion.free import Body, Moving, Zone
 from loomopt.physics.tolerances import ACCURACY, SAME_ANGLE
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 LINEAR = 1e-12
 """Share of a load's largest term by which it may miss the sum of its parts: rounding."""

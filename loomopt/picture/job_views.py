@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
     from loomopt.picture.panels import Curve, Panel
     from loomopt.picture.shapes import Drawing
-    from loomopt.scene.scene import Scene
+    from loomopt.scenes.scene import Scene
 
 Numbers = Mapping[str, float]
 

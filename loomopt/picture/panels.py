@@ -17,8 +17,8 @@ from loomopt.model.separation import Parted
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Check, Load, Speed, State
 from loomopt.physics.motion.flight import Landing
-from loomopt.scene.scene import Scene
-from loomopt.scene.tables import Limit
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import Limit
 
 EXTREMES = ("peak", "most", "least")
 """What of a curve may be marked: its largest magnitude, its largest and its least value."""

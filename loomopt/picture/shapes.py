@@ -13,7 +13,7 @@ from loomopt.base import units
 from loomopt.picture.placing import STEP, Box, Floats
 
 if TYPE_CHECKING:
-    from loomopt.scene.scene import Scene
+    from loomopt.scenes.scene import Scene
 
 Unit = Literal["mm", "in"]
 """What a workshop measures in."""

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene import packaged, provenance
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Solution
-from loomopt.solve.answer.words import Words, grouped
+from loomopt.scenes import packaged, provenance
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Solution
+from loomopt.solving.answer.words import Words, grouped
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row, Task

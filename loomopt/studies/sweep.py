@@ -15,14 +15,14 @@ from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene import designs, numbers
-from loomopt.scene.numbers import files, quantity
-from loomopt.scene.provenance import versions
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Solution
-from loomopt.solve.nlp.point import Point
-from loomopt.solve.options import check_numbers, check_sought, target_name
+from loomopt.scenes import designs, numbers
+from loomopt.scenes.numbers import files, quantity
+from loomopt.scenes.provenance import versions
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Solution
+from loomopt.solving.nlp.point import Point
+from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.run import warm
 from loomopt.studies.run.findings import Change, Findings
 from loomopt.studies.run.rows import Row, Task, parts, priced

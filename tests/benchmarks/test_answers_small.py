@@ -10,9 +10,9 @@ from test_benchmarks_small import ATTEMPTS, FOLDER
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import Sampler
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
 
 
 @pytest.fixture(scope="module")

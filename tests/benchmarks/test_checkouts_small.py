@@ -45,7 +45,7 @@ def test_all_work_is_timed_in_both():
 
 
 def test_every_packaged_scene_and_target_is_compared(compared):
-    from loomopt.scene.packaged import problems
+    from loomopt.scenes.packaged import problems
     from loomopt.studies.check import served
 
     wanted = {(name, target) for name in problems() for target in served(importlib.import_module("loomopt").load(name))}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_benchmarks_small import FOLDER
 
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 from loomopt.studies import check
 
 

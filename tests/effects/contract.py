@@ -7,7 +7,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.answer.solution import Solution
+from loomopt.solving.answer.solution import Solution
 
 JOBS = ("beatup", "rapier", "shedding")
 LOOSE = {"most": "1 km", "high": "1 km"}

@@ -10,7 +10,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 sys.path.append(str(Path(__file__).parents[1] / "solving"))
 import toy

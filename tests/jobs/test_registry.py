@@ -7,7 +7,7 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 from loomopt.studies import check
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from loomopt.jobs import registry
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Elastic, Settings, sampler_at
-from loomopt.solve.nlp.stations import epigraphs, families
-from loomopt.solve.nlp.transcribe import transcribe
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Elastic, Settings, sampler_at
+from loomopt.solving.nlp.stations import epigraphs, families
+from loomopt.solving.nlp.transcribe import transcribe
 
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 TARGETS = ("balance", "pulse", "torque", "retrofit")

@@ -5,9 +5,9 @@ import itertools
 import pytest
 from waves import objective, program
 
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.ipopt import IterationCallback
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.ipopt import IterationCallback
+from loomopt.solving.nlp.point import Settings
 
 
 def test_every_iteration_is_reported_in_order():

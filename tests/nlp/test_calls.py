@@ -9,9 +9,9 @@ from waves import model, objective, program
 
 from loomopt.model.program import Limit, Objective, Variable
 from loomopt.model.sampling import Extreme
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Elastic, Known, Settings
-from loomopt.solve.nlp.stations import Family
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Elastic, Known, Settings
+from loomopt.solving.nlp.stations import Family
 
 X = {"x": 0.5, "y": -2.0}
 

@@ -13,9 +13,9 @@ from loomopt.jobs import registry
 from loomopt.model.kinematics import Arcs
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, split
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.nlp import exchange, ipopt
-from loomopt.solve.nlp.point import Elastic, Settings, sampler_at
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.nlp import exchange, ipopt
+from loomopt.solving.nlp.point import Elastic, Settings, sampler_at
 
 BEATUP = registry.load("beatup")
 

@@ -10,8 +10,8 @@ from waves import WAVES, model, objective, program
 
 from loomopt.maths import systems
 from loomopt.model.sampling import Sampler
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings
 
 ROOT = 2**0.5
 

@@ -10,9 +10,9 @@ from waves import WAVES, model, objective, program
 
 from loomopt.maths import systems
 from loomopt.model.reading import Reading
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Elastic, Settings
-from loomopt.solve.nlp.stations import families
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Elastic, Settings
+from loomopt.solving.nlp.stations import families
 
 CASES: list[tuple[tuple[str, ...], str, tuple[tuple[str, str], ...]]]
 CASES = [((), target, ()) for target in TARGETS]

@@ -2,7 +2,7 @@
 
 from waves import objective, program
 
-from loomopt.solve.nlp.stations import Epigraph, Family, epigraphs, families
+from loomopt.solving.nlp.stations import Epigraph, Family, epigraphs, families
 
 
 def test_one_variable_stands_above_each_group_and_one_family_for_each_row():

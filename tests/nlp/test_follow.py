@@ -10,9 +10,9 @@ from waves import model, objective, program
 
 from loomopt.model.kinematics import Arcs
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.solve.nlp import exchange, follow
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Point, Settings
+from loomopt.solving.nlp import exchange, follow
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Point, Settings
 
 PEAK = (objective("circle", "peak", ("shifted",)),)
 """Two cones of equal height: on the line y = b they cross at x = (10 − 2 b) / 6."""

@@ -7,9 +7,9 @@ import pytest
 from waves import objective, program
 
 from loomopt.model.sampling import Tally
-from loomopt.solve.nlp import ipopt
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import ipopt
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Settings
 
 X = {"x": 0.5, "y": 0.4}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from loomopt.solve.nlp.structure import Layout
+from loomopt.solving.nlp.structure import Layout
 
 
 def test_layout_gives_back_what_was_written():

@@ -10,11 +10,11 @@ from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
 from loomopt.physics.tolerances import FEW_CHOICES
-from loomopt.solve.nlp.calls import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
-from loomopt.solve.nlp.expressions import expressions
-from loomopt.solve.nlp.lifted import Lifts, Options, chosen, identity
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.nlp.structure import structure
+from loomopt.solving.nlp.calls import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
+from loomopt.solving.nlp.expressions import expressions
+from loomopt.solving.nlp.lifted import Lifts, Options, chosen, identity
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.nlp.structure import structure
 
 
 def made(count=FEW_CHOICES + 1):

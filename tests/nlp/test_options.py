@@ -1,7 +1,7 @@
 """What IPOPT is told."""
 
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.nlp.transcribe import IPOPT, ipopt_options
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.nlp.transcribe import IPOPT, ipopt_options
 
 TOLERANCES = ("tol", "constr_viol_tol", "compl_inf_tol", "dual_inf_tol")
 

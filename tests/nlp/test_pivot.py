@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import loomopt as lo
-from loomopt.solve.nlp import pivot
-from loomopt.solve.nlp.pivot import active_by, reach
+from loomopt.solving.nlp import pivot
+from loomopt.solving.nlp.pivot import active_by, reach
 
 WIDE = 10.0
 

@@ -6,7 +6,7 @@ import pytest
 from waves import program
 
 from loomopt.jobs import registry
-from loomopt.solve.nlp.point import Settings, sampler_at
+from loomopt.solving.nlp.point import Settings, sampler_at
 
 
 @pytest.mark.parametrize(

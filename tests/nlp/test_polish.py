@@ -5,9 +5,9 @@ import pytest
 from waves import objective, program
 
 import loomopt as lo
-from loomopt.solve.nlp import exchange, polish
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange, polish
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Settings
 
 PEAK = (objective("circle", "peak", ("shifted",)),)
 """Two cones of equal height: on the line y = b they cross at x = (10 − 2 b) / 6."""

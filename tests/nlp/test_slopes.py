@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from loomopt.solve.nlp import expressions
+from loomopt.solving.nlp import expressions
 
 
 def test_second_derivatives_of_a_formula_with_and_without_switches():

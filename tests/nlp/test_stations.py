@@ -7,11 +7,11 @@ from steps import COUNT, program
 from loomopt.jobs import registry
 from loomopt.model.sampling import Extreme
 from loomopt.physics.cycle import TURN
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Settings, sampler_at
-from loomopt.solve.nlp.stations import Family, Stood, families, held, owners, stations
-from loomopt.solve.nlp.structure import structure
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Settings, sampler_at
+from loomopt.solving.nlp.stations import Family, Stood, families, held, owners, stations
+from loomopt.solving.nlp.structure import structure
 
 
 @pytest.fixture(scope="module")

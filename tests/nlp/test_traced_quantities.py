@@ -7,8 +7,8 @@ from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
-from loomopt.solve.nlp.expressions import Quantities
-from loomopt.solve.nlp.lifted import Lifts
+from loomopt.solving.nlp.expressions import Quantities
+from loomopt.solving.nlp.lifted import Lifts
 
 X = {name: 0.1 + 0.05 * k for k, name in enumerate(NAMES)}
 

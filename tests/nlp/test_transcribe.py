@@ -3,9 +3,9 @@
 import pytest
 from beatup_nlps import DESIGN, program_of, put
 
-from loomopt.solve.nlp import transcribe as built
-from loomopt.solve.nlp.point import sampler_at
-from loomopt.solve.nlp.transcribe import transcribe
+from loomopt.solving.nlp import transcribe as built
+from loomopt.solving.nlp.point import sampler_at
+from loomopt.solving.nlp.transcribe import transcribe
 
 
 def test_numbers_are_parameters_and_only_structure_is_built():

@@ -15,7 +15,7 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.files import outputs
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 NAMES = packaged.problem_names()
 MACHINES = 12

@@ -7,7 +7,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
-from loomopt.solve.nlp import transcribe
+from loomopt.solving.nlp import transcribe
 
 ALL = ("rocker_inertia", "counterweight_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
 NODES = {

@@ -14,8 +14,8 @@ from loomopt.model.model import Integral, JobModel, Quantity, Row, cased
 from loomopt.model.program import Limit, Objective, Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN, Node
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings
 
 OTHER = {"cloth.F": 700.0, "cloth.width": 1.7}
 """The second fabric: softer, and pressed earlier."""

@@ -8,7 +8,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding import model as shedding
 from loomopt.maths import systems
 from loomopt.model.sampling import Sampler
-from loomopt.solve.nlp.stations import Station, followed, recurrent, station_switches, stations
+from loomopt.solving.nlp.stations import Station, followed, recurrent, station_switches, stations
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)

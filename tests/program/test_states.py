@@ -21,9 +21,9 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load, State
 from loomopt.physics.schema import Table
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings, sampler_at
-from loomopt.solve.nlp.transcribe import transcribe
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings, sampler_at
+from loomopt.solving.nlp.transcribe import transcribe
 
 SAMPLES = 8
 

@@ -23,8 +23,8 @@ from loomopt.model.reading import DATUM, Quantities
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.scene.packaged import problem_names
-from loomopt.solve.certificate.taylor_bounds import Boxes
+from loomopt.scenes.packaged import problem_names
+from loomopt.solving.certificate.taylor_bounds import Boxes
 
 EFFECTS = {
     "beatup": ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal"),

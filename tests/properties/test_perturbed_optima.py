@@ -14,9 +14,9 @@ from machines import powers
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.scene import designs
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.nlp.point import sampler_at
+from loomopt.scenes import designs
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.nlp.point import sampler_at
 
 ACCURACY = 1e-8
 OPTIMA = {

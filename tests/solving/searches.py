@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 import toy
 
-from loomopt.solve.certificate.verdict import Certificate, Level
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Point, Settings
-from loomopt.solve.search import search as searching
-from loomopt.solve.search.search import Candidate, Search
+from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import search as searching
+from loomopt.solving.search.search import Candidate, Search
 
 PROGRAM = toy.program("xy", {"f": lambda v: v["x"] ** 2, "g": lambda v: v["y"]}, objectives=("f", "g"))
 LEVELS = (Level("f", 0.0, 0.0, 0.0), Level("g", 0.0, 0.0, 0.0))

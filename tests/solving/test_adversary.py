@@ -10,9 +10,9 @@ import pytest
 import toy
 from scipy.optimize import linprog
 
-from loomopt.solve.certificate.certificate import certified, certify
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.certificate import certified, certify
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
 
 ACCURACY = 1e-8
 FALLS, CURVES, EXCEEDED, PRICED = "can still fall", "second order fails", " is exceeded by ", "carries a price"

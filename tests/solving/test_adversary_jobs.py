@@ -6,9 +6,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.scene import designs
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.nlp.point import sampler_at
+from loomopt.scenes import designs
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.nlp.point import sampler_at
 
 ACCURACY = 1e-8
 MILLIONTH = 1e-6

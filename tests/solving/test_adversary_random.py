@@ -8,7 +8,7 @@ import toy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 ACCURACY = 1e-8
 LEAST_CURVATURE = 0.5

@@ -5,7 +5,7 @@ import toy
 
 from loomopt.base.errors import BadInput
 from loomopt.physics.tolerances import COARSEST, TIGHTEST
-from loomopt.solve.options import MOST_STARTS, check_numbers, target_name
+from loomopt.solving.options import MOST_STARTS, check_numbers, target_name
 
 SCENE = toy.scene_of(toy.ToyJob(toy.program("x", {"f": lambda v: v["x"]})))
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from loomopt.jobs import registry
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import sampler_at
-from loomopt.solve.search.batch import Batch
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import sampler_at
+from loomopt.solving.search.batch import Batch
 
 TASKS = [
     ("beatup", "balance", ()),

@@ -17,9 +17,9 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.solve.certificate import taylor_bounds
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.certificate.taylor_bounds import Boxes, judged
+from loomopt.solving.certificate import taylor_bounds
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.taylor_bounds import Boxes, judged
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 ACCURACY = 1e-8

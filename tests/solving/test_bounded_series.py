@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from loomopt.model.model import Integral
 from loomopt.model.sampling import Sampler, Tally
-from loomopt.solve.certificate import taylor_bounds
-from loomopt.solve.certificate.taylor_bounds import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
+from loomopt.solving.certificate import taylor_bounds
+from loomopt.solving.certificate.taylor_bounds import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
 
 TURN = 2 * math.pi
 flint = importlib.import_module("flint")

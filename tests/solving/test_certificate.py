@@ -10,7 +10,7 @@ from plain_beatup import DESIGN, Machine, least, random_designs
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 JOB = registry.find("beatup")
 ACCURACY = 1e-8

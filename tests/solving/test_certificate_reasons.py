@@ -9,14 +9,14 @@ import toy
 
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
-from loomopt.solve.certificate import certificate, kkt, second_order
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import COMPLEMENTARY, LARGEST_PRICE, Cycle, JudgedLevel, certified, certify
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.kkt import Multipliers
-from loomopt.solve.certificate.second_order import Curvature, Local
-from loomopt.solve.certificate.verdict import Level
+from loomopt.solving.certificate import certificate, kkt, second_order
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.certificate import COMPLEMENTARY, LARGEST_PRICE, Cycle, JudgedLevel, certified, certify
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import Multipliers
+from loomopt.solving.certificate.second_order import Curvature, Local
+from loomopt.solving.certificate.verdict import Level
 
 NONE = Multipliers(np.zeros(0), 0.0)
 

@@ -11,12 +11,12 @@ import loomopt as lo
 from loomopt.maths.systems import FLOAT
 from loomopt.model.program import Move, Wish
 from loomopt.physics.mechanisms.cam_spline import spline
-from loomopt.solve.certificate import second_order
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.search import least_change, settle
-from loomopt.solve.search.least_change import with_least_change
-from loomopt.solve.search.search import Search, judged, objectives, tried
+from loomopt.solving.certificate import second_order
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.search import least_change, settle
+from loomopt.solving.search.least_change import with_least_change
+from loomopt.solving.search.search import Search, judged, objectives, tried
 
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 LEAST = "least change from today"

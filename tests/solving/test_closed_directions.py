@@ -5,11 +5,11 @@ import pytest
 import toy
 
 import loomopt as lo
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import certify, judged_levels
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.second_order import Local
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.certificate import certify, judged_levels
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.second_order import Local
 
 
 def levels(first, second, names="ab", limits=(), third=None):

@@ -6,11 +6,11 @@ import pytest
 import toy
 
 from loomopt.physics.tolerances import NEEDED
-from loomopt.solve.answer.words import Words
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Point, Settings
-from loomopt.solve.search import elastic
-from loomopt.solve.search.elastic import clash, least
+from loomopt.solving.answer.words import Words
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import elastic
+from loomopt.solving.search.elastic import clash, least
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 

@@ -7,10 +7,10 @@ import toy
 
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import NEEDED, PRICED
-from loomopt.solve.answer.words import Words
-from loomopt.solve.nlp.point import Point
-from loomopt.solve.nlp.stations import families
-from loomopt.solve.search import elastic
+from loomopt.solving.answer.words import Words
+from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.stations import families
+from loomopt.solving.search import elastic
 
 WAVES = {"w": lambda m, v, phi: v["x"] + m.cos(phi), "z": lambda m, v, phi: v["x"] - 1 + m.cos(phi)}
 LIMITS = (("x", -1, 2.0), ("w", 1, 0.25), ("y", 1, 1.0), ("z", 1, 0.5))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 import toy
 
-from loomopt.solve import engine
-from loomopt.solve.answer import report
-from loomopt.solve.answer.solution import Clash
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Point, Settings
+from loomopt.solving import engine
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Clash
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Point, Settings
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 VALLEYS = {"f": lambda v: (v["x"] ** 2 - 1) ** 2 + v["x"] / 4 + v["y"] ** 2}
@@ -102,7 +102,7 @@ def test_a_design_that_only_the_elastic_solve_finds_is_taken(monkeypatch):
 def test_where_nothing_helps_the_solvers_own_word_is_passed_on(monkeypatch):
     failed = Point({"x": 0.5, "y": 0.5}, "Restoration_Failed", False, iterations=7)
     monkeypatch.setattr(exchange, "solve", lambda *_, **__: failed)
-    monkeypatch.setattr("loomopt.solve.search.elastic.clash", lambda *_: Clash())
+    monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert (answer.status, answer.solver["status"]) == ("failed", "Restoration_Failed")
     assert answer.solver["iterations"] % 7 == 0

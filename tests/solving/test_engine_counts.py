@@ -6,10 +6,10 @@ import pytest
 import toy
 
 from loomopt.jobs import registry
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Clash
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Point
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Clash
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Point
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 
@@ -17,8 +17,8 @@ BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
     monkeypatch.setattr(exchange, "starts", lambda *_: [])
     monkeypatch.setattr(exchange, "started", lambda *_: None)
-    monkeypatch.setattr("loomopt.solve.search.multistart.least", lambda *_: None)
-    monkeypatch.setattr("loomopt.solve.search.elastic.clash", lambda *_: Clash())
+    monkeypatch.setattr("loomopt.solving.search.multistart.least", lambda *_: None)
+    monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert answer.status == "failed"
     expected = {"status": "Not_Assembled", "iterations": 0, "starts": 1, "starts_at_best": 0, "accuracy": 1e-8}
@@ -26,7 +26,7 @@ def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
 
 
 def test_the_time_of_the_least_relaxation_is_part_of_the_solve(monkeypatch):
-    monkeypatch.setattr("loomopt.solve.search.elastic.clash", lambda *_: Clash())
+    monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
     failed = Point({"x": 0.5, "y": 0.5}, "Restoration_Failed", False)
     monkeypatch.setattr(exchange, "solve", lambda *_, **__: failed)
     answer = toy.solve(toy.program("xy", BOWL))

@@ -8,8 +8,8 @@ import pytest
 import toy
 
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives_mp import Exact
 
 
 def exact_at(program, x):

@@ -6,10 +6,10 @@ import toy
 
 import loomopt as lo
 from loomopt.model.sampling import Sampler
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import SECOND_ORDER_OPEN, certify
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.feasible_curve import FeasibleCurve, Lagrangian
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certify
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.feasible_curve import FeasibleCurve, Lagrangian
 
 ROUND = {"f": lambda v: -((v["x"] ** 2 + v["y"] ** 2) ** 2), "r": lambda v: v["x"] ** 2 + v["y"] ** 2}
 """On the circle r = 1 all is level; along its tangent f + 2 r falls by the fourth power of the step."""

@@ -11,7 +11,7 @@ import toy
 
 from loomopt.maths import systems
 from loomopt.physics.balance import Given
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 ACCURACY = 1e-8
 PROBLEMS = {**hock_schittkowski.PROBLEMS, **hock_schittkowski_larger.PROBLEMS}

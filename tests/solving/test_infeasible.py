@@ -8,7 +8,7 @@ import pytest
 from plain_beatup import DESIGN
 
 import loomopt as lo
-from loomopt.solve.answer.solution import remedies
+from loomopt.solving.answer.solution import remedies
 
 TIGHT: dict[str, tuple[str, dict[str, object], str]] = {
     "light, torque": ("beatup-light", {}, "torque"),

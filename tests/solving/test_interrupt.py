@@ -13,7 +13,7 @@ import loomopt as lo
 HOOKED = """
 import os, signal, sys
 from loomopt.interface.cli import app as cli
-from loomopt.solve import engine
+from loomopt.solving import engine
 
 genuine, hits = engine.solve, []
 

@@ -6,10 +6,10 @@ import toy
 
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
-from loomopt.solve.certificate import kkt
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.kkt import Multipliers, System, replaceable, solved
+from loomopt.solving.certificate import kkt
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import Multipliers, System, replaceable, solved
 
 
 def at(program, x):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import toy
 
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 WAVES = {
     "a": lambda m, v, phi: v["x"] + m.cos(phi),

@@ -7,7 +7,7 @@ import toy
 
 from loomopt.model.program import Limit, Objective
 from loomopt.model.sampling import Sampler
-from loomopt.solve.certificate.kkt import figure_of, priced
+from loomopt.solving.certificate.kkt import figure_of, priced
 
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}
 ROWS = {"square": lambda v: v["x"] ** 2, "size": lambda v: v["x"], "inverse": lambda v: 1 / v["x"]}

@@ -10,8 +10,8 @@ from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.scene.packaged import problem_names
-from loomopt.solve.certificate import taylor_bounds
+from loomopt.scenes.packaged import problem_names
+from loomopt.solving.certificate import taylor_bounds
 from loomopt.studies.check import served
 
 PAIRS = [(name, target) for name in problem_names() for target in served(lo.load(name))]

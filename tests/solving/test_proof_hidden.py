@@ -14,8 +14,8 @@ from shedding_cases import flat, freed, product
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.model.sampling import Sampler
-from loomopt.solve.certificate import taylor_bounds
-from loomopt.solve.certificate.taylor_bounds import Boxes
+from loomopt.solving.certificate import taylor_bounds
+from loomopt.solving.certificate.taylor_bounds import Boxes
 
 # Effects, laws, coils ------------------------------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from shedding_cases import product
 
 import loomopt as lo
 from loomopt.model.sampling import Sampler
-from loomopt.scene.packaged import problem_names
+from loomopt.scenes.packaged import problem_names
 
 
 @pytest.mark.parametrize("name", [name for name in problem_names() if name != "beatup-light"])

@@ -6,9 +6,9 @@ import pytest
 import toy
 
 from loomopt.model.program import Limit, Objective
-from loomopt.solve.answer import report
-from loomopt.solve.answer.solution import Clash, Relaxation
-from loomopt.solve.certificate.verdict import Binding, Certificate
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Clash, Relaxation
+from loomopt.solving.certificate.verdict import Binding, Certificate
 
 ROWS = {"f": lambda v: v["x"] ** 2, "p": lambda v: v["x"] + v["y"]}
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}

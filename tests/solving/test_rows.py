@@ -7,7 +7,7 @@ import toy
 
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import ACTIVE
-from loomopt.solve.certificate.active_set import active_set
+from loomopt.solving.certificate.active_set import active_set
 
 
 def active(program, x):

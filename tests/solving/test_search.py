@@ -9,10 +9,10 @@ import toy
 from searches import BAD, GOOD, PROGRAM, candidate, certified, empty, solved
 
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
-from loomopt.solve.certificate.verdict import Certificate, Level
-from loomopt.solve.nlp.point import Point, Settings
-from loomopt.solve.search import search as searching
-from loomopt.solve.search.search import MOST_ALIKE, Search, compared, judged, objectives
+from loomopt.solving.certificate.verdict import Certificate, Level
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import search as searching
+from loomopt.solving.search.search import MOST_ALIKE, Search, compared, judged, objectives
 
 __all__ = ["certified", "solved"]
 

@@ -2,9 +2,9 @@
 
 import toy
 
-from loomopt.solve.nlp.point import Point, Settings
-from loomopt.solve.search import search as searching
-from loomopt.solve.search.search import Candidate, Search, objectives
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import search as searching
+from loomopt.solving.search.search import Candidate, Search, objectives
 
 
 def test_a_correction_to_where_nothing_assembles_is_not_made():

@@ -9,11 +9,11 @@ import toy
 from loomopt.model.program import Move, Wish
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
-from loomopt.solve.certificate import kkt, second_order
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.kkt import Multipliers
-from loomopt.solve.certificate.second_order import Critical, Local
+from loomopt.solving.certificate import kkt, second_order
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import Multipliers
+from loomopt.solving.certificate.second_order import Critical, Local
 
 
 def local_at(program, **x):

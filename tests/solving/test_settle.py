@@ -7,7 +7,7 @@ from plain_beatup import DESIGN, LENGTHS, Machine
 
 import loomopt as lo
 from loomopt.model.program import Move, Wish
-from loomopt.solve.search.settle import _directions, _ends, goal_of, settle, unchanging, wished
+from loomopt.solving.search.settle import _directions, _ends, goal_of, settle, unchanging, wished
 
 
 def slide(goal, low=-100.0, high=100.0):

@@ -4,7 +4,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.solve.certificate import kkt
+from loomopt.solving.certificate import kkt
 
 G, T1, T2, H, X0 = 369.55, 124.545, 83.03, 0.0656, 0.08
 STATIC = lo.load("shedding-static")
@@ -45,7 +45,7 @@ def test_a_travel_that_would_better_be_longer_has_a_price_of_that_side():
 
 def test_variables_without_room_are_held_on_both_sides():
     from loomopt.model.program import Limit
-    from loomopt.solve.certificate.active_set import ActiveSet, Row
+    from loomopt.solving.certificate.active_set import ActiveSet, Row
 
     limit = Limit("kept", -1, "a", 1.0, 1.0, "variable")
     rows = (Row("kept", "a", 1.0, 1.0, 0, 0.0, limit), Row("f", "f", 1.0, 1.0, 0, 0.0))

@@ -10,7 +10,7 @@ from shedding_by_hand import peak, plain, product, softest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.solve.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import certify
 
 PAPER = plain.PAPER
 H, X0_MAX = PAPER.travel, PAPER.X0

@@ -15,7 +15,7 @@ from shedding_cases import CYCLOID, TRAVELS, freed, plain, product, programmed
 
 import loomopt as lo
 from loomopt.interface.cli.app import run
-from loomopt.scene.packaged import problems
+from loomopt.scenes.packaged import problems
 
 study = importlib.import_module("shedding_law")
 UNEVEN = (100, 70, 130, 60)

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from loomopt.solve.answer.solution import Evaluation, Finding, Relaxation, Solution, certificate_dict
-from loomopt.solve.certificate.verdict import Certificate, Level
+from loomopt.solving.answer.solution import Evaluation, Finding, Relaxation, Solution, certificate_dict
+from loomopt.solving.certificate.verdict import Certificate, Level
 
 HELD, BROKEN = Finding("p", 1.0, None, 2.0, True), Finding("q", 3.0, None, 2.0, False)
 

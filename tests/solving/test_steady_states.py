@@ -9,12 +9,12 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model import model
 from loomopt.model.sampling import sampled
-from loomopt.solve import engine
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.nlp.point import Settings
+from loomopt.solving import engine
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.nlp.point import Settings
 
 SCENE = lo.load("beatup").with_effect("shaft_torsion")
 BEST = {"l1": 0.03, "l2": 0.084060251, "l3": 0.151314494, "l4": 0.167, "m4e": 0.0}

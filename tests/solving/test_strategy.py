@@ -8,11 +8,11 @@ import toy
 from searches import BAD, certified, empty, solved
 
 import loomopt as lo
-from loomopt.solve.nlp.point import Point, Settings
-from loomopt.solve.search import multistart
-from loomopt.solve.search.batch import DESIGNS
-from loomopt.solve.search.multistart import BETTER, MORE_STARTS, searched
-from loomopt.solve.search.search import Search
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import multistart
+from loomopt.solving.search.batch import DESIGNS
+from loomopt.solving.search.multistart import BETTER, MORE_STARTS, searched
+from loomopt.solving.search.search import Search
 
 __all__ = ["certified", "solved"]
 

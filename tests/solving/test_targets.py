@@ -9,8 +9,8 @@ from plain_beatup import DESIGN, Machine, dead_centres, least, least_peak, rando
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings, sampler_at
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings, sampler_at
 
 RESISTANCES = (600, 745, 800, 900)
 OPTIMAL = [(M0, target) for M0 in RESISTANCES for target in ("balance", "pulse")]

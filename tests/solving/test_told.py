@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from searches import candidate, empty
 
-from loomopt.solve.nlp.point import Point
-from loomopt.solve.search import multistart
-from loomopt.solve.search.search import Candidate, Judged
+from loomopt.solving.nlp.point import Point
+from loomopt.solving.search import multistart
+from loomopt.solving.search.search import Candidate, Judged
 
 BEST = replace(candidate(1, 2, x=1.0), value=1002.0)
 

@@ -7,12 +7,12 @@ import toy
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
-from loomopt.solve.certificate.derivatives_jets import Forward
-from loomopt.solve.certificate.derivatives_mp import Exact
-from loomopt.solve.certificate.feasible_curve import PROBES, FeasibleCurve, Lagrangian
-from loomopt.solve.certificate.second_order import Local
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.feasible_curve import PROBES, FeasibleCurve, Lagrangian
+from loomopt.solving.certificate.second_order import Local
 from loomopt.studies.front import front
 from loomopt.studies.front.solver import Asking
 

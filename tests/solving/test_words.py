@@ -6,9 +6,9 @@ import pytest
 
 import loomopt as lo
 from loomopt.model.program import Limit, Objective
-from loomopt.solve.answer.solution import Relaxation, remedies
-from loomopt.solve.answer.words import Words, outward
-from loomopt.solve.certificate.verdict import Binding
+from loomopt.solving.answer.solution import Relaxation, remedies
+from loomopt.solving.answer.words import Words, outward
+from loomopt.solving.certificate.verdict import Binding
 
 
 @pytest.mark.parametrize(

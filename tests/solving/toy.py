@@ -23,11 +23,11 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Figure, Table, Target, Values
 from loomopt.picture.job_views import JobViews
-from loomopt.scene import scene
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Solution
+from loomopt.scenes import scene
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Solution
 
 WIDE = 10.0
 Formula = Callable[[Values], Number]

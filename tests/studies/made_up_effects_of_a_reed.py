@@ -8,7 +8,7 @@ from loomopt.jobs.beatup.scene import SCHEMA
 from loomopt.jobs.registry import load
 from loomopt.physics.effects.kinds import Clash, Load, ranked
 from loomopt.physics.schema import Table
-from loomopt.scene.scene import build
+from loomopt.scenes.scene import build
 
 
 class Own(Table):

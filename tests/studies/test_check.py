@@ -9,8 +9,8 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
-from loomopt.scene import packaged
-from loomopt.solve import engine
+from loomopt.scenes import packaged
+from loomopt.solving import engine
 from loomopt.studies import check as study
 
 NAME = "beatup-light"

@@ -12,7 +12,7 @@ import uncoiled
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import finished
-from loomopt.solve import engine
+from loomopt.solving import engine
 from loomopt.studies.effects import study
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Task

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from loomopt.jobs.registry import load
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 from loomopt.studies import check
 from loomopt.studies import check as study
 

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.scene import numbers
+from loomopt.scenes import numbers
 from loomopt.studies.sweep import COARSE, Lattice
 
 

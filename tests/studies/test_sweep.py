@@ -14,7 +14,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.solve.answer.solution import Solution
+from loomopt.solving.answer.solution import Solution
 from loomopt.studies import sweep
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import digest

@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve import engine
+from loomopt.solving import engine
 from loomopt.studies.run import warm
 
 SCENE = lo.load("beatup")

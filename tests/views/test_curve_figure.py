@@ -15,7 +15,7 @@ from loomopt.interface.figures import curves
 from loomopt.interface.files import outputs
 from loomopt.jobs import registry
 from loomopt.picture.panels import Panel
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 from tests import inch
 from tests.views import overlaps
 

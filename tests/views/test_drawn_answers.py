@@ -10,7 +10,7 @@ import loomopt as lo
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs, svg
 from loomopt.interface.text import notebook
-from loomopt.solve.answer.solution import Finding
+from loomopt.solving.answer.solution import Finding
 
 TOO_WIDE = {"limits.swing.min": "30 deg", "limits.swing.max": "31 deg"}
 

@@ -17,7 +17,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import LAYERS
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 
 def test_every_job_has_its_views():

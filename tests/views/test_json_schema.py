@@ -17,8 +17,8 @@ from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, fits
 from loomopt.interface.cli.app import run
 from loomopt.interface.text import json_schema
 from loomopt.jobs import registry
-from loomopt.scene import packaged
-from loomopt.scene.scene import TABLES
+from loomopt.scenes import packaged
+from loomopt.scenes.scene import TABLES
 
 JOBS = registry.own_names()
 SCENES = {name: tomllib.loads(path.read_text("utf-8")) for name, path in packaged.problems().items()}

@@ -4,7 +4,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.cli.app import run
-from loomopt.scene import packaged
+from loomopt.scenes import packaged
 
 RESULTS = [path.stem.rpartition(".") for path in packaged.results_path().glob("*.csv")]
 

@@ -16,7 +16,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs
-from loomopt.solve.answer.solution import Evaluation, Finding
+from loomopt.solving.answer.solution import Evaluation, Finding
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

@@ -13,7 +13,7 @@ from loomopt.base import files
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs
-from loomopt.solve import engine
+from loomopt.solving import engine
 
 NAMES = ["answer.json", "curves.csv", "linkage.svg", "table.csv"]
 

@@ -10,9 +10,9 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.cli.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
 
 if TYPE_CHECKING:
-    from loomopt.scene.designs import Design as DesignGiven
-    from loomopt.scene.scene import Scene
-    from loomopt.solve.answer.solution import Evaluation
+    from loomopt.scenes.designs import Design as DesignGiven
+    from loomopt.scenes.scene import Scene
+    from loomopt.solving.answer.solution import Evaluation
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
 Set = Annotated[
@@ -32,7 +32,7 @@ Target = Annotated[
 def remarked(scene: "Scene", design: "DesignGiven") -> None:
     """Say on stderr what a reader of a design's figures should know."""
     from loomopt.jobs import registry
-    from loomopt.scene import designs
+    from loomopt.scenes import designs
 
     for text in registry.of(scene).views.remarks(scene, designs.flat(design)):
         remark(f"Remark: {text}.")
@@ -49,7 +49,7 @@ def list_problems() -> None:
     """List the packaged problems and their targets."""
     from loomopt.interface.text import layout, scenes
     from loomopt.jobs import registry
-    from loomopt.scene import packaged
+    from loomopt.scenes import packaged
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
@@ -187,7 +187,7 @@ def simulate(
     from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.text import layout, scenes
-    from loomopt.solve.options import check_numbers
+    from loomopt.solving.options import check_numbers
 
     scene, given, name, status = read_asked(problem, design, target, sets, on, off)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)

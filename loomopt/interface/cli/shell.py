@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from loomopt.base.errors import BadInput, clean
 
 if TYPE_CHECKING:
-    from loomopt.scene.scene import Scene
+    from loomopt.scenes.scene import Scene
 
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
@@ -119,14 +119,14 @@ def read_asked(
     A remark names what is otherwise than in the file, where an answer brings any of it.
     """
     from loomopt.jobs.registry import load
-    from loomopt.solve.options import target_name
+    from loomopt.solving.options import target_name
 
     scene = load(problem)
     if design is None:
         scene, given, name, status = changed(scene, sets, on, off), dict[str, float](), target, None
     else:
         from loomopt.base.errors import clean
-        from loomopt.scene import answers, designs
+        from loomopt.scenes import answers, designs
 
         handed = answers.read(design, scene)
         own = answers.changes(scene, handed.scene)

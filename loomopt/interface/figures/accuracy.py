@@ -12,7 +12,7 @@ from loomopt.interface.figures.figure import COLOURS, STYLES, blank, own_style, 
 from loomopt.interface.figures.heads import Entry, head
 from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
-from loomopt.scene import provenance
+from loomopt.scenes import provenance
 from loomopt.studies.accuracy.accuracy import Study, in_time
 from loomopt.studies.accuracy.ladders import Row, grouped, told
 from loomopt.studies.accuracy.readings import NUMBERS

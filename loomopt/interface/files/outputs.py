@@ -14,10 +14,10 @@ from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
 from loomopt.interface import tables
 from loomopt.jobs import registry
-from loomopt.scene import provenance
-from loomopt.scene.designs import Design, flat
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Evaluation, Solution
+from loomopt.scenes import provenance
+from loomopt.scenes.designs import Design, flat
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluation, Solution
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,13 +9,13 @@ from loomopt.interface.tables import rows
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Evaluation, Solution, remedies
-from loomopt.solve.answer.words import Words
-from loomopt.solve.certificate.verdict import GlobalBound
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluation, Solution, remedies
+from loomopt.solving.answer.words import Words
+from loomopt.solving.certificate.verdict import GlobalBound
 
 if TYPE_CHECKING:
-    from loomopt.solve.answer.solution import Proofs
+    from loomopt.solving.answer.solution import Proofs
 
 
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:

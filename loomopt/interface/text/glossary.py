@@ -17,8 +17,8 @@ from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.schema import Figure, Table
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.words import Words
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.words import Words
 
 
 class Printed(NamedTuple):

@@ -9,10 +9,10 @@ from pydantic import TypeAdapter
 from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.schema import Table
-from loomopt.scene.display import KINDS
-from loomopt.scene.scene import TABLES
-from loomopt.scene.schema import SceneSchema
-from loomopt.scene.tables import Problem
+from loomopt.scenes.display import KINDS
+from loomopt.scenes.scene import TABLES
+from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import Problem
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

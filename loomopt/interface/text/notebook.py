@@ -10,9 +10,9 @@ from loomopt.interface.text import answers, scenes
 from loomopt.interface.text.layout import Grid, spaced
 from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
-from loomopt.scene.designs import Design
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Evaluation, Proofs, Solution
+from loomopt.scenes.designs import Design
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluation, Proofs, Solution
 
 PAGE = 720
 """Longer side of a drawing on a page of a notebook, pixels."""

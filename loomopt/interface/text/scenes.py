@@ -11,11 +11,11 @@ from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
-from loomopt.scene.designs import Design, flat
-from loomopt.scene.display import KINDS
-from loomopt.scene.packaged import Head
-from loomopt.scene.scene import Scene, given
-from loomopt.solve.answer.words import Words
+from loomopt.scenes.designs import Design, flat
+from loomopt.scenes.display import KINDS
+from loomopt.scenes.packaged import Head
+from loomopt.scenes.scene import Scene, given
+from loomopt.solving.answer.words import Words
 
 STEP = 15
 """Crank angle between printed rows, deg."""

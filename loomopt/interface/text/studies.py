@@ -11,7 +11,7 @@ from loomopt.interface import study_table
 from loomopt.interface.files import outputs
 from loomopt.interface.study_table import Column
 from loomopt.interface.text.layout import Grid, joined
-from loomopt.scene.provenance import csv
+from loomopt.scenes.provenance import csv
 from loomopt.studies.run.findings import Change, SceneStudy, counted
 from loomopt.studies.run.rows import Row
 

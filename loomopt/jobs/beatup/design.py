@@ -10,7 +10,7 @@ from loomopt.model.numbers import Bounds
 from loomopt.model.program import Goal, Numbers, Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import NO_MASS
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 BALANCED = 1e-8
 """|M3| at front dead centre below this share of the peak torque is called zero (words of the beat-up only)."""

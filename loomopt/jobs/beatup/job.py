@@ -13,7 +13,7 @@ from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 
 class Beatup(Job):

@@ -18,8 +18,8 @@ from loomopt.model.program import Limit, Move, Numbers, Objective, Program, Vari
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.tolerances import NO_MASS
-from loomopt.scene.scene import Scene
-from loomopt.scene.tables import Limit as Limited
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import Limit as Limited
 
 COUNTERWEIGHT = ("m4e", "r4e")
 AMPLE, LONG = 10.0, 3.0

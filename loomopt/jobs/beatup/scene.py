@@ -13,8 +13,8 @@ from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
 
 
 class Operation(Table):

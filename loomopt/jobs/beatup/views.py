@@ -10,7 +10,7 @@ from loomopt.model.curves import tops
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import State
 from loomopt.picture.job_views import JobViews
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation

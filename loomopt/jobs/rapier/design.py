@@ -16,7 +16,7 @@ from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import TURN, Node
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 STEPS, FARTHEST, LAST = 6, 1e-3, 1e-15
 """Newton's steps from a sampled extreme, which is right to 1e-8; rad beyond which a step leads elsewhere, and that end

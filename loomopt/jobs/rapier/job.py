@@ -12,7 +12,7 @@ from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 
 class Rapier(Job):

@@ -20,8 +20,8 @@ from loomopt.model.program import Limit, Move, Objective, Program, Variable, goa
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.scene.scene import Scene
-from loomopt.scene.tables import Limit as Limited
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import Limit as Limited
 
 FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}

@@ -13,9 +13,9 @@ from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.scene import csv_tables
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes import csv_tables
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""

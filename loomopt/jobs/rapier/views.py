@@ -8,7 +8,7 @@ from loomopt.jobs.rapier.design import read
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.cycle import TURN
 from loomopt.picture.job_views import JobViews
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation

@@ -28,7 +28,7 @@ from loomopt.physics.mechanisms import cam_limit
 from loomopt.physics.mechanisms.cam_laws import Derivatives
 from loomopt.physics.mechanisms.cam_motion import Spline, named_knots
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 CYCLE = {
     "contact_min": "lift",

@@ -36,8 +36,8 @@ from loomopt.picture.drawing import (
     spring,
 )
 from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive, Units, drawn_units
-from loomopt.scene import provenance
-from loomopt.scene.scene import Scene
+from loomopt.scenes import provenance
+from loomopt.scenes.scene import Scene
 
 CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED = 5e-7, 1e-8, 2.0
 """How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a huge

@@ -13,7 +13,7 @@ from loomopt.model.model import Formula, JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.mechanisms.cam_motion import Spline, knots
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 
 class Shedding(Job):

@@ -22,7 +22,7 @@ from loomopt.physics.effects.kinds import Check, owned
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.physics.tolerances import START_ROOM
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 SPEED = "operation.speed"
 ONE_OPTIMUM = "the problem is one of linear programmes"

@@ -29,9 +29,9 @@ from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.scene import csv_tables
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes import csv_tables
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 SAME_TURN = 1e-9

@@ -13,7 +13,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from loomopt.model.separation import Parted

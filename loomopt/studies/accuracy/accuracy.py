@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs import registry
 from loomopt.model import model
-from loomopt.scene import provenance
-from loomopt.scene.scene import Scene
-from loomopt.solve.options import check_sought
+from loomopt.scenes import provenance
+from loomopt.scenes.scene import Scene
+from loomopt.solving.options import check_sought
 from loomopt.studies.accuracy import optima, readings
 from loomopt.studies.accuracy.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.accuracy.subject import Subject

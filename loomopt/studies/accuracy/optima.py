@@ -8,11 +8,11 @@ from typing import Any
 
 from loomopt.jobs.base import Family
 from loomopt.model.sampling import Sampler
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Solution
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.calls import Calls
-from loomopt.solve.nlp.point import Point, Settings
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Solution
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.point import Point, Settings
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference, Setting
 from loomopt.studies.accuracy.subject import Subject, Target

@@ -12,7 +12,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.sampling import Sampler, Tally
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.solve.nlp import expressions
+from loomopt.solving.nlp import expressions
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference
 from loomopt.studies.accuracy.reference_digits import EXTREME_STEPS, REFERENCE_SLOPE

@@ -17,10 +17,10 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Motion
-from loomopt.scene import designs
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Solution
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Solution
 from loomopt.studies import check
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Reference

@@ -6,8 +6,8 @@ from typing import Any
 
 from loomopt.base.records import freeze
 from loomopt.base.refusals import refusal
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.words import Words
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.words import Words
 from loomopt.studies.effects.study import Course, Effects, command
 from loomopt.studies.effects.worth import NEEDED, Worth
 from loomopt.studies.run.rows import Row

@@ -16,14 +16,14 @@ from loomopt.physics.effects.declared import Fault, faults
 from loomopt.physics.effects.kinds import Effect, Event, Speed, State
 from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene import answers, designs
-from loomopt.scene.document import looked_up, replaced
-from loomopt.scene.numbers import files
-from loomopt.scene.provenance import versions
-from loomopt.scene.scene import Scene, build
-from loomopt.scene.tables import effects as read
-from loomopt.solve import engine
-from loomopt.solve.options import OMITTED, check_numbers, target_name
+from loomopt.scenes import answers, designs
+from loomopt.scenes.document import looked_up, replaced
+from loomopt.scenes.numbers import files
+from loomopt.scenes.provenance import versions
+from loomopt.scenes.scene import Scene, build
+from loomopt.scenes.tables import effects as read
+from loomopt.solving import engine
+from loomopt.solving.options import OMITTED, check_numbers, target_name
 from loomopt.studies.effects.worth import Judge, Worth
 from loomopt.studies.run.rows import Row, Task
 from loomopt.studies.sweep import reason
@@ -203,7 +203,7 @@ class Effects:
 
     def solved(self, task: Task, parent: Row | None) -> Row:
         """Return the row of a task: its place names the effects that are off."""
-        from loomopt.solve.nlp import transcribe
+        from loomopt.solving.nlp import transcribe
 
         scene = self.without(frozenset(task.place))
         try:

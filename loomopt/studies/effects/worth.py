@@ -9,9 +9,9 @@ from loomopt.base.errors import BadInput
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.model.program import Objective, Program
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer.solution import Evaluation, Finding
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer.solution import Evaluation, Finding
 from loomopt.studies.run.rows import Row
 
 NEEDED, EVALUATED = "needed", "evaluated"

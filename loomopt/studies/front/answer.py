@@ -12,19 +12,19 @@ from loomopt.model.axes import Traded
 from loomopt.model.program import Limit, Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
-from loomopt.scene.scene import Scene
-from loomopt.solve import engine
-from loomopt.solve.answer import report
-from loomopt.solve.answer.solution import Clash, Evaluation, Finding, Solution
-from loomopt.solve.answer.words import Words
-from loomopt.solve.certificate.certificate import certify
-from loomopt.solve.certificate.verdict import Binding, Certificate
-from loomopt.solve.nlp.point import Settings
+from loomopt.scenes.scene import Scene
+from loomopt.solving import engine
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Clash, Evaluation, Finding, Solution
+from loomopt.solving.answer.words import Words
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.verdict import Binding, Certificate
+from loomopt.solving.nlp.point import Settings
 from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
 from loomopt.studies.run import warm
 
 if TYPE_CHECKING:
-    from loomopt.solve.answer.solution import Proofs
+    from loomopt.solving.answer.solution import Proofs
 
 Cap = tuple[Traded, float]
 """An axis and the largest value of what is sought the least of."""
@@ -75,7 +75,7 @@ class Terms:
 
     def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
         """Return proofs of a design's limits (SI). Raises BadInput."""
-        from loomopt.solve.proof import whole_cycle
+        from loomopt.solving.proof import whole_cycle
 
         program = replace(self.program, limits=_named(self))
         return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.said)
@@ -152,7 +152,7 @@ def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
 
 def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
-    from loomopt.solve.search import elastic
+    from loomopt.solving.search import elastic
 
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}

@@ -14,10 +14,10 @@ from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import SI_UNIT, QuantityError
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scene import numbers
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.words import Words
-from loomopt.solve.options import check_numbers, check_sought, target_name
+from loomopt.scenes import numbers
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.words import Words
+from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.front.trade import POINTS, Trade
 
 FEWEST = 3

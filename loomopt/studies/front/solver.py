@@ -11,15 +11,15 @@ from loomopt.model.axes import Asked, Traded, opposite
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer import report
-from loomopt.solve.certificate.active_set import Row as Touched
-from loomopt.solve.certificate.active_set import active_set
-from loomopt.solve.nlp import exchange
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.search import least_change
-from loomopt.solve.search.multistart import searched, spread, tied
-from loomopt.solve.search.search import Judged, Search, judged, objectives, tried
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer import report
+from loomopt.solving.certificate.active_set import Row as Touched
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.search import least_change
+from loomopt.solving.search.multistart import searched, spread, tied
+from loomopt.solving.search.search import Judged, Search, judged, objectives, tried
 from loomopt.studies.run import warm
 
 CAPPED = " at most as asked"

@@ -15,12 +15,12 @@ from loomopt.base.records import lazy
 from loomopt.jobs import registry
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
-from loomopt.scene import designs
-from loomopt.scene.numbers import files
-from loomopt.scene.provenance import versions
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Solution
-from loomopt.solve.answer.words import Words
+from loomopt.scenes import designs
+from loomopt.scenes.numbers import files
+from loomopt.scenes.provenance import versions
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Solution
+from loomopt.solving.answer.words import Words
 from loomopt.studies.front import answer, plan
 from loomopt.studies.front.plan import ENDS, Next, Scale
 from loomopt.studies.front.solver import Asking, Reached, Solver

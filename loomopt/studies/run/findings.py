@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from loomopt.scene.scene import Scene
-from loomopt.solve.answer.solution import Solution
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Solution
 from loomopt.studies.run.rows import Row, Study, Task
 
 

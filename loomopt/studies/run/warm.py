@@ -8,7 +8,7 @@ import numpy as np
 
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme
-from loomopt.solve.nlp.point import Point
+from loomopt.solving.nlp.point import Point
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 

@@ -20,7 +20,7 @@ from loomopt.jobs.shedding import drawing as shedding_drawing
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
-from loomopt.scene import designs
+from loomopt.scenes import designs
 
 ezdxf: Any = importlib.import_module("ezdxf")
 

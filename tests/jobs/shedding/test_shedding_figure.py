@@ -13,7 +13,7 @@ from loomopt.interface.text import scenes
 from loomopt.interface.text.layout import Grid
 from loomopt.model.curves import split
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.scene import designs
+from loomopt.scenes import designs
 
 LEAST = {"K1": 102602.609425357, "X0": 0.08}
 PACKAGED = ("shedding", "shedding-static", "shedding-printed-travel")

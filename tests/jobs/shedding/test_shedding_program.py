@@ -9,7 +9,7 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
 from loomopt.jobs.shedding.scene import Frame
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.solve.nlp.stations import families
+from loomopt.solving.nlp.stations import families
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)

@@ -10,7 +10,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.scene import designs
+from loomopt.scenes import designs
 
 SCENE = lo.load("shedding")
 

@@ -10,12 +10,12 @@ from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
-from loomopt.solve.engine import solve_program
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.proof import task
-from loomopt.solve.proof.levels import loosening
-from loomopt.solve.proof.task import Task, reduced
-from loomopt.solve.search.search import Search
+from loomopt.solving.engine import solve_program
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.proof import task
+from loomopt.solving.proof.levels import loosening
+from loomopt.solving.proof.task import Task, reduced
+from loomopt.solving.search.search import Search
 
 
 class Solved(NamedTuple):

@@ -7,11 +7,11 @@ from machines_in_boxes import solved
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solve.engine import solve_program
-from loomopt.solve.nlp.point import Settings
-from loomopt.solve.options import Everywhere
-from loomopt.solve.proof.levels import Levels, Outcome, claimed
-from loomopt.solve.search.search import Search, objectives
+from loomopt.solving.engine import solve_program
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.options import Everywhere
+from loomopt.solving.proof.levels import Levels, Outcome, claimed
+from loomopt.solving.search.search import Search, objectives
 
 
 def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import solved
 
-from loomopt.solve.proof.reading import LIMIT, Reader
-from loomopt.solve.proof.tree import multipliers, with_cut
+from loomopt.solving.proof.reading import LIMIT, Reader
+from loomopt.solving.proof.tree import multipliers, with_cut
 
 
 @pytest.mark.parametrize(("name", "level"), [("beatup-light", 0), ("beatup-light", 1), ("beatup", 1)])

@@ -8,9 +8,9 @@ import pytest
 from machines_in_boxes import quietly, solved
 
 from loomopt.maths.intervals import Enclosure
-from loomopt.solve.proof.levels import HELD, Levels, _Level, loosening
-from loomopt.solve.proof.task import reduced, silent
-from loomopt.solve.proof.tree import grown
+from loomopt.solving.proof.levels import HELD, Levels, _Level, loosening
+from loomopt.solving.proof.task import reduced, silent
+from loomopt.solving.proof.tree import grown
 
 FOREVER = 1e12
 TURNS = 3

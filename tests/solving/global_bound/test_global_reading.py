@@ -5,7 +5,7 @@ import pytest
 from machines_in_boxes import solved
 
 from loomopt.model.sampling import Sampler
-from loomopt.solve.proof.reading import LIMIT, Reader
+from loomopt.solving.proof.reading import LIMIT, Reader
 
 
 @pytest.mark.parametrize(

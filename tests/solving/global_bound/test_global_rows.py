@@ -7,9 +7,9 @@ from machines_in_boxes import solved
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval, interval
 from loomopt.model.sampling import Sampler
-from loomopt.solve.proof.nodes import layouts
-from loomopt.solve.proof.reading import Reader
-from loomopt.solve.proof.rows import BoxRows, OpenError, _summed, strips
+from loomopt.solving.proof.nodes import layouts
+from loomopt.solving.proof.reading import Reader
+from loomopt.solving.proof.rows import BoxRows, OpenError, _summed, strips
 
 
 def test_means_hold_the_quadrature_of_designs_in_the_box():

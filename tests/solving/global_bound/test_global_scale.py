@@ -3,7 +3,7 @@
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solve.proof.task import silent
+from loomopt.solving.proof.task import silent
 
 FREE = [
     ("beatup", "balance"),

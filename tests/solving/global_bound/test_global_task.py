@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solve.proof.rows import OpenError
-from loomopt.solve.proof.task import reduced
+from loomopt.solving.proof.rows import OpenError
+from loomopt.solving.proof.task import reduced
 
 
 @pytest.mark.parametrize(

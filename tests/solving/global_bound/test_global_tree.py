@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from loomopt.maths.intervals import Interval, variable
-from loomopt.solve.proof.reading import LIMIT, Read
-from loomopt.solve.proof.tree import BATCH, Question, Tree, grown
+from loomopt.solving.proof.reading import LIMIT, Read
+from loomopt.solving.proof.tree import BATCH, Question, Tree, grown
 
 LOW, HIGH = np.array([-1.0, -2.0]), np.array([2.0, 1.0])
 

@@ -6,7 +6,7 @@ from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Limit, Numbers, Objective, Program, Variable
 from loomopt.model.sampling import Sampler
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 from loomopt_press import model as press
 from loomopt_press.scene import SCHEMA, check
 

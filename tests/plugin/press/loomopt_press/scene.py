@@ -7,8 +7,8 @@ from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import Shown
 from loomopt.physics.effects import declared
 from loomopt.physics.schema import Figure, Table, Target
-from loomopt.scene.scene import Scene
-from loomopt.scene.schema import SceneSchema
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.schema import SceneSchema
 from loomopt_press.model import LONGER
 
 

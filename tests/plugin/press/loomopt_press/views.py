@@ -12,7 +12,7 @@ from loomopt.picture.equations import Equation, Symbols, equation, symbol
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Panel
 from loomopt.picture.shapes import Drawing, Point, drawn_units
-from loomopt.scene.scene import Scene
+from loomopt.scenes.scene import Scene
 from loomopt_press.model import BOTTOM, TOP, SlidePose
 
 HALF = "half way"

@@ -1,0 +1,127 @@
+"""Tables of numbers in CSV files that a scene names: strict, the units in the header; no message repeats a cell."""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import plain_number
+from loomopt.base.refusals import refusal
+from loomopt.base.units import DISPLAY_UNIT, factor
+from loomopt.scenes.scene import Scene
+
+LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
+UNITS = {"angle": ("deg", "rad"), "length": ("mm", "cm", "m", "in")}
+"""Units a column may have, by kind of quantity."""
+TURN = 2 * math.pi + 1e-4
+"""Largest angle, rad: one turn, with room for 6.2832."""
+_HEADING = re.compile(r"(.*\S) +\[(.+)\]")
+
+
+class _Column(NamedTuple):
+    """A column that is read: its name, kind of quantity and place, and its unit in SI."""
+
+    name: str
+    kind: str
+    place: int
+    unit: float
+
+
+def read(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[list[tuple[float, ...]], str]:
+    """Return the columns of a table, SI, and the file as named. Raises BadInput.
+
+    given: the file as the scene names it, under `key`; kinds: column name → kind of quantity.
+    """
+    path = scene.paths.located(given, key, scene.origin)
+    try:
+        if not path.is_file():
+            problem = "the table cannot be read: there is no such file"
+            raise refusal(problem, scene.origin, key, given, remedy="Correct it")
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+        if len(raw) > LARGEST_FILE:
+            raise refusal("the table is too large", given, allowed="up to 1 MB", remedy="Thin it out")
+        lines = io.StringIO(raw.decode("utf-8-sig"), newline=None)
+        rows = list(csv.reader((line for line in lines if line.strip() and not line.startswith("#")), strict=True))
+    except BadInput:
+        raise
+    except OSError as error:
+        problem = f"the table cannot be read: {error.strerror or 'it is no file'}"
+        raise refusal(problem, given, remedy="Check the path and its permissions") from None
+    except UnicodeDecodeError as error:
+        raise refusal(f"it is not UTF-8 text (byte {error.start})", given, remedy="Save the file as UTF-8") from None
+    except (csv.Error, ValueError):
+        remedy = "Write short cells, and close every quotation mark on its own line"
+        raise refusal("the table is not CSV", given, allowed=header(kinds), remedy=remedy) from None
+    return _columns(rows, kinds, given), given
+
+
+def header(kinds: Mapping[str, str]) -> str:
+    """Return the header a table should have."""
+    return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
+
+
+def _columns(rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: str) -> list[tuple[float, ...]]:
+    if not rows:
+        raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
+    columns = list(_found(rows[0], kinds, origin))
+    if not FEWEST_ROWS <= len(rows) - 1 <= MOST_ROWS:
+        found = f"the table has {len(rows) - 1} rows"
+        raise refusal(found, origin, allowed=f"{FEWEST_ROWS} to {MOST_ROWS}", remedy="Give more, or fewer")
+    for line, row in enumerate(rows[1:], 2):
+        _check_length(row, rows[0], line, origin)
+    values = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
+    for column, numbers in zip(columns, values, strict=True):
+        if column.kind == "angle":
+            _check_angles(column.name, numbers, origin)
+    return values
+
+
+def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterator[_Column]:
+    """Yield the columns that a header names. Raises BadInput for one that is not there once, with its unit."""
+    headings = [_HEADING.fullmatch(cell.strip()) for cell in head]
+    for name, kind in kinds.items():
+        named = [(place, each[2]) for place, each in enumerate(headings) if each and each[1] == name]
+        if len(named) > 1:
+            raise refusal(f"the table has column {name} {len(named)} times", origin, remedy="Take out all but one")
+        if not named or named[0][1] not in UNITS[kind]:
+            units = " or ".join(UNITS[kind])
+            problem = f"the table has no column {name} with its unit ({units})"
+            raise refusal(problem, origin, allowed=header(kinds), remedy="Name the columns so, parted by commas")
+        yield _Column(name, kind, named[0][0], factor(named[0][1]))
+
+
+def _check_length(row: Sequence[str], head: Sequence[str], line: int, origin: str) -> None:
+    """Raise BadInput for a row that does not stand under its header: a decimal comma parts one number into two."""
+    nameless = (cell for cell, name in zip(row, head, strict=False) if not name.strip())
+    if len(row) != len(head) or any(cell.strip() for cell in nameless):
+        cells = sum(1 for cell in row if cell.strip())
+        problem = f"row {line} of the table has {cells} numbers or words under {sum(map(bool, head))} columns"
+        remedy = "Write one number in each column, with a decimal point, not a comma"
+        raise refusal(problem, origin, remedy=remedy)
+
+
+def _number(row: Sequence[str], column: _Column, line: int, origin: str) -> float:
+    value = plain_number(row[column.place].strip(" \t"))
+    if value is None:
+        problem = f"row {line} of the table holds no number under {column.name}"
+        remedy = "Write digits and a decimal point, such as 12.5 or 1.25e1"
+        raise refusal(problem, origin, remedy=remedy)
+    return value * column.unit
+
+
+def _check_angles(name: str, angles: Sequence[float], origin: str) -> None:
+    """Raise BadInput for an angle that comes twice, and for angles that are not of one turn."""
+    if max(map(abs, angles)) > TURN or max(angles) - min(angles) > TURN:
+        allowed = "-360 to 360 deg, one turn in all"
+        problem = f"the table's angles {name} go beyond one turn"
+        raise refusal(problem, origin, allowed=allowed, remedy="Check their unit, or take off whole turns")
+    seen: set[float] = set()
+    for line, angle in enumerate(angles, 2):
+        if angle in seen:
+            problem = f"row {line} of the table repeats an angle {name}"
+            raise refusal(problem, origin, remedy="Keep one row for each angle")
+        seen.add(angle)

@@ -1,0 +1,195 @@
+"""Designs from files: the JSON of a `design` object, or of a whole answer; numbers in SI, or text with units."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Quantity, described, quantity_of
+from loomopt.base.refusals import misread, refusal, unknown
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
+from loomopt.physics.effects.kinds import label
+from loomopt.scenes.scene import Scene
+
+LARGEST_FILE = 1_000_000
+"""Bytes; an answer has a few thousand."""
+LONGEST = 1000
+"""Numbers in a list."""
+LARGEST = 1e60
+"""SI; fourth powers of it are still numbers."""
+OUTGROWN = 10.0
+"""Factor on a machine's longest length beyond which a bare number is none in metres: one in mm is off by 1000."""
+MEANT = {"length": "metres", "angle": "radians"}
+"""What a bare number of a kind of quantity is in, where it may be taken for something else."""
+Design = Mapping[str, float | Sequence[float]]
+"""A design by label, SI and rad; parts of it may be lists of numbers."""
+Given = Mapping[str, float | str | Sequence[float | str]]
+"""A design as it is given: numbers, or text with units."""
+_ALLOWED = "a finite number in SI units, not negative"
+_PLACE = re.compile("0|[1-9][0-9]{0,2}")
+_GIVE = "Give an answer's design, or a part of it"
+_GIVE_FILE = "Give the JSON that `loomopt solve --json` prints, or its design object"
+
+
+def read(path: Path, scene: Scene) -> dict[str, float]:
+    """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
+    data = loaded(path)
+    return checked(data["design"] if isinstance(data, dict) and "design" in data else data, scene, str(path))
+
+
+def loaded(path: Path) -> object:
+    """Return what a JSON file of a design or an answer holds, unchecked. Raises BadInput."""
+    import json
+
+    origin = str(path)
+    try:
+        if not path.is_file():
+            what = "it is no ordinary file" if path.exists() else "there is no such file"
+            raise refusal(f"the design cannot be read: {what}", origin, remedy="Correct the path")
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+        if len(raw) > LARGEST_FILE:
+            raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
+        found: object = json.loads(raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _once(pairs, origin))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise refusal(f"the design cannot be read: {reason}", origin, remedy="Check the path") from None
+    except BadInput:
+        raise
+    except (ValueError, RecursionError):
+        raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
+    return found
+
+
+def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
+    """Return the entries of a JSON object. Raises BadInput where a name comes twice."""
+    found: dict[str, object] = {}
+    for name, value in pairs:
+        if name in found:
+            raise refusal("a name comes twice in one object", origin, name, remedy="Take out all but one")
+        found[name] = value
+    return found
+
+
+def packed(design: Mapping[str, float], names: Iterable[str]) -> dict[str, float | Sequence[float]]:
+    """Return a design with NAME_0, NAME_1 ... of each named list as one tuple."""
+    found: dict[str, float | Sequence[float]] = dict(design)
+    for name in names:
+        members = {k: key for key in design if (k := _place(key, name)) is not None}
+        if members:
+            found = {key: value for key, value in found.items() if key not in members.values()}
+            found[name] = tuple(design[members[k]] for k in sorted(members))
+    return found
+
+
+def flat(design: Design) -> dict[str, float]:
+    """Return a design with each list's numbers under names of their own, NAME_0, NAME_1 ..."""
+    found: dict[str, float] = {}
+    for name, value in design.items():
+        found |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
+    return found
+
+
+def _place(key: str, name: str) -> int | None:
+    number = key.removeprefix(f"{name}_")
+    return int(number) if number != key and _PLACE.fullmatch(number) else None
+
+
+def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, float]:
+    """Return a design given as a mapping, SI and rad, after checking names, numbers and assembly. Raises BadInput.
+
+    A number in it is SI; text is a number with its unit.
+    """
+    kinds = _numbers(scene)
+    lists = {name: Quantity(kind) for name, kind in scene.schema.lists.items()}
+    if not isinstance(data, Mapping) or not data:
+        known = ", ".join(scene.schema.variables)
+        raise refusal("there is no design", origin, allowed=f"an object of {known}, SI", remedy=_GIVE)
+    data = {name: value for name, value in data.items() if name not in lists} | _listed(data, lists, origin)
+    design = {}
+    for name, value in data.items():
+        listed = next((lists[of] for of in lists if _place(str(name), of) is not None), None)
+        if listed:
+            kinds[name] = listed
+        if name not in kinds:
+            raise unknown("design variable", str(name), [*kinds, *lists], origin, f"design.{name}")
+        design[name] = _read(value, kinds[name], origin, f"design.{name}")
+        if not isinstance(value, str) and abs(design[name]) > _largest(scene, name, kinds[name].kind):
+            raise _meant(scene, name, kinds[name].kind, design[name], origin)
+    for of in lists:
+        places = sorted(k for name in design if (k := _place(name, of)) is not None)
+        if places != list(range(len(places))):
+            remedy = f"Give all from {of}_0 on, or {of} as a list"
+            raise refusal(f"numbers of {of} are missing", origin, f"design.{of}", remedy=remedy)
+    fault = scene.schema.fault({**scene.mechanism, **design}, scene.show)
+    if fault:
+        remedy = "Correct its lengths; numbers without a unit are metres and radians"
+        raise refusal(f"the design does not assemble: {fault}", origin, "design", remedy=remedy)
+    return design
+
+
+def _read(value: object, quantity: Quantity, origin: str, key: str) -> float:
+    """Return one number of a design, SI. Raises BadInput."""
+    if isinstance(value, str):
+        try:
+            return quantity.validate(value)
+        except QuantityError as error:
+            raise misread(error, origin, key, value) from None
+    allowed = f"{_ALLOWED}, or {described(quantity.kind)}"
+    if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) < LARGEST:
+        if _fits(quantity, value):
+            return float(value)
+        allowed = f"{_ALLOWED}; {quantity.range}"
+    raise refusal("no design can have it", origin, key, value, allowed, "Correct the number")
+
+
+def _largest(scene: Scene, name: str, kind: str) -> float:
+    """Return how large a number without a unit may be before it is taken for one in another unit than SI."""
+    if kind not in MEANT:
+        return LARGEST
+    quantities = {key: quantity_of(scene.schema.mechanism, key) for key in scene.mechanism}
+    sizes = [abs(scene.mechanism[key]) for key, quantity in quantities.items() if quantity and quantity.kind == kind]
+    known = 2 * math.pi if kind == "angle" else OUTGROWN * max(sizes, default=LARGEST)
+    bound = scene.bounds.get(name)
+    return max(known, abs(bound.min), abs(bound.max)) if bound else known
+
+
+def _meant(scene: Scene, name: str, kind: str, value: float, origin: str) -> BadInput:
+    """Return the error for a bare number that is too large for its unit in SI."""
+    unit = scene.shown_in(kind)
+    unit = DISPLAY_UNIT[kind] if unit == SI_UNIT[kind] else unit
+    problem = f"a number without a unit is SI, and this is far beyond the machine: {MEANT[kind]}?"
+    remedy = f'Write "{value:.6g} {unit}", or "{show(value, SI_UNIT[kind])}" where {MEANT[kind]} are meant'
+    return refusal(problem, origin, f"design.{name}", value, remedy=remedy)
+
+
+def _listed(data: Mapping[str, Any], lists: Mapping[str, Quantity], origin: str) -> dict[str, Any]:
+    """Return the numbers of a design's lists, each under a name of its own. Raises BadInput."""
+    found: dict[str, Any] = {}
+    for name in lists:
+        values = data.get(name, [])
+        if not isinstance(values, list | tuple) or len(values) > LONGEST:
+            allowed = f"a list of up to {LONGEST} numbers"
+            raise refusal("it is not such a list", origin, f"design.{name}", allowed=allowed, remedy=_GIVE)
+        if values and any(_place(str(key), name) is not None for key in data):
+            raise refusal(f"{name} is given as a list and by number", origin, f"design.{name}", remedy=_GIVE)
+        found |= {f"{name}_{k}": value for k, value in enumerate(values)}
+    return found
+
+
+def _numbers(scene: Scene) -> dict[str, Quantity]:
+    """Return what kind of quantity each number of a scene is that a design may hold."""
+    found: dict[str, Quantity | None] = {}
+    for model in (scene.schema.mechanism, scene.schema.operation):
+        found |= {name: quantity_of(model, name) for name in model.model_fields}
+    for effect in scene.active:
+        found |= {label(effect, key): quantity_of(effect.own, key) for key in effect.own.model_fields}
+    first = {name: found[name] for name in scene.schema.variables}
+    return {name: quantity for name, quantity in {**first, **found}.items() if quantity}
+
+
+def _fits(quantity: Quantity, value: float) -> bool:
+    """Say whether a number in SI lies in its quantity's range."""
+    return value >= quantity.least and quantity.above < value < quantity.below

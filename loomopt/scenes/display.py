@@ -1,0 +1,149 @@
+"""The units in which a person sees a scene: of [display], else as the scene writes them, else composed of those."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from loomopt.base.quantities import misfit, quantity_of, unit_of
+from loomopt.base.refusals import misread, refusal, unknown
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
+from loomopt.physics.effects.kinds import Effect
+from loomopt.physics.schema import Table
+from loomopt.scenes.document import looked_up
+from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import Bound, Limit, table
+
+KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
+"""Key of [display] → kind of quantity."""
+_LONGEST = 60
+_BASES = {"m": "length", "kg": "mass", "N": "force"}
+"""Letter of an SI unit → the kind whose unit stands for it in a composed one."""
+_INCHES = {"length": "in", "mass": "lb", "force": "lbf"}
+_OF_INCHES = {"in", "inch", "ft", "lb", "lbf"}
+_PRESSURES = {"lbf": "psi"}
+"""Unit of force → the unit of pressure that goes with it by habit."""
+
+
+def read(raw: object, origin: str) -> dict[str, str]:
+    """Return [display]: kind of quantity → its unit. Raises BadInput for the first thing that is wrong."""
+    found = {}
+    for key, unit in table(raw, origin, "display").items():
+        path = f"display.{key}"
+        if key not in KINDS:
+            raise unknown("kind of quantity", key, KINDS, origin, path)
+        kind = KINDS[key]
+        allowed = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+        if not isinstance(unit, str) or len(unit) > _LONGEST:
+            raise refusal("it is not a unit", origin, path, unit, allowed, "Write the unit alone, as text")
+        try:
+            fitting = fits(unit.strip(), kind)
+        except QuantityError as error:
+            raise misread(QuantityError(error.problem, allowed, error.remedy), origin, path, unit) from None
+        if not fitting:
+            raise refusal(misfit(unit.strip(), kind), origin, path, unit, allowed, "Write another unit")
+        found[kind] = ascii_unit(unit.strip())
+    return found
+
+
+def units(
+    document: Mapping[str, Any],
+    schema: SceneSchema,
+    active: Iterable[Effect],
+    ranges: tuple[Mapping[str, Bound], Mapping[str, Limit]],
+) -> dict[str, str]:
+    """Return the unit of every kind of quantity; ranges: [bounds] and [limits], which come after the scene's numbers.
+
+    document: checked; its [display] goes before all.
+    """
+    first: dict[str, str] = {}
+    for kind, unit in _written(document, schema, active, ranges):
+        if kind not in first and fits(unit, kind):
+            first[kind] = ascii_unit(unit)
+    return _completed({**first, **read(document.get("display", {}), "")})
+
+
+def unit_for(si: str, known: Mapping[str, str]) -> str:
+    """Return the unit in which a person sees what has an SI unit; known: unit of every kind of quantity.
+
+    What swings stays in rad/s, whatever unit the shaft's speed has.
+    """
+    kind = next((kind for kind, unit in SI_UNIT.items() if unit == si and kind != "angular speed"), None)
+    return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
+
+
+def filed_in(si: str, known: Mapping[str, str], chosen: bool) -> str:
+    """Return the unit in which a file of curves has what has an SI unit; known: unit of every kind of quantity.
+
+    chosen: whether the scene's [display] chooses units. Without it lengths and forces are the SI's unless the scene's
+    are no decimal multiples of them (inches, pounds), and angles are in rad.
+    """
+    unit = unit_for(si, known)
+    return unit if chosen or not (_is_decimal(unit) or fits(unit, "angle")) else si
+
+
+def _written(
+    document: Mapping[str, Any],
+    schema: SceneSchema,
+    active: Iterable[Effect],
+    ranges: tuple[Mapping[str, Bound], Mapping[str, Limit]],
+) -> Iterator[tuple[str, str]]:
+    """Yield each quantity's kind with the unit it is written in, in the order in which the first one counts."""
+    tables: list[tuple[tuple[str, ...], type[Table]]] = [
+        (("mechanism",), schema.mechanism),
+        (("operation",), schema.operation),
+    ]
+    tables += [(("effects", *effect.path), effect.own) for effect in active]
+    for path, own in tables:
+        for key in own.model_fields:
+            quantity, text = quantity_of(own, key), looked_up(document, (*path, key))
+            if quantity and isinstance(text, str):
+                yield quantity.kind, unit_of(text)
+    bounds, limits = ranges
+    yield from ((schema.variables[name], bound.unit) for name, bound in bounds.items() if name in schema.variables)
+    yield from ((schema.figures[name].kind, limit.unit) for name, limit in limits.items())
+
+
+def _completed(own: Mapping[str, str]) -> dict[str, str]:
+    """Return a unit for every kind: its own one, else one composed of the scene's, else the usual one.
+
+    The SI's own composed units (N*m, N/m, 1/m) stay wherever lengths, masses and forces are decimal multiples of its
+    units.
+    """
+    inches = any(own.get(kind) in _OF_INCHES for kind in _INCHES)
+    bases = {kind: own.get(kind) or (_INCHES[kind] if inches else DISPLAY_UNIT[kind]) for kind in _INCHES}
+    letters = {letter: bases[kind] for letter, kind in _BASES.items()}
+    found = {**bases, **own}
+    torque = SI_UNIT["torque"]
+    for kind, si in SI_UNIT.items():
+        if kind in found:
+            continue
+        if kind == "pressure":
+            found[kind] = _pressure(bases)
+        elif kind == "energy":
+            found[kind] = si if _is_decimal(found["torque"]) else found["torque"]
+        elif kind != "torque" and si.startswith(torque):
+            found[kind] = si.replace(torque, found["torque"], 1)
+        else:
+            found[kind] = _composed(si, letters) or DISPLAY_UNIT[kind]
+    return {kind: found[kind] for kind in SI_UNIT}
+
+
+def _composed(si: str, letters: Mapping[str, str]) -> str:
+    """Return an SI unit written with a scene's own units; "" where these are the SI's or its decimal multiples."""
+    used = [unit for letter, unit in letters.items() if re.search(rf"\b{letter}\b", si)]
+    if all(map(_is_decimal, used)) or not all(unit.isalpha() for unit in used):
+        return ""
+    return re.sub(r"[A-Za-z]+", lambda letter: letters.get(letter[0], letter[0]), si)
+
+
+def _pressure(bases: Mapping[str, str]) -> str:
+    """Return the unit of pressure that goes with a scene's forces."""
+    force = bases["force"]
+    composed = "" if _is_decimal(force) else _composed("N/m^2", {"N": force, "m": bases["length"]})
+    return _PRESSURES.get(force) or composed or DISPLAY_UNIT["pressure"]
+
+
+def _is_decimal(unit: str) -> bool:
+    """Say whether a unit is a power of ten of the SI's."""
+    factor = parse_unit(unit).factor
+    return bool(re.fullmatch("10*", str(factor.numerator * factor.denominator)))

@@ -1,0 +1,122 @@
+"""What a study varies and depends on: the numbers of a scene by dotted key, and the files that it names."""
+
+import contextlib
+import re
+from collections.abc import Iterator, Mapping
+from decimal import Decimal, localcontext
+from typing import Any
+
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import Quantity, plain_number, quantity_of
+from loomopt.base.refusals import refusal, unknown
+from loomopt.physics.effects.kinds import label
+from loomopt.physics.schema import Table
+from loomopt.scenes.scene import Scene
+
+WITHOUT_FILES = ("problem", "display")
+"""Tables whose texts are never names of files."""
+
+
+def quantity(scene: Scene, key: str) -> Quantity:
+    """Return what the number under a dotted key may be. Raises BadInput where the scene has no number there."""
+    known = dict(_quantities(scene))
+    table = key.rpartition(".")[0]  # such as a target's weights, each number of which has a name of its own
+    if key in known or (table in known and scene.given(key) is not None):
+        return known.get(key) or known[table]
+    if scene.given(key) is not None:
+        remedy = "Vary a number, such as operation.speed"
+        raise refusal("it is no number", scene.origin, key, scene.given(key), remedy=remedy)
+    raise unknown("number", key, known, scene.origin, key)
+
+
+def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
+    """Yield the dotted key of every number that a scene may hold, with what it may be."""
+    schema, labels = scene.schema, {name: Quantity(kind) for name, kind in scene.schema.variables.items()}
+    for table, model in (("operation", schema.operation), ("mechanism", schema.mechanism)):
+        for key, found in _fields(model):
+            yield f"{table}.{key}", found
+            labels.setdefault(key, found)
+    for effect in scene.active:
+        for key, found in _fields(effect.own):
+            yield ".".join(("effects", *effect.path, key)), found
+            labels.setdefault(label(effect, key), found)
+    for name, target in schema.targets.items():
+        for key, found in _fields(target.own):
+            yield f"targets.{name}.{key}", found
+    for name in scene.bounds:
+        for place in (f"bounds.{name}", f"bounds.{name}.min", f"bounds.{name}.max"):
+            yield place, labels[name]
+    for name, limit in scene.limits.items():
+        for side in ("min", "max"):
+            if getattr(limit, side) is not None:
+                yield f"limits.{name}.{side}", Quantity(schema.figures[name].kind)
+
+
+def _fields(model: type[Table]) -> Iterator[tuple[str, Quantity]]:
+    for key in model.model_fields:
+        found = quantity_of(model, key)
+        if found:
+            yield key, found
+
+
+def files(scene: Scene) -> dict[str, str]:
+    """Return the SHA-256 of every file that a scene names, by the dotted key of its name."""
+    import hashlib
+
+    found = {}
+    for key, text in _texts({name: own for name, own in scene.document.items() if name not in WITHOUT_FILES}):
+        with contextlib.suppress(BadInput, OSError, ValueError):  # what can be no file's name is none
+            path = scene.paths.located(text, key, scene.origin)
+            if path.is_file():
+                found[key] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+def _texts(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _texts(value, (*path, name))
+        elif isinstance(value, str):
+            yield ".".join((*path, name)), value
+
+
+MOST_VALUES = 20_000
+"""Points of a study."""
+_RANGE = re.compile(r"([^:\s]+) *: *([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
+_ENDS = re.compile(r"([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")
+FORM, EXAMPLE = "LO:HI:STEP UNIT", "600:900:25 N*m"
+_ALLOWED = f"{FORM}, such as {EXAMPLE}"
+
+
+def range_values(text: str, key: str) -> list[str]:
+    """Return LO, LO + STEP, … and HI of "LO:HI:STEP UNIT", each as text with the unit; digits are exact.
+
+    Where the steps do not meet HI the last one is shorter. Raises BadInput.
+    """
+    found = _RANGE.fullmatch(text.strip())
+    numbers = [number for number in (found.groups()[:3] if found else ()) if plain_number(number) is not None]
+    if found is None or len(numbers) < 3:
+        raise _refused("it is no range of numbers", key, text)
+    low, high, step = map(Decimal, numbers)
+    if step <= 0 or high < low:
+        raise _refused("the range has no step forward", key, text, "Write the smaller end first, and a step above 0")
+    with localcontext(prec=200):
+        if (high - low) / step > MOST_VALUES:
+            raise _refused(f"the range has more than {MOST_VALUES} values", key, text, "Write a larger step")
+        steps = [low + k * step for k in range(int((high - low) / step) + 1)]
+        steps += [high] if steps[-1] < high else []
+        told = [f"{value.normalize():f}" for value in steps]
+    return [f"{number} {found[4]}" if found[4] else number for number in told]
+
+
+def range_ends(text: str, key: str) -> tuple[str, str]:
+    """Return LO and HI of "LO:HI UNIT", each as text with the unit. Raises BadInput."""
+    found = _ENDS.fullmatch(text.strip())
+    if found is None or None in map(plain_number, found.groups()[:2]):
+        raise _refused("it is no range of numbers", key, text, allowed="LO:HI UNIT, such as 0:5 kg")
+    low, high = (f"{number} {found[3]}" if found[3] else number for number in found.groups()[:2])
+    return low, high
+
+
+def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range", allowed: str = _ALLOWED) -> BadInput:
+    return refusal(problem, "", key, text, allowed, remedy)

@@ -1,0 +1,82 @@
+"""Where packaged scenes and reference results stand: in the installed package, else at the checkout's top."""
+
+import difflib
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from loomopt.base.errors import BadInput, clean
+from loomopt.base.refusals import shown
+from loomopt.scenes.document import looked_up, read_document
+
+
+def _folder(name: str) -> Path:
+    package = Path(__file__).resolve().parents[1]
+    return package / name if (package / name).is_dir() else package.parent / name
+
+
+def scenes(folder: Path) -> dict[str, Path]:
+    """Return the files of the scenes in a folder by name, in alphabetical order; none where there is no such folder."""
+    return dict(sorted((path.stem, path) for path in folder.glob("*.toml")))
+
+
+def problems() -> dict[str, Path]:
+    """Return the files of the packaged scenes by name, in alphabetical order."""
+    return scenes(_folder("problems"))
+
+
+class Head(NamedTuple):
+    """What `loomopt list` tells of a scene; targets: those it has a table for."""
+
+    name: str
+    title: str
+    job: str
+    targets: tuple[str, ...]
+    source: str
+
+
+def head(path: Path) -> Head:
+    """Return the head of a packaged scene, nothing else of which is looked at. Raises BadInput."""
+    document = read_document(path)
+    title, job, source = (str(looked_up(document, ("problem", key)) or "") for key in ("title", "job", "source"))
+    targets = looked_up(document, ("targets",))
+    return Head(path.stem, title, job, tuple(targets) if isinstance(targets, dict) else (), source)
+
+
+def problem_names() -> list[str]:
+    """Return the names of the packaged scenes, in alphabetical order."""
+    return list(problems())
+
+
+def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadInput] = ()) -> BadInput:
+    """Return the error, with the nearest name, for a scene that is not packaged.
+
+    faults: of jobs that other distributions bring: one that cannot be imported may be what brings the scene.
+    """
+    near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
+    hint = f'perhaps "{near[0]}" is meant' if near else "see `loomopt list`"
+    return BadInput(
+        "; ".join(["there is no packaged scene of this name", *(fault.problem for fault in faults)]),
+        file=clean(name, 80),
+        value=shown(name),
+        allowed=", ".join(known),
+        remedy=f"Correct the name ({hint}), or give a path that ends in .toml",
+    )
+
+
+def problems_path() -> Path:
+    """Return the folder of the packaged scenes."""
+    return _folder("problems")
+
+
+def results_path() -> Path:
+    """Return the folder of the reference results."""
+    return _folder("results")
+
+
+def is_path(name_or_path: str | os.PathLike[str]) -> bool:
+    """Say whether text is a path: with a separator, or ending in .toml; else it is a packaged name."""
+    text = os.fspath(name_or_path)
+    separators = {os.sep, os.altsep or os.sep}
+    return isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or bool(separators & set(text))

@@ -1,0 +1,39 @@
+"""Where a table comes from, and tables as CSV text that says so."""
+
+import functools
+from typing import TYPE_CHECKING
+
+from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+VERSIONED = ("loomopt", "casadi", "numpy")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that numbers depend on: this package's, CasADi's with its IPOPT, NumPy's."""
+    return {name: _version(name) for name in VERSIONED}
+
+
+@functools.cache
+def _version(name: str) -> str:
+    import importlib.metadata
+
+    return importlib.metadata.version(name)
+
+
+def provenance(scene: Scene, **more: object) -> dict[str, str]:
+    """Return where a table comes from: scene, its hash and effects, versions, date, and what else matters to it."""
+    import datetime
+
+    today = datetime.datetime.now(tz=datetime.UTC).date().isoformat()
+    told = {name: str(value) for name, value in more.items()}
+    effects = ", ".join(scene.effects) or "none"
+    return {"scene": scene.name, "scene_hash": scene.hash, "effects": effects, **told, **versions(), "date": today}
+
+
+def csv(frame: "pd.DataFrame") -> str:
+    """Return a table as CSV text, its provenance in comment lines before the header; digits round-trip."""
+    head = "".join(f"# {name}: {value}\n" for name, value in frame.attrs.items())
+    return head + str(frame.to_csv(index=frame.index.name is not None, lineterminator="\n"))

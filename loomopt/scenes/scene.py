@@ -1,0 +1,305 @@
+"""A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from loomopt.base.errors import clean
+from loomopt.base.records import Shown, freeze, lazy
+from loomopt.base.refusals import refusal, shown, unknown
+from loomopt.base.units import show
+from loomopt.physics.effects.kinds import Effect, label, owned
+from loomopt.physics.schema import Table
+from loomopt.scenes import display
+from loomopt.scenes import tables as read
+from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
+from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import Bound, JobNames, Limit
+
+_Own = TypeVar("_Own", bound=Table)
+
+TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
+
+
+class Jobs(JobNames, Protocol):
+    """Where a scene finds its job by name."""
+
+    def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str], /) -> SceneSchema:
+        """Return what a scene of a job may hold, with the effects it names where anybody brings them."""
+
+    def check(self, scene: "Scene", /) -> None:
+        """Raise BadInput where today's machine is not one that its job can work on."""
+
+
+@dataclass(frozen=True, repr=False)
+class Scene(Shown):
+    """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
+
+    document: the raw tables, never to be changed; origin: the file they came from; schema: what its job declares.
+    operation, mechanism: numbers given or defaulted; tables: both as their models, words and lists too.
+    effects: tables of those that are on, in the order of the job, by name; active: the effects themselves.
+    bounds: by label of number; limits: by name of figure; targets: every target of the job.
+    paths: where the files lie that it names.
+    """
+
+    document: Mapping[str, Any]
+    origin: str
+    schema: SceneSchema
+    jobs: Jobs = field(compare=False)
+    name: str
+    title: str
+    source: str
+    operation: Mapping[str, float]
+    mechanism: Mapping[str, float]
+    tables: Mapping[str, Table]
+    effects: Mapping[str, Table]
+    active: tuple[Effect, ...]
+    bounds: Mapping[str, Bound]
+    limits: Mapping[str, Limit]
+    targets: Mapping[str, Table]
+    paths: Paths = field(compare=False)
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
+
+    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths]]:
+        """Return how to make it again: from its tables, for formulas do not pickle."""
+        return build, (self.document, self.jobs, self.origin, self.paths)
+
+    def __repr__(self) -> str:
+        on = ", ".join(self.effects) or "none"
+        return f"<Scene {self.name}: {self.title} (job {self.job}; effects {on})>"
+
+    @property
+    def job(self) -> str:
+        """The name of its job."""
+        return self.schema.name
+
+    def own(self, model: type[_Own]) -> _Own | None:
+        """Return the table of an effect that is on, by the model of its values; None where it is off."""
+        return next((table for table in self.effects.values() if isinstance(table, model)), None)
+
+    def table(self, model: type[_Own]) -> _Own:
+        """Return [operation], [mechanism] or the table of a target, by its model."""
+        return next(each for each in (*self.tables.values(), *self.targets.values()) if isinstance(each, model))
+
+    def full(self, name: str) -> str:
+        """Return the full name of a number by what a designer calls it; any other name is one already."""
+        if name in self.mechanism or name in self.operation:
+            return name
+        labels = {label(e, key): owned(e, key) for e in reversed(self.active) for key in e.own.model_fields}
+        return labels.get(name, name)
+
+    def given(self, key: str) -> str | None:
+        """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
+        value = looked_up(self.document, key.split("."))
+        if value is None or isinstance(value, Mapping):
+            return None
+        return value if isinstance(value, str) else shown(value)
+
+    @lazy
+    def units(self) -> Mapping[str, str]:
+        """Kind of quantity → the unit in which a person sees it: of [display], else as written, else composed."""
+        return display.units(self.document, self.schema, self.active, (self.bounds, self.limits))
+
+    def shown_in(self, kind: str) -> str:
+        """Return the unit in which a person sees quantities of a kind."""
+        return self.units[kind]
+
+    def unit_for(self, si: str) -> str:
+        """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
+        return display.unit_for(si, self.units)
+
+    def filed_in(self, si: str) -> str:
+        """Return the unit in which a file of curves has what has an SI unit."""
+        return display.filed_in(si, self.units, bool(self.document.get("display")))
+
+    def show(self, value: float, kind: str, digits: int = 6) -> str:
+        """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
+        return show(value, self.units[kind], digits)
+
+    def set(self, key: str, value: object) -> "Scene":
+        """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
+        return self.update({key: value})
+
+    def update(self, values: Mapping[str, object]) -> "Scene":
+        """Return the scene with several dotted keys set at once.
+
+        A key of an effect that is off puts it on, with the other values from [available]. A bound that is one
+        value becomes a range once its min and max are set.
+        """
+        return self.change(values)
+
+    def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
+        """Return the scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
+        document = self._off(self._on(self._set(values), on), off)
+        if document is self.document:
+            return self
+        return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
+
+    def _set(self, values: Mapping[str, object]) -> Mapping[str, Any]:
+        document = self.document
+        for key, value in values.items():
+            parts = self._path(key)
+            effect = self.schema.effects.get(parts[1]) if parts[0] == "effects" and len(parts) > 1 else None
+            own = parts[: 3 if effect and effect.many else 2]
+            inside = looked_up(document, own)
+            if parts[0] == "effects" and len(parts) > len(own) and inside is None:
+                document = _put_on(document, *own[1:])
+            if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
+                document = replaced(document, own, {}, self.origin, key)
+            document = replaced(document, parts, value, self.origin, key)
+        return document
+
+    def with_effect(self, *names: str) -> "Scene":
+        """Return the scene with effects put on together, their values from [available.NAME]."""
+        return self.change({}, on=names)
+
+    def _on(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
+        for name in names:
+            parts = self._effect_path(name)
+            if looked_up(document, ("effects", *parts)) is None:
+                self._demand_values(document, name, parts)
+                document = _put_on(document, *parts)
+        return document
+
+    def _demand_values(self, document: Mapping[str, Any], name: str, parts: list[str]) -> None:
+        """Raise BadInput for an effect that is off and has no table in [available]."""
+        fields = self._effect(name).own.model_fields
+        keys = [f"effects.{name}.{key}" for key, info in fields.items() if info.is_required()]
+        if keys and looked_up(document, ("available", *parts)) is None:
+            remedy = f"Set {', '.join(keys)} instead, which puts it on, or add the table [available.{name}]"
+            raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
+
+    def without_effect(self, *names: str) -> "Scene":
+        """Return the scene with effects taken off together; their values stay in [available.NAME]."""
+        return self.change({}, off=names)
+
+    def _off(self, document: Mapping[str, Any], names: Iterable[str]) -> Mapping[str, Any]:
+        for name, parts in [(name, self._effect_path(name)) for name in names]:
+            own = looked_up(document, ("effects", *parts))
+            if own is not None:
+                document = removed(document, ("effects", *parts))
+                document = replaced(document, ("available", *parts), own, self.origin, f"available.{name}")
+        return document
+
+    def free(self, names: Iterable[str] | str) -> "Scene":
+        """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
+        named = names.replace(",", " ").split() if isinstance(names, str) else list(names)
+        ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
+        groups = {group: [n for n in of if n in ranges] for group, of in self.schema.groups.items()}
+        asked = [each for name in named for each in groups.get(name) or [name]]
+        for name in asked:
+            if name not in ranges:
+                single = [bound for bound in ranges if not self.bounds[bound].free]
+                held = ", ".join(dict.fromkeys([*(group for group, of in groups.items() if of), *single]))
+                allowed = held or "nothing: no bound has free = false"
+                remedy = "Give it min and max in [bounds]"
+                raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
+        return self.update({f"bounds.{name}.free": True for name in asked})
+
+    @property
+    def hash(self) -> str:
+        """Twelve hex digits of all that decides an answer: the checked numbers, SI, no name or title."""
+        import hashlib
+        import json
+
+        content = {
+            "job": self.job,
+            "operation": given(self.tables["operation"]),
+            "mechanism": given(self.tables["mechanism"]),
+            "effects": {name: own.model_dump() for name, own in self.effects.items()},
+            "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
+            "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
+            "targets": {name: own.model_dump(exclude={"expected"}) for name, own in self.targets.items()},
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
+
+    def _path(self, key: str) -> list[str]:
+        """Return the names of a dotted key."""
+        parts = key.split(".")
+        if all(parts) and (len(parts) > 1 or key in TABLES):
+            return parts
+        problem = f"unknown table {shown(key)}" if len(parts) == 1 else "a name in the key is empty"
+        remedy = "Name the table and the key, such as operation.M0"
+        raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
+
+    def _effect(self, name: str) -> Effect:
+        """Return a declared effect; of an instance, its kind."""
+        return self.jobs.schema(self.job, self.document, (self._kind(name),)).effects[self._kind(name)]
+
+    def _kind(self, name: str) -> str:
+        """Return the kind of an effect as the command names it: "mass" of "mass.rod"."""
+        return name.split(".")[0]
+
+    def _effect_path(self, name: str) -> list[str]:
+        """Return where an effect's table stands inside [effects]; raises BadInput for one that is not declared."""
+        known = self.jobs.schema(self.job, self.document, (self._kind(name),)).effects
+        if self._kind(name) not in known:
+            raise unknown("effect", name, known, self.origin, "effects")
+        return name.split(".")
+
+
+def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
+    """Move an effect's table from [available] to [effects]."""
+    own = looked_up(document, ("available", *effect))
+    on = replaced(document, ("effects", *effect), {} if own is None else own, "", f"effects.{'.'.join(effect)}")
+    return on if own is None else removed(on, ("available", *effect))
+
+
+def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None) -> Scene:
+    """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
+
+    paths: where the files lie that it names; without, they are the caller's own. Raises BadInput for the first thing
+    that is wrong.
+    """
+    original = copied(document, origin)
+    for name in original:
+        if name not in TABLES:
+            raise unknown("table", name, TABLES, origin, name)
+    raw: dict[str, Any] = {name: {} for name in TABLES} | original
+    problem = read.problem(raw["problem"], jobs, origin)
+    named = [*read.table(raw["effects"], origin, "effects"), *read.table(raw["available"], origin, "available")]
+    schema = jobs.schema(problem.job, original, named)
+    tables = {
+        "operation": read.checked(schema.operation, raw["operation"], origin, "operation"),
+        "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism"),
+    }
+    active = read.effects(raw["effects"], schema, origin, "effects")
+    available = read.effects(raw["available"], schema, origin, "available")
+    read.demand(schema, tables, active, origin)
+    places = list(read.places(schema, tables, active, available))
+    own_targets = {name: {} for name in schema.targets} | dict(read.table(raw["targets"], origin, "targets"))
+    targets = {name: target.own for name, target in schema.targets.items()}
+    display.read(raw["display"], origin)
+    scene = Scene(
+        document=original,
+        origin=clean(origin),
+        schema=schema,
+        jobs=jobs,
+        name=problem.name,
+        title=clean(" ".join(problem.title.split())),
+        source=clean(" ".join(problem.source.split())),
+        operation=_numbers(tables["operation"]),
+        mechanism=_numbers(tables["mechanism"]),
+        tables=tables,
+        effects={effect.name: own for effect, own in active.items()},
+        active=tuple(active),
+        bounds=read.bounds(raw["bounds"], schema, places, origin),
+        limits=read.limits(raw["limits"], schema, tuple(active), origin),
+        targets=read.named(own_targets, targets, "target", origin, "targets"),
+        paths=paths or Paths(),
+    )
+    jobs.check(scene)
+    return scene
+
+
+def given(table: Table) -> dict[str, Any]:
+    """Return the values of a table that are given or defaulted, words and lists too."""
+    return {name: value for name, value in table if value is not None}
+
+
+def _numbers(table: Table) -> dict[str, float]:
+    """Return the numbers of a table that are given or defaulted."""
+    return {name: value for name, value in table if isinstance(value, float)}

@@ -1,0 +1,242 @@
+"""From a judged design to what a person and a script read."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from loomopt.base.units import factor
+from loomopt.jobs.base import Job
+from loomopt.model import numbers
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
+from loomopt.physics.tolerances import FEASIBLE
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies
+from loomopt.solving.answer.words import Words
+from loomopt.solving.certificate.verdict import Certificate
+
+Today = Callable[[], Evaluation]
+"""Evaluates today's machine."""
+
+
+def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
+    """Return a design's figures and limits, each limit judged from the figures alone."""
+    figures = job.figures(scene, design)
+    words = Words(scene)
+    labels = numbers.labels(scene)
+    named = {labels.get(name, name): value for name, value in design.items()}
+    shown = designs.packed(named, scene.schema.lists)
+    return Evaluation(
+        problem=scene.name,
+        effects=tuple(scene.effects),
+        design=shown,
+        figures=figures,
+        units={name: words.si(name) for name in (*shown, *figures)},
+        limits=_findings(program, figures, named, job.sampler(scene, design)),
+        reached={goal.figure: goal.reached(figures) for goal in program.goals},
+        scene=scene,
+    )
+
+
+def _findings(
+    program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
+) -> tuple[Finding, ...]:
+    """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
+    sides: dict[tuple[str, bool], dict[int, float]] = {}
+    sizes: dict[tuple[str, bool], float] = {}
+    values: dict[str, float | None] = {**design, **figures, **sampler.static}
+    for limit in program.limits:
+        if limit.hidden or (limit.family == "variable" and limit.name not in values):
+            continue
+        if limit.family == "cycle" and not sampler.model.has_quantity(limit.row):
+            # A row of the program alone: what it limits is told by the figure that it is read for.
+            continue
+        if limit.family == "cycle":
+            peak = sampler.peak(limit.row, limit.where)
+            values[limit.name] = limit.sign * (peak - limit.complement)
+        chosen = limit.name in design and (limit.family == "variable" or bool(limit.weight))
+        key = limit.name, chosen
+        for sign in (limit.sign,) if limit.sign else (-1, 1):
+            other = sides.setdefault(key, {}).setdefault(sign, limit.value)
+            sides[key][sign] = min(other, limit.value) if sign > 0 else max(other, limit.value)
+        size = abs(limit.value) if chosen and limit.value else 1.0 if limit.weight else limit.scale
+        sizes[key] = max(sizes.get(key, 0.0), size)
+    found = []
+    for (name, chosen), ends in sides.items():
+        value, slack = (design if chosen else values)[name], FEASIBLE * sizes[name, chosen]
+        low, high = ends.get(-1), ends.get(1)
+        ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
+        found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
+    return tuple(found)
+
+
+def with_optimum(
+    job: Job,
+    scene: Scene,
+    target: str,
+    here: Evaluation,
+    certificate: Certificate,
+    solver: Mapping[str, Any],
+    today: Today,
+    searched: str,
+) -> Solution:
+    """Return the answer of a design that was reached: optimal if certified, else uncertified.
+
+    searched: how far the best was sought, as a sentence.
+    """
+    binding = prices(Words(scene), certificate)
+    passed = certificate.passed and here.admissible
+    headline = job.say(scene, target, here.figures)
+    if passed:
+        message = " ".join(part for part in (headline, stops(binding), _left_open(certificate), searched) if part)
+    else:
+        reasons = "; ".join(certificate.reasons) or "a limit does not hold on independent evaluation"
+        message = f"A design was reached but not certified: {reasons}. Try more starts, such as 20."
+    return Solution(
+        **vars(here),
+        target=target,
+        status="optimal" if passed else "uncertified",
+        message=message,
+        binding=binding,
+        certificate=certificate,
+        solver=solver,
+        today=today,
+    )
+
+
+def _left_open(certificate: Certificate) -> str:
+    """Say which variables could be others as well, where no rule has settled them; "" for none."""
+    return f"Left open, for others are as good: {', '.join(certificate.open)}." if certificate.open else ""
+
+
+def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
+    """Return one price per limit and side."""
+    groups: dict[tuple[str, int], list[Any]] = {}
+    for binding in certificate.binding:
+        groups.setdefault((binding.limit.name, binding.side), []).append(binding)
+    return tuple(words.price(group) for group in groups.values())
+
+
+def stops(binding: tuple[Price, ...]) -> str:
+    """Return the sentence that names the limits which stop the first objective they move."""
+    if not binding:
+        return "No limit binds."
+    figure = next(iter(binding[0].worth))
+    first = [price for price in binding if figure in price.worth]
+    listed = ", ".join(f"{price.text} (worth {price.reading})" for price in first)
+    return f"Limits that stop {figure}: {listed}."
+
+
+def _helps(relaxations: Sequence[Relaxation]) -> str:
+    """Return what helps as sentences, the first one begun already."""
+    first, *others = remedies(relaxations)
+    said = ", ".join(each.text for each in first) + "."
+    alone = "; ".join(each.text for remedy in others for each in remedy if each.alone)
+    together = ", ".join(each.text for remedy in others for each in remedy if not each.alone)
+    said += f" By itself, any one of these would do{' too' if first[0].alone else ''}: {alone}." if alone else ""
+    return said + (f" So would all of these together: {together}." if together else "")
+
+
+def without_optimum(
+    target: str,
+    here: Evaluation,
+    found: Clash,
+    solver: Mapping[str, Any],
+    today: Today,
+    explanation: str = "",
+) -> Solution:
+    """Return the answer where no design was reached: infeasible with the least relaxations, else failed."""
+    if found.relaxations:
+        message = (
+            f"No admissible design exists near any start. Limits that clash: {', '.join(found.limits)}. "
+            f"The least relaxation that helps: {_helps(found.relaxations)} {explanation}"
+        ).strip()
+    else:
+        status = str(solver["status"])
+        message = f"The solver failed ({status}): {ADVICE.get(status, 'try more starts, such as 20.')}"
+    return Solution(
+        **vars(here),
+        target=target,
+        status="infeasible" if found.relaxations else "failed",
+        message=message,
+        relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
+        clash=found.limits,
+        explanation=explanation if found.relaxations else "",
+        solver=solver,
+        today=today,
+    )
+
+
+LEAST_DIGITS, MOST_DIGITS = 4, 14
+"""Significant digits of a rounded design: numbers of fewer are nominal ones, such as 155 mm, meant as they stand; those
+of more are a computer's."""
+CONVERTED = 1e-15
+"""Relative; what a float of few digits may be off after its unit was converted: a few roundings."""
+
+Evaluate = Callable[[Mapping[str, float]], Evaluation]
+
+
+def told_apart(found: Evaluation, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluation:
+    """Return an evaluation that is not admissible with limits that say whether rounding alone exceeds them.
+
+    design: all of it by full names, SI; evaluate(design): the same evaluation of another design.
+    The reach of rounding is the sum of what half a unit of each number's last digit moves, the worst case.
+    """
+    reach = [0.0] * len(found.limits)
+    for name, step in roundings(scene, design).items():
+        moved = [_values(evaluate, {**design, name: design[name] + side * step}) for side in (1.0, -1.0)]
+        for k, limit in enumerate(found.limits):
+            changes = [abs(values[k] - limit.value) for values in moved if values]
+            reach[k] += max((change for change in changes if math.isfinite(change)), default=0.0)
+    pairs = zip(found.limits, reach, strict=True)
+    limits = tuple(replace(each, rounding=not each.ok and _excess(each) <= most) for each, most in pairs)
+    return replace(found, limits=limits)
+
+
+def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+    """Return half a unit of each number's last digit, SI: all numbers have as many as the one that has the most.
+
+    Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
+    """
+    words, labels = Words(scene), numbers.labels(scene)
+    known = {name: words.kind(labels.get(name, name)) for name in design if _single(scene, name)}
+    sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in known.items()}
+    given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in known if design[name]}
+    most = max((count for count, _ in given.values()), default=0)
+    if most > MOST_DIGITS:
+        return {}
+    count = max(most, LEAST_DIGITS)
+    return {name: size * _half(design[name] / size, count) for name, (_, size) in given.items()}
+
+
+def digits(value: float) -> int:
+    """Return with how many significant digits a number was written, whatever zeros ended it; 17 for any float."""
+    few = range(1, MOST_DIGITS + 1)
+    return next((n for n in few if abs(float(f"{value:.{n}g}") - value) <= CONVERTED * abs(value)), 17)
+
+
+def _half(value: float, count: int) -> float:
+    """Return half a unit of the last of `count` significant digits."""
+    return 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - count + 1)
+
+
+def _single(scene: Scene, name: str) -> bool:
+    """Say whether a number of a design stands by itself, and is none of a list."""
+    return not any(name.startswith(f"{each}_") for each in scene.schema.lists)
+
+
+def _values(evaluate: Evaluate, design: Mapping[str, float]) -> list[float]:
+    """Return each limit's value of a design; none where it cannot move."""
+    try:
+        return [limit.value for limit in evaluate(design).limits]
+    except (ValueError, ZeroDivisionError, FloatingPointError):
+        return []
+
+
+def _excess(limit: Finding) -> float:
+    """Return by how much a limit is exceeded, SI; infinite where it has no value."""
+    low = -math.inf if limit.min is None else limit.min
+    high = math.inf if limit.max is None else limit.max
+    return max(low - limit.value, limit.value - high) if math.isfinite(limit.value) else math.inf

@@ -1,0 +1,319 @@
+"""What a solve or an evaluation says: plain data, ready for JSON."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from loomopt.base.records import Shown, freeze, lazy
+from loomopt.scenes.document import copied
+from loomopt.scenes.scene import Scene
+from loomopt.solving.certificate.verdict import Certificate, GlobalBound
+
+if TYPE_CHECKING:
+    from loomopt.scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What is shown of one limit, SI.
+
+    margin: by how much the refined value stays clear of the limit, negative where it exceeds it; slack: what is left
+    open; boxes: how many it took; angle: a crank angle, rad, where the limit fails.
+    """
+
+    limit: str
+    text: str
+    status: str
+    margin: float
+    slack: float
+    boxes: int
+    angle: float | None = None
+    kind: Literal["limit", "assembly", "peak"] = "limit"
+
+    @property
+    def said(self) -> str:
+        """What it is of, in a few words."""
+        return self.limit.removeprefix(f"{self.kind} ") if self.kind == "peak" else self.text
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {name: value for name, value in vars(self).items() if name != "kind"}
+
+
+@dataclass(frozen=True, repr=False)
+class Proofs(Shown):
+    """All proofs of one design; in Jupyter they show themselves as a table."""
+
+    problem: str
+    target: str
+    proofs: tuple[Proof, ...]
+    scene: Scene = field(compare=False)
+    uncovered: tuple[str, ...] = ()
+    """What the proofs rest on and do not cover, each a sentence without its full stop."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is proven."""
+        return all(proof.status == "proven" for proof in self.proofs)
+
+    @property
+    def said(self) -> str:
+        """What came of them, in one sentence."""
+        missed = dict.fromkeys(proof.limit for proof in self.proofs if proof.status != "proven")
+        return f"NOT proven: {', '.join(missed)}" if missed else "every limit holds at every crank angle"
+
+    def __repr__(self) -> str:
+        return f"<Proofs {self.problem}, {self.target}: {self.said}>"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `prove --json` prints."""
+        proofs = [proof.as_dict() for proof in self.proofs]
+        found = {"problem": self.problem, "target": self.target, "proofs": proofs}
+        return found | ({"uncovered": list(self.uncovered)} if self.uncovered else {})
+
+
+ADVICE = {
+    "Solve_Succeeded": "IPOPT converged.",
+    "Solved_To_Acceptable_Level": "IPOPT stopped at a looser tolerance; try more starts, such as 20.",
+    "Infeasible_Problem_Detected": "IPOPT found no point that keeps all limits; loosen one of them.",
+    "Restoration_Failed": "IPOPT could not get back to admissible designs; try more starts, such as 20.",
+    "Maximum_Iterations_Exceeded": "IPOPT ran out of iterations; try more starts, such as 20.",
+    "Search_Direction_Becomes_Too_Small": "IPOPT could not improve further; try more starts, such as 20.",
+    "Diverging_Iterates": "The objective falls without end; bound every variable.",
+    "Invalid_Number_Detected": "A design on the way did not assemble; narrow the bounds of the lengths.",
+    "Not_Enough_Degrees_Of_Freedom": "More is fixed than the design can follow; free a dimension.",
+    "Not_Assembled": "The start does not assemble; narrow the bounds of the lengths.",
+}
+"""What each of IPOPT's statuses means to a designer."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One limit beside its figure, SI; min or max is None where the limit has no such side.
+
+    rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
+    """
+
+    name: str
+    value: float
+    min: float | None
+    max: float | None
+    ok: bool
+    rounding: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data; what is not exceeded says nothing of rounding."""
+        return {name: value for name, value in vars(self).items() if value or name != "rounding"}
+
+
+@dataclass(frozen=True)
+class Price:
+    """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI."""
+
+    limit: str
+    side: str
+    value: float
+    text: str
+    worth: Mapping[str, float]
+    unit: Mapping[str, str]
+    reading: str
+    """The worth in the designer's own units, as a phrase."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """How far a limit must be loosened to make a design possible, SI.
+
+    alone: this one limit suffices; in_proportion: it gives way by no more than a designer may think of.
+    """
+
+    limit: str
+    side: str
+    value: float
+    needed: float
+    alone: bool
+    text: str
+    in_proportion: bool = True
+
+
+def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
+    """Return what helps, each by itself: limits that give way together, or one alone; out of proportion last."""
+    together = tuple(each for each in relaxations if not each.alone)
+    found = [together] if together else []
+    found += [(each,) for each in relaxations if each.alone]
+    return sorted(found, key=lambda remedy: not all(each.in_proportion for each in remedy))
+
+
+@dataclass(frozen=True)
+class Clash:
+    """Why nothing is admissible: the limits that clash, the relaxations that help, and where they lead (SI)."""
+
+    limits: tuple[str, ...] = ()
+    relaxations: tuple[Relaxation, ...] = ()
+    x: Mapping[str, float] = field(default_factory=dict)
+
+
+class Terms(Protocol):
+    """What a design is judged by where that is not a target alone, such as the limits on the axes of a front."""
+
+    @property
+    def said(self) -> str:
+        """What is sought, in a few words."""
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """The figures that are sought."""
+
+    def evaluation(self, design: Mapping[str, float]) -> "Evaluation":
+        """Return figures and limits of a design, SI."""
+
+    def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
+        """Return proofs of its limits. Raises BadInput."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A given design: its figures and limits, SI and rad."""
+
+    problem: str
+    effects: tuple[str, ...]
+    design: Mapping[str, Any]
+    figures: Mapping[str, float | None]
+    units: Mapping[str, str]
+    limits: tuple[Finding, ...]
+    reached: Mapping[str, bool] = field(default_factory=dict, kw_only=True)
+    """Of each figure of which the target asks what may be out of reach, whether the design reaches it."""
+    scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
+    """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
+    terms: Terms | None = field(default=None, kw_only=True, repr=False, compare=False)
+    """What it is judged by; None for its target alone."""
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "design", "figures", "units", "reached")
+
+    @property
+    def admissible(self) -> bool:
+        """Whether every limit holds."""
+        return all(limit.ok for limit in self.limits)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `evaluate --json` prints."""
+        return {
+            "problem": self.problem,
+            "effects": list(self.effects),
+            "design": dict(self.design),
+            "figures": {name: _finite(value) for name, value in self.figures.items()},
+            "units": dict(self.units),
+            "limits": [limit.as_dict() for limit in self.limits],
+            "reached": dict(self.reached),
+        }
+
+
+@dataclass(frozen=True)
+class Solution(Evaluation):
+    """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
+
+    target: str = ""
+    status: str = "failed"
+    message: str = ""
+    binding: tuple[Price, ...] = ()
+    certificate: Certificate | None = None
+    relaxation: tuple[Relaxation, ...] = ()
+    clash: tuple[str, ...] = ()
+    """Limits that cannot all be kept, as phrases."""
+    explanation: str = ""
+    """What physics says of why no design is admissible."""
+    solver: Mapping[str, Any] = field(default_factory=dict)
+    time: Mapping[str, float] = field(default_factory=dict)
+    optima: tuple[tuple[Mapping[str, float | None], int], ...] = ()
+    """Figures of the distinct optima the starts ended in, best first, and how many starts did."""
+    proofs: "Proofs | None" = None
+    """What was proven at every crank angle, where that was asked for."""
+    global_bound: GlobalBound | None = None
+    """What is proven of all admissible designs, where that was asked for."""
+    today: Callable[[], Evaluation] | None = None
+    """Evaluates today's machine."""
+    point: Any = field(default=None, repr=False)
+    """Where the solver stood: what a neighbour's solve can start from."""
+
+    def __post_init__(self) -> None:
+        """Freeze what a frozen dataclass would leave open."""
+        freeze(self, "design", "figures", "units", "reached", "solver", "time")
+
+    @lazy
+    def before(self) -> Evaluation | None:
+        """Today's machine, evaluated when it is first read."""
+        return self.today() if self.today else None
+
+    @property
+    def sought(self) -> str:
+        """What it answers: its target, or what its terms say."""
+        return self.terms.said if self.terms else self.target
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the object `solve --json` prints."""
+        base = super().as_dict()
+        head: dict[str, Any] = {
+            "problem": self.problem,
+            "target": self.target or None,
+            "status": self.status,
+            "message": self.message,
+            "effects": base["effects"],
+        }
+        if self.scene:
+            head["scene"] = _scene_dict(self.scene)
+        head["reached"] = base["reached"]
+        tail: dict[str, Any] = {
+            "binding": [
+                {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}
+                for price in self.binding
+            ],
+            "certificate": certificate_dict(self.certificate) if self.certificate else None,
+            "solver": dict(self.solver),
+            "global": self.global_bound.as_dict() if self.global_bound else None,
+            "time": dict(self.time),
+        }
+        if self.proofs:
+            tail["proofs"] = self.proofs.as_dict()["proofs"]
+        if self.relaxation:
+            tail["clash"] = list(self.clash)
+            tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]
+        if len(self.optima) > 1:
+            tail["optima"] = [
+                {"figures": {k: _finite(v) for k, v in figures.items()}, "starts": n} for figures, n in self.optima
+            ]
+        return head | base | tail
+
+
+def certificate_dict(certificate: Certificate) -> dict[str, Any]:
+    """Return the certificate as JSON data."""
+    return {
+        "passed": certificate.passed,
+        "by": certificate.by,
+        "reasons": list(certificate.reasons),
+        "levels": [
+            {
+                "objective": level.objective,
+                "stationarity": float(level.stationarity),
+                "complementarity": float(level.complementarity),
+            }
+            for level in (*certificate.levels, *([certificate.change] if certificate.change else []))
+        ],
+        "feasibility": float(certificate.feasibility),
+        "whole_cycle": {"violation": float(certificate.violation), "by": certificate.whole_cycle},
+        "minimum": certificate.minimum,
+        "unique": certificate.unique,
+        "settled": list(certificate.choices),
+    }
+
+
+def _scene_dict(scene: "Scene") -> dict[str, Any]:
+    """Return a scene as JSON data from which it can be made again."""
+    return {"hash": scene.hash, "document": copied(scene.document, scene.origin)}
+
+
+def _finite(value: float | None) -> float | None:
+    """Return None for what JSON cannot say."""
+    return value if value is not None and math.isfinite(value) else None

@@ -1,0 +1,251 @@
+"""The certificate: is this design a proven local optimum of its target? Computed apart from the solver.
+
+One KKT system per level, on gradients of the true extremes, with multipliers of its own (non-negative least squares). A
+limit with a positive multiplier at one level is an equality of free sign at the next. Gradients come by jets; where a
+figure that decides is too near its threshold for floats, all is judged again in 40 digits.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler, sampled
+from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
+from loomopt.solving.certificate import kkt, second_order
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives import Derivatives
+from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import Multipliers, System, priced
+from loomopt.solving.certificate.second_order import Curvature, Local
+from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
+from loomopt.solving.certificate.verdict import Binding, Certificate, Level
+from loomopt.solving.nlp.point import Settings
+
+COMPLEMENTARY = 1e-8
+"""Multiplier times distance of a limit: what the objective might still gain by meeting it. The usual accuracy."""
+
+
+LARGEST_PRICE = 1e6
+"""Multiplier above which there is no KKT point: STATIONARY times it is a slope of 1. Hock-Schittkowski's degenerate
+problems end at 2e16, every packaged scene below 1e2."""
+
+
+LARGEST_VARIABLE = 1e8
+"""Variable above which slopes cannot be trusted: floats then resolve no better than 1e-8 of a natural size."""
+
+
+SECOND_ORDER_OPEN = "second order open"
+"""The reason of a certificate that neither curvature nor higher orders decide."""
+
+
+@dataclass(frozen=True)
+class JudgedLevel:
+    """One level: its residuals, the multipliers they are of, and its curvature (None where there was none to judge)."""
+
+    level: Level
+    multipliers: Multipliers
+    curvature: Curvature | None = None
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What holds over the whole cycle: by how much a refined value is exceeded, and what boxes say."""
+
+    violation: float
+    bound: str
+
+
+def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0) -> Certificate:
+    """Return the certificate of variables x (SI) as an optimum of the program's target.
+
+    By jets; by 40 digits where floats leave a verdict in doubt. shown: of how many first levels it is known that none
+    falls here to higher order, from the certificate of a program with those levels that holds nothing more than this.
+    """
+    quick = certified(Forward, program, x, accuracy, shown)
+    return quick if quick.clear else certified(Exact, program, x, accuracy, shown)
+
+
+def certified(
+    derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0
+) -> Certificate:
+    """Return the certificate of variables x (SI) by one way to derivatives; shown: as in `certify`."""
+    settings = Settings(accuracy)
+    try:
+        sampler = sampled(program.model, {**program.parameters, **x}, settings.sampled)
+        active = active_set(program, sampler)
+        found = derivatives(program, x, sampler, active.rows)
+        local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
+        rows = cycle_rows(program)
+        cycle = Cycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
+        return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
+    except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
+        reason = f"a value or a slope is no number here ({type(error).__name__})"
+        by, clear = derivatives.by, issubclass(derivatives, Exact)
+        return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
+
+
+def judged_levels(local: Local) -> list[JudgedLevel]:
+    """Return all levels in order; those after one that settles the design have nothing to choose."""
+    found: list[JudgedLevel] = []
+    for place, objective in enumerate(local.program.objectives):
+        if any(each.curvature and each.curvature.settled for each in found):
+            none = Multipliers(np.zeros(len(local.active.rows)), 0.0)
+            found.append(JudgedLevel(Level(objective.figure, 0.0, 0.0, 0.0), none))
+        else:
+            found.append(_judged_level(local, place, found))
+    return found
+
+
+def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> JudgedLevel:
+    """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
+    local = replace(whole, closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
+    system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
+    first = kkt.solved(local.slopes, system)
+    alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
+    if local.active.zero[place]:
+        return alone
+    try:
+        multipliers, curvature = _best(local, place, system, first)
+    except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError):
+        # Beside a point where a row's slope has no end there is no second derivative: where the slope that is left
+        # refuses the design already, nothing hangs on it.
+        if first.residual <= STATIONARY:
+            raise
+        return alone
+    return JudgedLevel(_residuals(local, place, system, multipliers, first.residual), multipliers, curvature)
+
+
+def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple[Multipliers, Curvature]:
+    """Return the multipliers under which the curvature is best, where several share the slopes."""
+    curvature = second_order.judged(local, place, system, first)
+    if curvature.minimum and curvature.unique:
+        return first, curvature
+    for k in kkt.replaceable(local.slopes, system, first, STATIONARY):
+        other = kkt.solved(local.slopes, system.without(k))
+        if other.residual <= STATIONARY:
+            found = second_order.judged(local, place, system, other)
+            if (found.minimum, found.unique) > (curvature.minimum, curvature.unique):
+                return other, found
+    if curvature.higher == "open" and len(system.held):
+        # Earlier levels' slopes vanish together, so what they hold may share a price that limits carry alone.
+        other = kkt.solved(local.slopes, system.without_held())
+        if other.residual <= STATIONARY:
+            found = second_order.judged(local, place, system, other)
+            if found.minimum and found.higher == "holds":
+                return other, found
+    return first, curvature
+
+
+def _residuals(local: Local, place: int, system: System, multipliers: Multipliers, residual: float) -> Level:
+    """Return one level's residuals, and the limit with the largest multiplier."""
+    rows, of = local.active.rows, multipliers.of
+    slack = max((abs(of[k] * rows[k].excess) for k in system.limits), default=0.0)
+    held = float(sum(abs(of[k]) for level in range(place) for k in local.active.pieces(level)))
+    dearest = max(system.limits, key=lambda k: abs(of[k]), default=None)
+    price, name = (0.0, "") if dearest is None else (float(abs(of[dearest])), rows[dearest].name)
+    figure = local.program.objectives[place].figure
+    return Level(figure, residual, float(slack), held, price, name)
+
+
+def _unserved(sampler: Sampler) -> str:
+    """Return why the states of a design need another model than the one it was solved with, "" where they do not."""
+    if not sampler.model.states:
+        return ""
+    from loomopt.model.model import unserved
+
+    return unserved(sampler.model, sampler.values)
+
+
+def _certificate(
+    local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accuracy: float, model: str = ""
+) -> Certificate:
+    """Return what was verified, and every reason why it is not enough; model: why it is none for here, if so."""
+    feasibility = float(max(0.0, *local.active.excess))
+    reasons = [*_amiss(local, feasibility), *_open(cycle, accuracy), *_not_least(levels)]
+    reasons += [model] if model else []
+    curvatures = [each.curvature for each in levels if each.curvature]
+    step = next((curvature.step for curvature in curvatures if len(curvature.step)), np.zeros(0))
+    names = local.derivatives.names
+    moved = dict(zip(names, map(float, step * local.scales), strict=True)) if len(step) else {}
+    level = curvatures[-1].level if curvatures else ()
+    return Certificate(
+        not reasons,
+        tuple(reasons),
+        tuple(each.level for each in levels),
+        feasibility,
+        cycle.violation,
+        all(curvature.minimum for curvature in curvatures),
+        curvatures[-1].unique if curvatures else True,
+        tuple(_binding(local, levels)),
+        by=local.derivatives.by,
+        clear=isinstance(local.derivatives, Exact) or not _doubtful(local, levels),
+        whole_cycle="bounded" if cycle.bound == "proven" else "refined",
+        correction=moved,
+        step=float(np.abs(step).max(initial=0.0)),
+        level=tuple(dict(zip(names, map(float, way), strict=True)) for way in level),
+    )
+
+
+def _doubtful(local: Local, levels: Sequence[JudgedLevel]) -> bool:
+    """Say whether floats leave a verdict in doubt: a figure near its threshold, or an error that reaches one."""
+    for each in levels:
+        level, of = each.level, np.abs(each.multipliers.of)
+        residuals = [level.stationarity / STATIONARY, level.complementarity / COMPLEMENTARY]
+        figures = [*residuals, level.price / LARGEST_PRICE, *(of / POSITIVE)]
+        error = JET_ERROR * float(of @ np.abs(local.gradients).max(axis=1, initial=1.0))
+        errors = [error / STATIONARY]
+        if each.curvature:
+            figures += list(each.curvature.figures)
+            errors.append(each.curvature.error / FLAT)
+        if max(errors) >= 1.0 or any(1 / DOUBT < figure < DOUBT for figure in figures):
+            return True
+    return False
+
+
+def _amiss(local: Local, feasibility: float) -> Iterator[str]:
+    """Yield why the design itself cannot be trusted."""
+    sizes = {v.name: v.scale for v in local.program.variables}
+    if max((abs(x) / sizes[name] for name, x in local.x.items() if name in sizes), default=0.0) > LARGEST_VARIABLE:
+        yield "the design is out of all proportion: slopes cannot be trusted here"
+    if not feasibility <= FEASIBLE:
+        worst = max(range(len(local.active.excess)), key=lambda k: local.active.excess[k])
+        yield f"limit {local.program.limits[worst].name} is exceeded by {feasibility:.2g} of its size"
+
+
+def _open(cycle: Cycle, accuracy: float) -> Iterator[str]:
+    """Yield why the whole cycle is not covered."""
+    if not cycle.violation <= accuracy:
+        yield f"a whole-cycle value is exceeded by {cycle.violation:.2g} between refined points"
+    if cycle.bound == "violated":
+        yield "a whole-cycle value is exceeded somewhere between refined points"
+
+
+def _not_least(levels: Sequence[JudgedLevel]) -> Iterator[str]:
+    """Yield why the design is no proven optimum: first order of each level, then second."""
+    for level in (each.level for each in levels):
+        if not level.stationarity <= STATIONARY:
+            yield f"{level.objective} can still fall: stationarity {level.stationarity:.2g}"
+        if not level.complementarity <= COMPLEMENTARY:
+            yield f"a limit that is not met exactly carries a price: {level.complementarity:.2g}"
+        if level.price > LARGEST_PRICE:
+            yield f"the price of limit {level.dearest} is without measure: {level.price:.2g}, no KKT point"
+    falling = [each.level.objective for each in levels if each.curvature and each.curvature.higher == "falls"]
+    if falling:
+        yield f"second order does not decide: {falling[-1]} falls along a direction without curvature"
+    elif any(each.curvature.higher == "open" for each in levels if each.curvature):
+        yield SECOND_ORDER_OPEN
+    if not all(each.curvature.minimum for each in levels if each.curvature):
+        yield "second order fails: along some direction the objective falls (a saddle or a maximum)"
+
+
+def _binding(local: Local, levels: Sequence[JudgedLevel]) -> Iterator[Binding]:
+    """Yield the limits that bind, each with its worth for the first objective it moves."""
+    for k, row in enumerate(local.active.rows[: local.active.limits]):
+        multipliers = [float(each.multipliers.of[k]) for each in levels]
+        first = next((level for level, multiplier in enumerate(multipliers) if abs(multiplier) > POSITIVE), None)
+        if first is not None and row.limit and row.limit.name in local.program.told:
+            yield priced(local.sampler, row.limit, local.program.objectives[first], multipliers[first])

@@ -1,0 +1,230 @@
+"""Designs beside a design that keep what binds there, and whether its Lagrangian falls on the way to them.
+
+Where a level neither rises nor falls to second order, higher orders decide. Along a straight line these count how the
+binding rows bend: the Lagrangian may fall there though no design that keeps the rows is better, and the other way
+round. So each step along the line is first corrected onto the rows by Gauss and Newton's method with the slopes at the
+design [Nocedal and Wright, Numerical Optimization, 2nd ed., section 12.5: feasible sequences], then moved once along
+the directions that are curved, to where the Lagrangian is least. Where an earlier level is least along directions by
+its curvature alone, and this one has a slope along them, designs are moved on to where that level stays least.
+"""
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from loomopt.base.records import lazy
+from loomopt.model.program import Program
+from loomopt.model.sampling import Sampler
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET
+from loomopt.solving.certificate.active_set import Row, moved
+from loomopt.solving.certificate.valley import Closed, inverted
+from loomopt.solving.nlp.point import sampler_at
+
+PROBES = 1e-2, 3e-3
+"""Steps along a direction without curvature at which the Lagrangian is read: at both of them it must fall."""
+
+
+FALLEN, FALL_MARGIN = 1e-12, 10.0
+"""Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
+
+
+FALL_GROWTH = 18.0
+"""How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
+to be doubted: of third order it grows 37 times, of higher more, an error by chance (tests/solving/test_valley.py)."""
+
+
+@dataclass(frozen=True)
+class Lagrangian:
+    """One level's objective and what holds it, in natural sizes.
+
+    x: variables, SI; level: the objective's place; prices: multiplier of each limit by its place, and of each earlier
+    objective by its own.
+    """
+
+    program: Program
+    x: Mapping[str, float]
+    level: int
+    prices: Mapping[int, float]
+    held: Mapping[int, float]
+
+    def falls(self, direction: Mapping[str, float], slope: float) -> bool:
+        """Say whether it falls along a direction (SI), more than a slope left at x explains, at every probe."""
+        found = ((step, {n: v + step * direction.get(n, 0.0) for n, v in self.x.items()}) for step in PROBES)
+        return all(self.is_lower(there, step, slope) for step, there in found)
+
+    def is_lower(self, there: Mapping[str, float], step: float, slope: float, unsure: float = 0.0) -> bool:
+        """Say whether it is lower at a design (SI) a step away, more than a slope left at x explains.
+
+        unsure: what it may differ by there, beside rounding.
+        """
+        return self.fall(there) > FALL_MARGIN * slope * step + FALLEN + unsure
+
+    def fall(self, there: Mapping[str, float]) -> float:
+        """Return by how much it is lower at a design (SI); −∞ where either value is unknown."""
+        base, value = self._base, self.value(there)
+        return -math.inf if base is None or value is None else base - value
+
+    @functools.cached_property
+    def _base(self) -> float | None:
+        return self.value(self.x)
+
+    def value(self, there: Mapping[str, float]) -> float | None:
+        """Return its value at a design (SI); None where the linkage has no real position."""
+        sampler = sampler_at(self.program, there)
+        if sampler is None:
+            return None
+        weights = {self.level: 1.0, **self.held}
+        objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
+        value = sum(weight * (sampler.merit(objective) / objective.scale) for weight, objective in objectives)
+        return value + sum(price * sampler.excess(self.program.limits[k]) for k, price in self.prices.items())
+
+
+Design = dict[str, float]
+Verdict = Literal["holds", "falls", "open"]
+STEPS = 40
+"""Corrections onto the rows, each of which leaves the step's share of what was missed: of 1e-2 eight are enough."""
+
+
+@dataclass(frozen=True)
+class FeasibleCurve:
+    """Designs around x (SI) at which sums (m, rows) of rows are what they are at x.
+
+    jacobian: (m, variables), slopes of the sums in natural sizes; basis: (variables, k), orthonormal, the directions
+    that no sum forbids; curved: (k, c), those of them along which the Lagrangian curves by bends (c,); valley: of an
+    earlier level, that counts, and the Lagrangian's slopes (v,) along its directions.
+    """
+
+    program: Program
+    x: Mapping[str, float]
+    rows: tuple[Row, ...]
+    scales: Mapping[str, float]
+    sums: Floats
+    jacobian: Floats
+    basis: Floats
+    curved: Floats
+    bends: Floats
+    valley: tuple[Closed, Floats] | None = None
+
+    def judged(self, lagrangian: Lagrangian, way: Floats, slope: float) -> Verdict:
+        """Say whether the Lagrangian falls along a direction (k,) at every probe, more than a slope explains.
+
+        "open" where the rows cannot be kept, or where every design that is better breaks another limit: it falls, but
+        only within the first probe; or by less than an earlier level's valley is known to. That such a fall does not
+        grow with the step, as one of third order would, shows it to be that valley's error.
+        """
+        better: list[Design] = []
+        falls, sure = list[float](), list[bool]()
+        for step in PROBES:
+            designs = self._lowest(lagrangian, step, way)
+            if not designs:
+                return "open"
+            lower = [x for x in designs if lagrangian.is_lower(x, step, slope)]
+            if not lower:
+                return "holds"
+            surely = [x for x in lower if lagrangian.is_lower(x, step, slope, self._unsure)]
+            falls.append(max(map(lagrangian.fall, lower)))
+            sure.append(bool(surely))
+            better += surely
+        if all(sure):
+            return "falls" if any(map(self._is_kept, better)) else "open"
+        return "holds" if not any(sure) and falls[0] < FALL_GROWTH * falls[-1] else "open"
+
+    def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
+        """Return the Lagrangian's slopes along lines (k, c) at coordinates in the basis."""
+        step, found = PROBES[-1], []
+        for line in lines.T:
+            ends = [self.at(place + sign * step * line) for sign in (1.0, -1.0)]
+            high, low = (lagrangian.value(x) if x else None for x in ends)
+            if high is None or low is None:
+                return None
+            found.append((high - low) / (2 * step))
+        return np.array(found)
+
+    def at(self, place: Floats) -> Design | None:
+        """Return the design (SI) at coordinates (k,) in the basis that keeps the rows; None where none is found."""
+        moved, before = self.basis @ place, math.inf
+        for _ in range(STEPS):
+            x = self._moved(moved)
+            sampler = sampler_at(self.program, x)
+            values = None if sampler is None else self._values(sampler)
+            along = self._along(x)
+            if values is None or self._here is None or along is None:
+                return None
+            missed = self.sums @ (values - self._here)
+            largest = float(np.abs(missed).max(initial=0.0))
+            if not np.any(along) and (largest <= POLISH_DONE or before <= 2 * largest):
+                return x if largest <= POLISH_MET else None
+            moved, before = moved - self._back @ missed + along, largest
+        return None
+
+    def _along(self, x: Mapping[str, float]) -> Floats | None:
+        """Return the step (variables,) from a design (SI) to the valley, 0 where there is none left to take.
+
+        What an earlier level holds is kept there alone. None where it is not known.
+        """
+        if self.valley is None:
+            return np.zeros(len(self.basis))
+        closed, _ = self.valley
+        steps = closed.step(x)
+        if steps is None or np.abs(steps).max() > 1.0:
+            return None
+        return np.where(np.abs(steps) > closed.step_errors, steps, 0.0) @ closed.directions
+
+    @lazy
+    def _unsure(self) -> float:
+        """What the Lagrangian may differ by on the valley."""
+        if self.valley is None:
+            return 0.0
+        closed, pull = self.valley
+        return FALL_MARGIN * float(np.abs(pull) @ closed.step_errors)
+
+    def _lowest(self, lagrangian: Lagrangian, step: float, way: Floats) -> list[Design]:
+        """Return the design a step along a direction, and the one moved along what is curved to the least there."""
+        slopes = self._slopes(lagrangian, self.curved, step * way)
+        places = [step * way]
+        if slopes is not None and np.any(slopes):
+            places.append(step * way - self.curved @ (slopes / self.bends))
+        return [x for x in map(self.at, places) if x]
+
+    def _is_kept(self, x: Mapping[str, float]) -> bool:
+        """Say whether a design keeps every limit as well as x itself."""
+        here, there = (self._excess(each) for each in (self.x, x))
+        return bool(np.all(there <= np.maximum(here, FEASIBLE)))
+
+    def _excess(self, x: Mapping[str, float]) -> Floats:
+        sampler = sampler_at(self.program, x)
+        if sampler is None:
+            return np.full(len(self.program.limits), np.inf)
+        found = [(limit, sampler.excess(limit)) for limit in self.program.limits]
+        return np.array([abs(excess) if limit.sign == 0 else excess for limit, excess in found])
+
+    @lazy
+    def _back(self) -> Floats:
+        """The shortest step (variables, m) that changes each sum by 1."""
+        return inverted(self.jacobian)
+
+    @lazy
+    def _here(self) -> Floats | None:
+        sampler = sampler_at(self.program, self.x)
+        return None if sampler is None else self._values(sampler)
+
+    def _moved(self, moved: Floats) -> Design:
+        """Return x moved by a step in natural sizes."""
+        sizes = self.scales.items()
+        return {**self.x, **{n: self.x[n] + size * float(by) for (n, size), by in zip(sizes, moved, strict=True)}}
+
+    def _values(self, sampler: Sampler) -> Floats | None:
+        """Return every row at a design, in its natural size; extremes move along. None where one is gone."""
+        rows = moved(self.rows, sampler)
+        return None if rows is None else np.array([_value(row, sampler) for row in rows])
+
+
+def _value(row: Row, sampler: Sampler) -> float:
+    if row.limit and row.node is None:
+        return sampler.excess(row.limit)
+    return row.sign * (row.node.value if row.node else sampler.single(row.reads)) / row.scale

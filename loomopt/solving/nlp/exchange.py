@@ -1,0 +1,266 @@
+"""Solve a program with its whole-cycle rows held everywhere: solve at a few nodes, add the true extremes, repeat.
+
+The exchange method for semi-infinite programs [Hettich and Kortanek, Semi-infinite programming, SIAM Review 35 (1993),
+section 5; Blankenship and Falk, JOTA 19 (1976)]. Nodes are never dropped (that can cycle); the extremes are found on
+the design just reached, in plain NumPy, and between any two nodes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme, Sampler
+from loomopt.physics.cycle import TURN, Cycle, Floats
+from loomopt.physics.tolerances import BINDING, NEEDED
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.follow import follow
+from loomopt.solving.nlp.ipopt import Answer, run
+from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
+from loomopt.solving.nlp.polish import polish
+from loomopt.solving.nlp.stations import Family
+from loomopt.solving.nlp.transcribe import Transcription
+
+EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
+"""Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
+creep (tests/solving/test_infeasible.py)."""
+
+
+STANDS = 1e-7
+"""Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
+
+
+DRAWS = 200
+"""Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
+
+
+Nodes = tuple[tuple[Extreme, ...], ...]
+"""Nodes of each family."""
+
+
+class _Place(NamedTuple):
+    """Where a round begins: variables, SI, with the extremes there; nodes to solve at.
+
+    raw: multipliers to start warm from, if any; extra: the epigraph or elastic variables, None where nothing is known.
+    """
+
+    x: dict[str, float]
+    sampler: Sampler
+    peaks: Nodes
+    nodes: Nodes
+    raw: Mapping[str, Floats]
+    extra: Floats | None
+
+
+class _Round(NamedTuple):
+    """What a round gave: IPOPT's answer, and where the next one begins.
+
+    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether the
+    switches at events are those that it was solved with; iterations: of all rounds so far.
+    """
+
+    after: _Place
+    nlp: Transcription
+    answer: Answer
+    reached: bool
+    violation: float
+    steady: bool
+    iterations: int
+
+
+def solve(
+    program: Program,
+    start: Mapping[str, float],
+    settings: Settings,
+    warm: Point | None = None,
+    elastic: Elastic | None = None,
+    known: Known | None = None,
+) -> Point:
+    """Solve a program from a start (SI) or warm from a solved neighbour.
+
+    warm: of the same structure; of another one with the same rows only pivots lead on from it.
+    """
+    calls = Calls(program, settings, elastic, known)
+    if warm:
+        within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
+        warm = replace(warm, x=within)
+        followed = follow(calls, warm) if warm.reached else None
+        if followed:
+            return followed
+        if warm.structure not in (None, program.structure):
+            warm = None
+    x = dict(warm.x if warm else start)
+    sampler = calls.sampler(x)
+    if sampler is None:
+        return Point(x, "Not_Assembled", False)
+    result = _round(calls, _begin(calls, x, sampler, warm), 0)
+    for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
+        if isinstance(result, Point) or not result.reached:
+            break
+        if result.violation <= settings.excess and result.steady:
+            break
+        followed = _followed(calls, result) if result.steady else None
+        if followed:
+            return followed
+        if more:
+            result = _round(calls, result.after, result.iterations)
+    return result if isinstance(result, Point) else _ended(calls, result)
+
+
+def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:
+    """Return where the exchange begins: at the largest extremes of the start, or at a neighbour's nodes."""
+    peaks = _frozen(calls.peaks(sampler))
+    beside = calls.ways.beside if calls.ways else None
+    if beside:
+        return _Place(x, sampler, peaks, beside.nodes, {}, None)
+    nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
+    if calls.settings.uniform:
+        nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
+    raw = warm.raw if warm else {}
+    return _Place(x, sampler, peaks, nodes, raw, raw.get("extra"))
+
+
+def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
+    """Return what one round gives: solve at the nodes, add the extremes that exceed their bounds.
+
+    A point of failure where what the solver reached has no real cycle, or is no better than what is known; iterations:
+    of the rounds before.
+    """
+    nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
+    extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
+    answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.raw)
+    iterations += answer.iterations
+    if answer.status not in SUCCESS and here.raw:
+        extra = calls.first_extra(nlp, here.sampler, here.peaks)
+        answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, {})
+        iterations += answer.iterations
+    if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):
+        return Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
+    sampler = calls.sampler(answer.x)
+    if sampler is None:
+        return Point(answer.x, "Invalid_Number_Detected", False, iterations)
+    nodes, before = here.nodes, here.sampler.cycle
+    if sampler.cycle.order != before.order:
+        nodes = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes)
+    peaks, violation = _frozen(calls.peaks(sampler)), 0.0
+    if not calls.settings.uniform:
+        violation = calls.violation(peaks, answer.extra)
+        nodes = tuple(
+            (*of, *(e for e in top if calls.excess(family, e, answer.extra) > calls.settings.excess))
+            for of, top, family in zip(nodes, calls.loose(sampler, peaks), calls.families, strict=True)
+        )
+    after = _Place(answer.x, sampler, peaks, nodes, answer.raw, answer.extra)
+    reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
+    steady = sampler.stills == here.sampler.stills
+    return _Round(after, nlp, answer, reached, violation, steady, iterations)
+
+
+def _ended(calls: Calls, result: _Round) -> Point:
+    """Return the point that the exchange ends in, put exactly on what binds."""
+    here, answer, program = result.after, result.answer, calls.program
+    point = Point(
+        here.x, answer.status, result.reached, result.iterations, here.nodes, result.violation, answer.raw, calls.built
+    )
+    point = replace(point, value=answer.value)
+    if not result.reached or not calls.settings.polished:
+        return point
+    if calls.elastic:
+        return replace(
+            point,
+            reached=result.violation <= STANDS,
+            relaxed=_relaxed(program, answer.extra),
+            excesses=tuple(answer.extra.tolist()),
+            binding=_binding(here, result.nlp.slots),
+        )
+    x, touching = polish(calls, here.x, answer.extra, point, here.peaks)
+    rough, structure = x is here.x, program.structure
+    return replace(point, x=x, rough=rough, binding=_frozen(touching), built=calls.built, structure=structure)
+
+
+def _followed(calls: Calls, result: _Round) -> Point | None:
+    """Return the answer that pivots lead to from what binds where IPOPT stopped; None where they do not.
+
+    They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
+    extremes it creeps.
+    """
+    here, status, slots = result.after, result.answer.status, result.nlp.slots
+    if calls.elastic or status not in SUCCESS or not here.raw or not calls.settings.polished:
+        return None
+    binding = _binding(here, slots)
+    loose = _frozen(calls.loose(here.sampler, here.peaks))
+    point = Point(here.x, status, True, nodes=loose, raw=here.raw, binding=binding)
+    followed = follow(calls, replace(point, structure=calls.program.structure))
+    return replace(followed, iterations=result.iterations, value=result.answer.value) if followed else None
+
+
+def _binding(here: _Place, slots: int) -> Nodes:
+    """Return of each family the nodes that carry a multiplier where the solver stopped."""
+    if not here.nodes:
+        return ()
+    prices = here.raw["lam_g"][-len(here.nodes) * slots :].reshape(len(here.nodes), slots)
+    pairs = zip(here.nodes, prices, strict=True)
+    return tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
+
+
+def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
+    """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
+    grown = any(len(of) > nlp.slots for of in here.nodes)
+    if calls.elastic or grown or here.sampler.corner_count != nlp.structure.corners:
+        return False
+    arguments = calls.arguments(nlp, here.sampler, here.x, extra, here.nodes)
+    rows = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
+    return bool(np.all(rows <= arguments["ubg"] + STANDS) and np.all(rows >= arguments["lbg"] - STANDS))
+
+
+def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
+    """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
+    limits = program.limits
+    needs = {k: extra[way[0]] - (extra[way[1]] if len(way) == 2 else 0.0) for k, way in program.ways.items()}
+    return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
+
+
+def _uniform(sampler: Sampler, family: Family, count: int) -> tuple[Extreme, ...]:
+    """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
+    pieces, u = sampler.cycle.located(TURN * np.arange(count) / count)
+    on = sampler.on(family.row, family.where)[pieces]
+    places = list(zip(pieces[on].tolist(), u[on].tolist(), strict=True))
+    if family.row in sampler.model.signed:
+        return tuple(Extreme(*place, 0.0, signed=True) for place in places)
+    return tuple(Extreme(*place, sign) for place in places for sign in (1.0, -1.0))
+
+
+def _carried(node: Extreme, before: Cycle, sampler: Sampler) -> Extreme:
+    """Return a node of a cycle whose corners stood in another order, at the same crank angle."""
+    angle = float(before.angles(np.array([node.piece]), np.array([node.u]))[0])
+    return Extreme(*sampler.cycle.place(angle), node.value, node.signed)
+
+
+def _frozen(nodes: Sequence[Sequence[Extreme]]) -> Nodes:
+    return tuple(map(tuple, nodes))
+
+
+def starts(program: Program, count: int, seed: int = 0) -> list[dict[str, float]]:
+    """Return the job's own starts, all of them, then random ones within each variable's range, up to `count`."""
+    own = [start for start in (started(program, x) for x in program.starts) if start]
+    if len(own) >= count:
+        return own
+    generator = np.random.default_rng(seed)
+    drawn: list[dict[str, float]] = []
+    for _ in range(DRAWS * count):
+        if len(own) + len(drawn) >= count:
+            break
+        trial = started(program, {v.name: float(generator.uniform(*v.range)) for v in program.variables})
+        if trial:
+            drawn.append(trial)
+    return own + drawn
+
+
+def started(program: Program, x: Mapping[str, float]) -> dict[str, float] | None:
+    """Return a start with the variables that follow from the others; None where the linkage has no real cycle."""
+    try:
+        full = program.completed(x)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return full if sampler_at(program, full) else None

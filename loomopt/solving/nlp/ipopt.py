@@ -1,0 +1,121 @@
+"""How IPOPT is asked to work, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from loomopt.model.sampling import Extreme, Sampler, Tally
+from loomopt.physics.cycle import Floats
+from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.transcribe import Transcription
+
+STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
+"""What IPOPT says when its callback raised, or asked it to stop."""
+
+
+class Answer(NamedTuple):
+    """What IPOPT said.
+
+    extra: the epigraph or elastic variables; raw: its multipliers and `extra` again, nothing where it did not run;
+    value: of the objective.
+    """
+
+    status: str
+    x: dict[str, float]
+    extra: Floats
+    raw: Mapping[str, Floats]
+    iterations: int
+    value: float = math.inf
+
+
+def run(
+    calls: Calls,
+    nlp: Transcription,
+    sampler: Sampler,
+    x: Mapping[str, float],
+    extra: Floats,
+    nodes: Sequence[Sequence[Extreme]],
+    raw: Mapping[str, Floats],
+) -> Answer:
+    """Return IPOPT's answer from variables x (SI) and extra; raw: multipliers to start warm from, if any.
+
+    Raises KeyboardInterrupt on Ctrl-C.
+    """
+    arguments = calls.arguments(nlp, sampler, x, extra, nodes)
+    if calls.overdetermined(arguments):
+        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, {}, 0)
+    if raw:
+        arguments |= {"lam_x0": raw["lam_x"], "lam_g0": _padded(raw["lam_g"], nlp.rows)}
+    solver = nlp.solver(bool(raw), calls.settings)
+    said = solver(**arguments)
+    stats = solver.stats()
+    status = str(stats["return_status"])
+    if status in STOPPED:
+        raise KeyboardInterrupt
+    evaluated = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
+    Tally.positions += evaluated * max(1, sum(map(len, nodes)))
+    flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
+    reached = flat[len(calls.program.variables) :]
+    said_raw = {"lam_x": lam_x, "lam_g": lam_g, "extra": reached}
+    iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
+    return Answer(status, calls.design(flat), reached, said_raw, iterations, value)
+
+
+def _padded(multipliers: Floats, size: int) -> Floats:
+    """Return multipliers for an NLP that has grown by empty rows at its end."""
+    padded = np.zeros(size)
+    common = min(size, len(multipliers))
+    padded[:common] = multipliers[:common]
+    return padded
+
+
+class IterationCallback:
+    """Reports each iteration; one CasADi callback per NLP size, kept alive with it."""
+
+    def __init__(self, report: Callable[[int], None]) -> None:
+        self.report = report
+        self._made: dict[tuple[int, int, int], Any] = {}
+
+    def for_size(self, variables: int, rows: int, parameters: int) -> Any:
+        """Return the CasADi callback for an NLP of this size."""
+        size = (variables, rows, parameters)
+        if size not in self._made:
+            self._made[size] = _make(self.report, *size)
+        return self._made[size]
+
+
+def _make(report: Callable[[int], None], variables: int, rows: int, parameters: int) -> Any:
+    """Return a CasADi callback; defined here so that CasADi is imported only when one is wanted."""
+    import casadi as ca
+
+    shapes = {"x": variables, "f": 1, "g": rows, "lam_x": variables, "lam_g": rows, "lam_p": parameters}
+
+    class Report(ca.Callback):
+        def __init__(self) -> None:
+            super().__init__()
+            self.count = 0
+            self.construct("iteration_report", {})
+
+        def get_n_in(self) -> int:
+            return int(ca.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_name_in(self, place: int) -> str:
+            return str(ca.nlpsol_out(place))
+
+        def get_name_out(self, place: int) -> str:
+            return "stop"
+
+        def get_sparsity_in(self, place: int) -> Any:
+            return ca.Sparsity.dense(shapes.get(str(ca.nlpsol_out(place)), 0), 1)
+
+        def eval(self, arguments: Any) -> list[int]:
+            report(self.count)
+            self.count += 1
+            return [0]
+
+    return Report()

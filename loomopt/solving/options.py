@@ -1,0 +1,111 @@
+"""What a solve is asked for, checked before anything is computed."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal
+from loomopt.physics.effects.kinds import EVALUATED
+from loomopt.physics.tolerances import COARSEST, TIGHTEST
+from loomopt.scenes.scene import Scene
+
+MOST_STARTS = 10_000
+"""Starts that may be asked for: hours; more is a slip of the pen."""
+
+
+GAP, SECONDS = 1e-3, 60.0
+"""What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""
+OMITTED = 0.01
+"""Share of an objective's natural size that leaving out an effect may change, usual."""
+LEAST_GAP, MOST_GAP = 1e-6, 0.5
+"""Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
+
+
+class Everywhere(NamedTuple):
+    """That an answer be proven best of all admissible designs; say: is told how far the proof has come.
+
+    gap: relative, what is left open; seconds: how long it may take.
+    """
+
+    gap: float = GAP
+    seconds: float = SECONDS
+    say: Callable[[str], None] = lambda text: None
+
+
+def check_everywhere(asked: Everywhere | None) -> None:
+    """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
+    if asked is None:
+        return
+    arguments.number(asked.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
+    arguments.number(asked.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
+    if not LEAST_GAP <= asked.gap <= MOST_GAP:
+        raise BadInput(
+            "the gap is out of range",
+            key="--gap",
+            value=f"{asked.gap:g}",
+            allowed=f"{LEAST_GAP:g} to {MOST_GAP:g}",
+            remedy="Write --gap 1e-3, or leave it out.",
+        )
+    if not 0 < asked.seconds < math.inf:
+        raise BadInput(
+            "the time is out of range",
+            key="--time",
+            value=f"{asked.seconds:g}",
+            allowed="seconds, more than 0",
+            remedy="Write --time 60, or leave it out.",
+        )
+
+
+def target_name(scene: Scene, target: str | None) -> str:
+    """Return the target's name, the job's default without one."""
+    if target is not None:
+        arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
+    name = target or scene.schema.default_target
+    if name not in scene.schema.targets:
+        raise BadInput(
+            f"job {scene.job} has no target {name}",
+            file=scene.origin,
+            key="target",
+            value=name,
+            allowed=", ".join(scene.schema.targets),
+            remedy="Choose one of them.",
+        )
+    return name
+
+
+def check_sought(scene: Scene, what: str = "solve") -> None:
+    """Raise BadInput where an effect takes part only where a given design is evaluated; what: the command."""
+    for effect in scene.active:
+        if isinstance(effect, EVALUATED):
+            problem = f"{what} does not cover effect {effect.name}: with it, a design is evaluated and simulated only"
+            remedy = f"Take it off (--without {effect.name}): {what} without it, evaluate with it"
+            raise refusal(problem, scene.origin, f"effects.{effect.name}", remedy=remedy)
+
+
+def check_numbers(accuracy: float, starts: int | None, seed: int = 0) -> None:
+    """Raise BadInput for settings outside what can be kept."""
+    accuracy = arguments.number(
+        accuracy, "accuracy", f"{TIGHTEST:g} to {COARSEST:g}", "Give 1e-8 as a number, or leave it out"
+    )
+    if starts is not None:
+        arguments.whole(starts, "starts", f"1 to {MOST_STARTS}", "Give 20, or leave it out")
+    if arguments.whole(seed, "seed", "0 or more", "Give 0, or leave it out") < 0:
+        raise refusal("it is less than 0", "", "seed", seed, "0 or more", "Give 0, or leave it out")
+    if not TIGHTEST <= accuracy <= COARSEST:
+        raise BadInput(
+            "the accuracy is out of range",
+            key="accuracy",
+            value=f"{accuracy:g}",
+            allowed=f"{TIGHTEST:g} to {COARSEST:g}",
+            remedy="Give 1e-8, or leave it out.",
+        )
+    if starts is not None and not 1 <= starts <= MOST_STARTS:
+        raise BadInput(
+            "the number of starts is out of range",
+            key="starts",
+            value=str(starts),
+            allowed=f"1 to {MOST_STARTS}",
+            remedy="Give 20, or leave it out.",
+        )

@@ -1,0 +1,260 @@
+"""The proof of an answer, level by level: that no admissible design in the bounds is better by more than a gap.
+
+Each level is asked of all designs that are as good as the answer at the levels before it, up to a stated tolerance.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from loomopt.jobs.base import Job
+from loomopt.maths.intervals import Floats
+from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.sampling import Sampler
+from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
+from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel, Sense
+from loomopt.solving.options import Everywhere
+from loomopt.solving.proof.reading import Reader
+from loomopt.solving.proof.rows import OpenError
+from loomopt.solving.proof.task import Task, reduced, silent
+from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
+from loomopt.solving.search.search import Search, compared, judged, tried
+
+HELD = SAME_OBJECTIVE
+"""What an earlier level's objective may exceed the answer's by, natural size: that much counts as the same optimum."""
+LEAST_SIZE = 1e-3
+"""Share of its natural size below which an optimum is as good as 0: the gap is then relative to that share."""
+
+LOOKED_AT = 16
+"""Promising middles of a batch that are judged as designs, each of which takes a millisecond."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What is shown of all levels so far; why: why not more; better: a better design, if one turned up.
+
+    lowest: the middle of an open box that could be the best; both the program's variables, SI.
+    """
+
+    levels: tuple[GlobalLevel, ...] = ()
+    boxes: int = 0
+    why: str = ""
+    better: Mapping[str, float] | None = None
+    lowest: Mapping[str, float] | None = None
+
+    @property
+    def proven(self) -> bool:
+        """Whether every level is."""
+        return not self.why and self.better is None
+
+
+class Levels:
+    """The questions of all levels of an answer, and how far each has come."""
+
+    def __init__(self, program: Program, job: Job, x: Mapping[str, float], gap: float) -> None:
+        self.program, self.gap = program, gap
+        sampler = Sampler(program.model, {**program.parameters, **x})
+        self.merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+        self.why = job.open_boxes or _unserved(program, sampler)
+        self._levels: list[_Level] = []
+        if self.why:
+            return
+        try:
+            task = reduced(program, loosening(job, program), silent(program), _most(program, self.merits))
+            self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
+        except OpenError as error:
+            self.why = str(error)
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            # A formula that decides by a value, or raises to a power that is no whole number, is none for boxes.
+            self._levels, self.why = [], "a formula of this scene does not run in intervals"
+
+    def run(self, until: float, say: Callable[[str], None]) -> Outcome:
+        """Go on until all is shown, a better design turns up, or the clock says `until`."""
+        for place, level in enumerate(self._levels):
+            now = time.perf_counter()
+            better = level.search(now + (until - now) / (len(self._levels) - place), say)
+            if better is not None:
+                return self._outcome(better)
+        return self._outcome()
+
+    def _outcome(self, better: Mapping[str, float] | None = None) -> Outcome:
+        shown = tuple(level.shown() for level in self._levels)
+        still = [level for level, found in zip(self._levels, shown, strict=True) if not found.proven]
+        why = "; ".join(level.why() for level in still) or self.why
+        lowest = still[0].lowest() if still else None
+        return Outcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
+
+
+def loosening(job: Job, program: Program) -> tuple[str, ...]:
+    """Return the variables of a program that its job says only loosen limits."""
+    names = {v.name for v in program.variables}
+    return tuple(name for name, other in job.loosening.items() if {name, other} <= names)
+
+
+def _unserved(program: Program, sampler: Sampler) -> str:
+    """Return why boxes say nothing of a program, "" where they do."""
+    if sampler.hints:
+        return "corners of the cycle are found by iteration, which boxes do not enclose"
+    if names := ", ".join(state.name for state in program.model.states):
+        return f"the steady state of {names} is not bounded by boxes of designs"
+    if any(len(objective.groups) > 1 for objective in program.objectives):
+        return "an objective that is a sum is not bounded by boxes"
+    return ""
+
+
+def _most(program: Program, merits: list[float]) -> dict[str, float]:
+    """Return what variables that are the first objective need not exceed, SI: the answer's own."""
+    first = program.objectives[0]
+    if first.form != "value" or first.row not in {v.name for v in program.variables}:
+        return {}
+    return {first.row: (merits[0] + HELD) * first.scale}
+
+
+class _Level:
+    """One level's question, and the tree of its boxes."""
+
+    def __init__(self, task: Task, x: Mapping[str, float], merits: list[float], place: int, gap: float) -> None:
+        self.task, self.place, self.gap = task, place, gap
+        self.objective, self.best = task.program.objectives[place], merits[place]
+        lowest = _lessened(self.objective, self.best, gap)
+        held = tuple(merit + HELD for merit in merits[:place])
+        at = task.place(x)
+        reader = Reader(task, place + 1, at)
+        weights = multipliers(reader, at, place)
+        self.question = Question(reader, place, lowest, weights, held, self._better)
+        # Less than nothing there is none of.
+        nothing_less = self.objective.form != "value" and self.best <= FEASIBLE
+        self.tree = Tree.empty(len(task.names)) if nothing_less else Tree.whole(task.low, task.high)
+
+    @property
+    def proven(self) -> bool:
+        """Whether no box is open, and none was given up."""
+        return self.tree.closed and math.isinf(self.tree.stuck)
+
+    def search(self, until: float, say: Callable[[str], None]) -> dict[str, float] | None:
+        """Grow the tree; returns a better design, the program's variables, SI, if one turns up."""
+        while not self.tree.closed and time.perf_counter() < until:
+            found = grown(self.tree, self.question)
+            say(f"proving {self.objective.figure}: {self._gap_said()}, {self.tree.boxes} boxes")
+            if found is not None:
+                return self.task.design(found)
+        return None
+
+    def lowest(self) -> dict[str, float] | None:
+        """Return the middle of the open box with the least bound, the program's variables, SI."""
+        middle = self.tree.lowest()
+        return None if middle is None else self.task.design(middle)
+
+    def _better(self, middles: Floats) -> Floats | None:
+        """Return a middle that is an admissible design with a better objective, judged as any design is."""
+        program = self.task.program
+        for k in range(min(middles.shape[1], LOOKED_AT)):
+            x = self.task.design(middles[:, k])
+            try:
+                sampler = Sampler(program.model, {**program.parameters, **x})
+                kept = all(_kept(sampler, limit) for limit in program.limits)
+                merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+            except (ArithmeticError, TypeError, ValueError):
+                continue
+            same = all(merit <= held for merit, held in zip(merits, self.question.held, strict=False))
+            if kept and same and merits[self.place] < self.question.cut:
+                return middles[:, k]
+        return None
+
+    def shown(self) -> GlobalLevel:
+        """Return what the tree shows."""
+        objective = self.objective
+        least = min(self.question.cut, self.tree.bound)
+        # A magnitude and a peak are never negative.
+        bound = _figure(objective, least if objective.form == "value" else max(least, 0.0))
+        best = _figure(objective, self.best)
+        gap = self.gap if self.proven and self.tree.boxes else abs(best - bound) / _size(objective, best)
+        band = abs(_figure(objective, self.best + HELD) - best)
+        return GlobalLevel(objective.figure, self._sense, best, bound, gap, band, self.proven)
+
+    @property
+    def _sense(self) -> Sense:
+        if self.objective.form == "magnitude":
+            return "least magnitude"
+        return "least" if self.objective.power > 0 else "most"
+
+    def why(self) -> str:
+        """Return why the level is not proven."""
+        small = ", and what is left open is too small to halve" if self.tree.closed else ""
+        return f"{self.objective.figure} is open, {self._gap_said()}{small}"
+
+    def _gap_said(self) -> str:
+        gap = self.shown().gap
+        return f"gap {100 * gap:.2g} %" if math.isfinite(gap) else "no bound yet"
+
+
+def _kept(sampler: Sampler, limit: Limit) -> bool:
+    excess = sampler.excess(limit)
+    return (abs(excess) if limit.sign == 0 else excess) <= FEASIBLE
+
+
+def _figure(objective: Objective, merit: float) -> float:
+    """Return the figure, SI, of an objective of natural size; of an inverse one it is the larger the less that is."""
+    value, power = merit * objective.scale, objective.power
+    if power == 1 or math.isinf(value):
+        return value
+    if power < 0 and value <= 0:
+        return math.inf
+    return math.copysign(abs(value) ** (1 / power), value)
+
+
+def _size(objective: Objective, figure: float) -> float:
+    """Return what a gap is relative to, SI: the figure, or a share of its natural size where that is more."""
+    return max(abs(figure), abs(_figure(objective, LEAST_SIZE))) if objective.power > 0 else abs(figure)
+
+
+def _lessened(objective: Objective, best: float, gap: float) -> float:
+    """Return the objective, natural size, of a figure that is better by the gap."""
+    figure = _figure(objective, best)
+    better = figure - math.copysign(gap * _size(objective, figure), objective.power)
+    return math.copysign(abs(better) ** objective.power, better) / objective.scale
+
+
+FIRST = 0.5
+"""Share of the time after which a local solve is tried from the most promising open box."""
+
+
+def claimed(search: Search, asked: Everywhere, refused: str = "") -> tuple[Search, GlobalBound]:
+    """Return what is proven of a search's best, and the search: with a better best where boxes led to one.
+
+    refused: why nothing can be, "" where that is not known.
+    """
+    began = time.perf_counter()
+    until = began + asked.seconds
+    reason = refused or ("" if search.passed else "there is no certified answer")
+    if reason or search.best is None:
+        return search, _bound(Outcome(why=reason), 0, began)
+    boxes = 0
+    while True:
+        levels = Levels(search.program, search.job, search.best.x, asked.gap)
+        now = time.perf_counter()
+        outcome = levels.run(now + FIRST * (until - now), asked.say)
+        start = outcome.better or outcome.lowest
+        found = _improved(search, start) if start else None
+        if found is None and outcome.better:
+            why = "a better design turned up, and no certified optimum was reached from it"
+            return search, _bound(Outcome(outcome.levels, outcome.boxes, why), boxes, began)
+        if found is None:
+            return search, _bound(levels.run(until, asked.say), boxes, began)
+        search, boxes = found, boxes + outcome.boxes
+
+
+def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
+    """Return the search after a solve from a design (variables, SI), None where its certified best is no better."""
+    found = judged(tried(search, start))
+    if not found.passed or found.best is None or search.best is None:
+        return None
+    return found if compared(found.best.candidate, search.best.candidate) < 0 else None
+
+
+def _bound(outcome: Outcome, boxes: int, began: float) -> GlobalBound:
+    """Return what an outcome says; boxes: read for answers that were given up before."""
+    seconds = time.perf_counter() - began
+    after = f" after {seconds:.3g} s" if outcome.levels and outcome.why else ""
+    return GlobalBound(outcome.levels, boxes + outcome.boxes, seconds, outcome.why + after)

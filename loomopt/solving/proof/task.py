@@ -1,0 +1,247 @@
+"""A program as branch and bound sees it: variables with finite ends, and what stands for all others."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from loomopt.maths import intervals, systems
+from loomopt.maths.intervals import Floats, Interval
+from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import boxes as box_system
+from loomopt.model.program import Limit, Move, Program, Variable
+from loomopt.model.sampling import Sampler
+from loomopt.solving.proof.rows import BoxRows, OpenError
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Lengths of which one stands still, at its upper bound, for all sizes of the others.
+
+    bounds: of all lengths, SI; still: the one that stands.
+    """
+
+    bounds: Mapping[str, tuple[float, float]]
+    still: str
+
+    @property
+    def held(self) -> dict[str, float]:
+        """The length that stands, SI."""
+        return {self.still: self.bounds[self.still][1]}
+
+    @property
+    def most(self) -> float:
+        """How many times larger than itself a design may be taken."""
+        low, high = self.bounds[self.still]
+        return float(np.nextafter(high / low, math.inf))
+
+    @property
+    def ends(self) -> dict[str, tuple[float, float]]:
+        """The other lengths' ends where the one stands, SI."""
+        others = {name: ends for name, ends in self.bounds.items() if name != self.still}
+        return {name: (low, float(np.nextafter(high * self.most, math.inf))) for name, (low, high) in others.items()}
+
+    @property
+    def pairs(self) -> list[tuple[str, str, float]]:
+        """For each two of the others a, b the largest a/b that bounds allow: a ≤ b · share, rounded upward."""
+        names = list(self.ends)
+        return [
+            (a, b, float(np.nextafter(self.bounds[a][1] / self.bounds[b][0], math.inf)))
+            for a in names
+            for b in names
+            if a != b
+        ]
+
+    def taken_out(self, x: Mapping[str, float]) -> dict[str, float]:
+        """Return a design, SI, of the size at which the one stands."""
+        factor = self.bounds[self.still][1] / x[self.still]
+        return {name: value * factor if name in self.bounds else value for name, value in x.items()}
+
+    def inside(self, x: Mapping[str, float]) -> dict[str, float]:
+        """Return a design, SI, of a size that bounds allow: the middle one."""
+        least = max(x[name] / high for name, (_, high) in self.bounds.items())
+        most = min(x[name] / low for name, (low, _) in self.bounds.items())
+        factor = 2 / (least + most)
+        return {name: value * factor if name in self.bounds else value for name, value in x.items()}
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is searched for a better design.
+
+    names: of the variables, in order; low, high: their ends, (names,), SI; fixed: numbers all designs share, of
+    variables that only loosen limits all that they may be; scale: a common scale that is left out, if there is one.
+    """
+
+    program: Program
+    names: tuple[str, ...]
+    low: Floats
+    high: Floats
+    fixed: Mapping[str, Interval]
+    loosening: Mapping[str, float] = field(default_factory=dict)
+    """Variables that only loosen limits, with the value that a design is given, SI."""
+    scale: Scale | None = None
+
+    @property
+    def sizes(self) -> Floats:
+        """The widths of the whole box, SI."""
+        return np.asarray(self.high - self.low)
+
+    @property
+    def limits(self) -> list[Limit]:
+        """The limits that are rows: those of variables are the box itself, or ratios."""
+        return [limit for limit in self.program.limits if limit.family != "variable"]
+
+    def numbers(self, low: Floats, high: Floats) -> dict[str, Number]:
+        """Return all numbers over boxes: variables with their slopes; low, high: (names, boxes), SI."""
+        count = len(self.names)
+        own = {name: intervals.variable(k, count, low[k], high[k]) for k, name in enumerate(self.names)}
+        return {**self.fixed, **own}
+
+    def points(self, at: Floats) -> dict[str, Number]:
+        """Return all numbers at points (names, boxes), SI, as intervals without slopes."""
+        return {**self.fixed, **{name: intervals.interval(at[k][None]) for k, name in enumerate(self.names)}}
+
+    def floats(self, at: Floats) -> dict[str, Number]:
+        """Return all numbers at points (names, boxes), SI, as plain arrays."""
+        known = {**self.program.parameters, **{v.name: v.lower for v in self.program.variables}, **self.loosening}
+        if self.scale:
+            known |= self.scale.held
+        return {**known, **{name: at[k][None] for k, name in enumerate(self.names)}}
+
+    def values(self, at: Floats) -> dict[str, float]:
+        """Return all numbers at one point (names,), SI, as floats: its scale is left as the boxes have it."""
+        return {name: float(np.asarray(value).ravel()[0]) for name, value in self.floats(at[:, None]).items()}
+
+    def design(self, at: Floats) -> dict[str, float]:
+        """Return the program's variables at one point (names,), SI, at a scale that its bounds allow."""
+        values = self.values(at)
+        found = {v.name: values[v.name] for v in self.program.variables}
+        return self.scale.inside(found) if self.scale else found
+
+    def place(self, x: Mapping[str, float]) -> Floats:
+        """Return the point (names,) of the program's variables, SI, moved inside the box."""
+        values = self.scale.taken_out(x) if self.scale else x
+        at = np.array([values[name] for name in self.names])
+        return np.asarray(np.clip(at, self.low, self.high))
+
+
+def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> Task:
+    """Return the task of a program.
+
+    loosening: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
+    without a bound of their own need not exceed. Raises OpenError where a variable has no end.
+    """
+    maths: Maths = box_system()
+    held = dict(scale.held) if scale else {}
+    fixed = {name: maths.number(value) for name, value in {**program.parameters, **held}.items()}
+    for v in program.variables:
+        if v.name in loosening or v.lower == v.upper:
+            fixed.setdefault(v.name, Interval(v.lower, v.upper))
+    inside: dict[str, tuple[float, float]] = {}
+    for v in (v for v in program.variables if v.name not in fixed):
+        low, high = scale.ends[v.name] if scale and v.name in scale.ends else (v.lower, v.upper)
+        inside[v.name] = low, min(high, most.get(v.name, high))
+    for name in [name for name, ends in inside.items() if not np.all(np.isfinite(ends))]:
+        inside[name] = _implied(program, fixed | {n: Interval(*ends) for n, ends in inside.items()}, name)
+    _finite(program.variables, inside)
+    uppers = {v.name: v.upper for v in program.variables if v.name in loosening}
+    lows, highs = (np.array([ends[k] for ends in inside.values()]) for k in range(2))
+    return Task(program, tuple(inside), lows, highs, fixed, uppers, scale)
+
+
+def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tuple[float, float]:
+    """Return the ends of a variable that its limits imply: value · weight, all that the weight may be."""
+    maths: Maths = box_system()
+    rows = BoxRows(program.model, maths, program.model.given(maths, values), {})
+    ends = values[name]
+    for limit in program.limits:
+        if limit.row == name and limit.family == "static":
+            bound = maths.number(limit.value) * (rows.single(limit.weight) if limit.weight else 1.0)
+            low = bound.low if limit.sign <= 0 else ends.low
+            high = bound.high if limit.sign >= 0 else ends.high
+            ends = ends.meet(Interval(low, high))
+    return float(ends.low), float(ends.high)
+
+
+def _finite(variables: tuple[Variable, ...], inside: Mapping[str, tuple[float, float]]) -> None:
+    """Raise OpenError for a variable without ends."""
+    called = {v.name: v.called for v in variables}
+    for name, ends in inside.items():
+        if not np.all(np.isfinite(ends)):
+            raise OpenError(f"{called[name]} is not bounded")
+
+
+DRAWN, TRIED = 3, 60
+"""Random designs at which rows are read at two sizes, and draws to find them: formulas that agree to 30 digits at one
+point agree everywhere but by a coincidence that no scene arranges."""
+AGREE = 1e-30
+"""Share by which rows of two sizes may differ: ten digits above the rounding of 40."""
+PLACES = 0.11, 0.35, 0.62, 0.87
+"""Shares of each piece of the cycle at which whole-cycle rows are read."""
+
+
+def silent(program: Program) -> Scale | None:
+    """Return the common scale of a program's lengths where it changes no row, None without one."""
+    ends = {v.name: (v.lower, v.upper) for v in program.variables}
+    for move in program.moves:
+        known = all(name in ends and ends[name][0] > 0 and math.isfinite(ends[name][1]) for name in move.along)
+        if move.kind == "scale" and known and _changes_nothing(program, move):
+            bounds = {name: ends[name] for name in move.along}
+            return Scale(bounds, min(bounds, key=lambda name: bounds[name][1] / bounds[name][0]))
+    return None
+
+
+def _changes_nothing(program: Program, move: Move) -> bool:
+    """Say whether rows of designs of two sizes agree: a limit at 0 keeps its sign, all else its value."""
+    read = 0
+    for x in _designs(program):
+        try:
+            sizes = x, {**x, **{name: 2.0 * x[name] for name in move.along}}
+            pairs = list(zip(*(_rows(program, Sampler(program.model, each)) for each in sizes), strict=True))
+        except (ArithmeticError, TypeError, ValueError):
+            continue
+        if not all(_agree(small, large, at_zero) for (small, at_zero), (large, _) in pairs):
+            return False
+        read += 1
+        if read == DRAWN:
+            return True
+    return False
+
+
+def _agree(small: Number, large: Number, at_zero: bool) -> bool:
+    """Say whether a row is the same at twice the size; of a limit at 0 it may grow with a power of the size."""
+    powers = (1, 2, 4) if at_zero else (1,)
+    return any(abs(large - power * small) <= AGREE * max(abs(large), abs(small)) for power in powers)
+
+
+def _designs(program: Program) -> Iterator[dict[str, float]]:
+    """Yield random designs within the ranges of the variables, SI."""
+    rng = np.random.default_rng(0)
+    for _ in range(TRIED):
+        shares = rng.random(len(program.variables))
+        drawn = zip(program.variables, shares, strict=True)
+        yield {**program.parameters, **{v.name: v.range[0] + t * (v.range[1] - v.range[0]) for v, t in drawn}}
+
+
+def _rows(program: Program, sampler: Sampler) -> Iterator[tuple[Number, bool]]:
+    """Yield rows in 40 digits, and whether each is a limit at 0: those that are no variable's, and objectives.
+
+    Raises ValueError for a design that is no machine.
+    """
+    if not all(map(math.isfinite, sampler.static.values())):
+        raise ValueError("a row has no real value")
+    reading = sampler.read(systems.mpmath())
+    for limit in program.limits:
+        if limit.family == "static":
+            yield reading.excess(limit), limit.value == 0.0
+    cycle = [limit.row for limit in program.limits if limit.family == "cycle"]
+    for objective in program.objectives:
+        if objective.form == "peak":
+            cycle += objective.rows
+        else:
+            yield from ((reading.single(row), False) for row in objective.rows)
+    for name in dict.fromkeys(cycle):
+        for piece in range(sampler.cycle.pieces):
+            yield from ((reading.at(name, piece, reading.maths.number(u)), False) for u in PLACES)

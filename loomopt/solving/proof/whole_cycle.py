@@ -1,0 +1,169 @@
+"""Proof over the whole cycle: every limit, the assembly and every claimed peak, for all crank angles.
+
+Whole-cycle rows are bounded on boxes of crank angle, single values enclosed, in Arb's ball arithmetic. What binds
+touches its limit, so it is proven up to a slack: a share of the quantity's largest magnitude over the cycle.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from loomopt.base import arguments
+from loomopt.base.errors import BadInput
+from loomopt.jobs import registry
+from loomopt.jobs.base import Job
+from loomopt.model import model
+from loomopt.model.program import Limit, Program
+from loomopt.model.sampling import Sampler
+from loomopt.physics.cycle import Where
+from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Proof, Proofs, Solution
+from loomopt.solving.answer.words import Words
+from loomopt.solving.certificate.taylor_bounds import Boxes
+from loomopt.solving.options import check_sought, target_name
+
+RANK = {"proven": 0, "undecided": 1, "violated": 2}
+"""Statuses from best to worst."""
+
+
+def prove(
+    scene: Scene,
+    design: Mapping[str, float],
+    target: str | None = None,
+    slack: float = SLACK,
+    judged_by: Program | None = None,
+) -> Proofs:
+    """Return the proofs of a design's limits (SI; what it does not name is today's).
+
+    slack: what is left open, relative to each quantity's largest magnitude over the cycle; judged_by: a program whose
+    limits they are, the target's own without one. Raises BadInput.
+    """
+    allowed, remedy = f"{LEAST_SLACK:g} to {MOST_SLACK:g}", "Give 1e-8, or leave it out."
+    if not LEAST_SLACK <= arguments.number(slack, "slack", allowed, remedy) <= MOST_SLACK:
+        raise BadInput("the slack is out of range", key="slack", value=f"{slack:g}", allowed=allowed, remedy=remedy)
+    job, name = registry.of(scene), target_name(scene, target)
+    check_sought(scene, "prove")
+    job.demand(scene, name)
+    full = {**job.today(scene), **design}
+    own, asked = (scene, name) if judged_by else job.adopted(scene, full, name)
+    program = judged_by or job.program(own, asked)
+    reads = _readings(own, job, program, full, slack)
+    found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
+    whole = reads[1].sampler
+    return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
+
+
+def _merged(found: list[Proof]) -> Iterator[Proof]:
+    """Yield one proof for all rows of one limit: the worst status, the least margin, all boxes."""
+    groups: dict[tuple[str, str], list[Proof]] = {}
+    for proof in found:
+        groups.setdefault((proof.limit, proof.text), []).append(proof)
+    for rows in groups.values():
+        worst = max(rows, key=lambda proof: (RANK[proof.status], -proof.margin))
+        yield replace(worst, boxes=sum(proof.boxes for proof in rows))
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A design read in floats and in balls; slack: relative, what proofs leave open."""
+
+    sampler: Sampler
+    boxes: Boxes
+    slack: float
+
+
+@dataclass(frozen=True)
+class _Claim:
+    """That |quantity| (of a signed one, the quantity) stays below a bound; peak: its refined largest; all SI."""
+
+    limit: str
+    text: str
+    quantity: str
+    bound: float
+    peak: float
+    where: Where | None = None
+    kind: Literal["limit", "assembly", "peak"] = "limit"
+
+
+def _readings(
+    scene: Scene, job: Job, program: Program, design: Mapping[str, float], slack: float
+) -> tuple[_Read, _Read]:
+    """Return the design read by the target's program, and by the job as a whole."""
+    # What has no room in the program stands where the program holds it: limits may ask for more than the scene's own.
+    known = {name: value for name, value in job.numbers(scene).items() if name not in program.fixed}
+    chosen = {scene.full(name): value for name, value in design.items()}
+    # What the target's program does not choose is the design's own too, and today's where it names nothing.
+    parameters = {n: chosen.get(n, value) for n, value in program.parameters.items()}
+    asked = replace(program, parameters=parameters)
+    values = {**parameters, **job.values(asked, {**known, **chosen})}
+    samplers = Sampler(program.model, values), job.sampler(scene, design)
+    own, whole = (_Read(sampler, Boxes(sampler), slack) for sampler in samplers)
+    return own, whole
+
+
+def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
+    """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
+    for limit in (limit for limit in program.limits if limit.family != "variable"):
+        hidden = limit.row if limit.name in program.told else limit.name
+        text = hidden if limit.hidden else words.limit(limit)
+        if limit.family == "cycle":
+            peak = own.sampler.peak(limit.row, limit.where)
+            yield _over_cycle(own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where))
+        else:
+            yield _single(own, limit, text)
+    for name, (quantity, most) in whole.sampler.model.assembly.items():
+        yield _over_cycle(whole, _Claim(name, name, quantity, most, whole.sampler.peak(quantity), kind="assembly"))
+    for figure, quantity in job.peaks(whole.sampler.model).items():
+        peak = whole.sampler.peak(quantity)
+        if math.isfinite(peak):
+            yield _over_cycle(
+                whole, _Claim(f"peak {figure}", f"{figure} as claimed", quantity, peak, peak, kind="peak")
+            )
+
+
+def _over_cycle(read: _Read, claim: _Claim) -> Proof:
+    """Bound one quantity on boxes; both signs where its magnitude counts."""
+    slack = read.slack * _largest(read.sampler, claim.quantity)
+    signs = (1.0,) if claim.quantity in read.sampler.model.signed else (1.0, -1.0)
+    found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where) for sign in signs]
+    worst = max(found, key=lambda each: RANK[each.status])
+    count = sum(each.boxes for each in found)
+    angle = None if worst.angle is None else worst.angle % (2 * math.pi)
+    return Proof(claim.limit, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle, claim.kind)
+
+
+def _single(read: _Read, limit: Limit, text: str) -> Proof:
+    """Enclose one value of the design alone."""
+    residual = read.boxes.excess(limit) + read.boxes.maths.number(0.0)
+    weight = float(read.boxes.single(limit.weight)) if limit.weight else 1.0
+    residual = residual / weight if weight else residual
+    value = abs(float(read.boxes.single(limit.row)))
+    size = max(value / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))
+    excess = abs(residual) if limit.sign == 0 else residual
+    slack = read.slack * size
+    status = "proven" if excess <= slack else "violated" if excess > slack else "undecided"
+    return Proof(limit.name, text, status, -float(excess.mid()), slack, 1)
+
+
+def _largest(sampler: Sampler, quantity: str) -> float:
+    """Return a quantity's largest magnitude over the cycle, as sampled."""
+    pieces, u = sampler.grid()
+    return float(np.abs(sampler.at(quantity, pieces, u)).max())
+
+
+def proven(scene: Scene, target: str, answer: Solution) -> Solution:
+    """Return an answer whose certificate says that everything is proven, or why it is not."""
+    found = prove(scene, designs.flat(answer.design), target)
+    answer = replace(answer, proofs=found)
+    assert answer.certificate is not None
+    if found.passed:
+        return replace(answer, certificate=replace(answer.certificate, whole_cycle="proven"))
+    reasons = tuple(f"{each.text} is {each.status}" for each in found.proofs if each.status != "proven")
+    certificate = replace(answer.certificate, passed=False, reasons=(*answer.certificate.reasons, *reasons))
+    message = f"A design was reached but not proven: {'; '.join(reasons)}."
+    return replace(answer, certificate=certificate, status="uncertified", message=message)

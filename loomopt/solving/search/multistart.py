@@ -1,0 +1,227 @@
+"""How wide a search goes: from starts as asked for, or from many designs looked at until the best basin is found."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from loomopt.physics.tolerances import SAME_OBJECTIVE
+from loomopt.solving.certificate.kkt import figure_of
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Known, Point, sampler_at
+from loomopt.solving.search.batch import SCREENED_STARTS
+from loomopt.solving.search.elastic import least
+from loomopt.solving.search.search import Candidate, OnStart, Search, at, compared, judged, tried
+
+if TYPE_CHECKING:
+    from loomopt.solving.search.screening import Screening
+
+MORE_STARTS = 8
+"""Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'
+hardest target (tests/solving/test_rapier_starts.py: more than half do)."""
+
+
+BETTER, FLIPS = 1e-8, 2
+"""What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
+flips."""
+
+
+ELSEWHERE = 1e-3
+"""Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
+
+
+def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
+    """Return the search after so many starts, or as wide as it takes; after none where points `near` lead on.
+
+    count: the job's own starts and random ones; None for a search of the best basin. More are tried where none is
+    certified; where no start leads to a design, only if one is admissible as far as can be seen.
+    """
+    for point in near:
+        search = tried(at(search, "start nearby"), point.x, point)
+    if search.reached:
+        search = judged(search)
+        if search.passed:
+            return replace(search, stayed=True)
+    if count is None:
+        search = judged(spread(search, seed, on_start))
+        if search.passed or search.clashes:
+            return search
+    done = 0
+    for wanted in dict.fromkeys((count or MORE_STARTS, max(count or 0, MORE_STARTS))):
+        chosen = exchange.starts(search.program, wanted, seed)[:wanted]
+        for place, start in enumerate(chosen[done:], done + 1):
+            if on_start:
+                on_start(place, len(chosen))
+            search = tried(at(search, f"start {place} of {len(chosen)}"), start)
+        done = max(done, len(chosen))
+        search = judged(search)
+        if not search.reached and search.nearest is None:
+            search = judged(relaxed(search, chosen))
+        if search.passed or search.clashes:
+            break
+    return search
+
+
+def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
+    """Return the search after the job's own starts, the best of a look at many designs, and the best with flips.
+
+    From the best, each variable in turn is put to its far end: basins lie side by side along bounds. Where the best is
+    as good as any design can be, nothing more is solved.
+    """
+    own = exchange.starts(search.program, 1, seed)
+    search = at(search, "looking at designs")
+    began = time.perf_counter()
+    screening = None if search.program.single else _screening(search, own)
+    drawn = _completed(search, screening.starts(seed)) if screening else []
+    looked, spent = screening.count if screening else 0, time.perf_counter() - began
+    search = replace(search, designs=looked, solved=search.solved + spent)
+    steps = _Steps(on_start, len(own) + len(drawn))
+    for start in own:
+        search = steps.explored(search, start)
+        if not search.reached and search.nearest is None:
+            search = relaxed(search, [*own, *drawn[:SCREENED_STARTS]])
+            if search.clashes:
+                return search
+    for start in drawn:
+        search = steps.explored(search, start)
+    for _ in range(FLIPS):
+        if screening is None or not search.reached or unbeatable(search):
+            break
+        before = search.ranked[0]
+        flipped = _completed(search, screening.flipped(before.point.x))
+        steps.count += len(flipped)
+        for start in flipped:
+            search = steps.explored(search, start)
+        if search.ranked[0] is before:
+            break
+    return search
+
+
+@dataclass
+class _Steps:
+    """Starts as they are explored: what is told of each; count: how many are known to come."""
+
+    on_start: OnStart | None
+    count: int
+    done: int = 0
+
+    def explored(self, search: Search, start: Mapping[str, float]) -> Search:
+        """Return the search after a solve that is left as soon as it cannot be better than the best so far.
+
+        It is not begun where nothing can.
+        """
+        self.done += 1
+        if unbeatable(search):
+            return search
+        if self.on_start:
+            self.on_start(self.done, self.count)
+        search = at(search, f"start {self.done} of {self.count}")
+        if not search.reached:
+            return tried(search, start)
+        best = search.ranked[0]
+        return tried(search, start, known=Known(best.point.binding, best.value - BETTER))
+
+
+def tied(search: Search) -> bool:
+    """Say whether other designs may be as good as the best: other starts led there, or its bounds alone stop it."""
+    best, sizes = search.ranked[0], {v.name: v.scale for v in search.program.variables}
+
+    def apart(candidate: Candidate) -> bool:
+        x = candidate.point.x
+        return any(abs(x.get(name, value) - value) > ELSEWHERE * sizes[name] for name, value in best.point.x.items())
+
+    alike = (each for each in search.candidates if each.value <= best.value + SAME_OBJECTIVE)
+    return unbeatable(search) or any(map(apart, alike))
+
+
+def unbeatable(search: Search) -> bool:
+    """Say whether the best is as good as bounds alone let any design be: none can be better by as much as counts."""
+    lower = {v.name: v.lower for v in search.program.variables}
+    least = 0.0
+    for level in search.program.objectives:
+        alone = lower.get(level.row, -math.inf) if level.form == "value" and len(level.rows) == 1 else -math.inf
+        least = search.settings.penalty * least + (0.0 if level.form == "magnitude" else alone / level.scale)
+    return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
+
+
+def _screening(search: Search, own: Sequence[Mapping[str, float]]) -> "Screening | None":
+    """Return what looks at many designs, by the nodes of the first start that has a cycle.
+
+    None without one, and where nothing is free.
+    """
+    from loomopt.solving.search.screening import Screening
+
+    for start in (*own, search.today):
+        sampler = sampler_at(search.program, start) if start else None
+        if sampler is not None:
+            found = Screening(search.program, sampler)
+            return found if len(found.free) else None
+    return None
+
+
+def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+    """Return the starts that assemble, with the variables that follow from the others."""
+    return [start for start in (exchange.started(search.program, each) for each in starts) if start]
+
+
+def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
+    """Return the search with where its limits' excesses are least; solved from there where there are none."""
+    began = time.perf_counter()
+    search = at(search, "looking for the least relaxation")
+    places = [*starts, *([search.today] if search.today else [])]
+    nearest = least(search.program, places, search.settings)
+    search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
+    return search if nearest is None or nearest.relaxed else tried(search, nearest.x)
+
+
+def search_counts(search: Search) -> dict[str, Any]:
+    """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
+    best = search.best
+    same = [c for c in search.candidates if _is_there(c, best.candidate)] if best else []
+    accuracy = search.settings.accuracy
+    counts = {
+        "starts": len(search.candidates) + search.sought,
+        "starts_at_best": len(same),
+        "basins": len(optima_found(search)),
+    }
+    return {**counts, "designs": search.designs, "accuracy": accuracy}
+
+
+def optima_found(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
+    """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
+    groups: list[list[Candidate]] = []
+    for candidate in search.ranked:
+        if groups and compared(groups[-1][0], candidate) == 0:
+            groups[-1].append(candidate)
+        else:
+            groups.append([candidate])
+    return tuple((_figures(search, group[0]), len(group)) for group in groups)
+
+
+def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
+    """Return the figures of the objectives at a candidate, SI."""
+    sampler = sampler_at(search.program, candidate.point.x)
+    if sampler is None:
+        return {}
+    return {objective.figure: figure_of(sampler, objective) for objective in search.program.objectives}
+
+
+def _is_there(candidate: Candidate, best: Candidate) -> bool:
+    """Say whether a solve ended in the best, or was left where it could only have ended there."""
+    if candidate.point.reached:
+        return compared(candidate, best) == 0
+    return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
+
+
+def search_report(search: Search) -> str:
+    """Return how far the best was sought, as a sentence that claims no more than was done."""
+    if search.stayed:
+        return "Solved again near the answer given; other basins were not looked at."
+    if search.program.single:
+        return f"No other basin was looked for: {search.program.single}."
+    solves, found = len(search.candidates), len(optima_found(search))
+    reached = f"{solves} solve{'s' if solves > 1 else ''}"
+    ended = f"Best of {found} optima" if found > 1 else "The only optimum"
+    looked = f", {search.designs} designs sampled" if search.designs else ""
+    return f"{ended} reached by {reached}{looked}."

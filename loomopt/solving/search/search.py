@@ -1,0 +1,263 @@
+"""The search for the best certified design: starts → exchange → silent levels → certificate, as steps on records."""
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from loomopt.jobs.base import Job
+from loomopt.model.program import Program
+from loomopt.physics.tolerances import (
+    CORRECTIONS,
+    FEASIBLE,
+    POLISH_FARTHER,
+    PRECISE,
+    ROUNDING,
+    SAME_OBJECTIVE,
+    STATIONARY,
+)
+from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.verdict import Certificate
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Known, Point, Settings, sampler_at
+from loomopt.solving.search.settle import settle
+
+MOST_ALIKE = 4
+"""Points of one optimum that are put to the certificate where the first does not pass."""
+
+
+STRONGER, STRONGEST_PENALTY = 100.0, 1e7
+"""Factor on the weight between levels where a level gave way; the largest weight that IPOPT still solves to 1e-9."""
+
+
+HELD_MARGIN = 2.0
+"""A level's weight must exceed its multiplier [exact penalty: Nocedal and Wright, section 17.2], by this factor."""
+
+
+OnStart = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle.
+
+    value: of the NLP's objective there, in which each level weighs far more than the next; that of the NLP itself
+    where the solve was left.
+    """
+
+    point: Point
+    objectives: tuple[float, ...]
+    value: float = math.inf
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate after the silent levels: its variables, SI, and their certificate."""
+
+    candidate: Candidate
+    x: Mapping[str, float]
+    certificate: Certificate
+
+
+@dataclass(frozen=True)
+class Search:
+    """How far a search has come.
+
+    settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
+    best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
+    no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
+    basin; built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of
+    certificates.
+    """
+
+    job: Job
+    program: Program
+    settings: Settings
+    today: Mapping[str, float] = field(default_factory=dict)
+    candidates: tuple[Candidate, ...] = ()
+    best: Judged | None = None
+    nearest: Point | None = None
+    sought: int = 0
+    designs: int = 0
+    stayed: bool = False
+    built: float = 0.0
+    solved: float = 0.0
+    settled: float = 0.0
+    certified: float = 0.0
+
+    @property
+    def passed(self) -> bool:
+        """Whether the best has its certificate."""
+        return self.best is not None and self.best.certificate.passed
+
+    @property
+    def clashes(self) -> bool:
+        """Whether limits clash as far as can be seen."""
+        return not self.reached and self.nearest is not None and bool(self.nearest.relaxed)
+
+    @property
+    def reached(self) -> list[Candidate]:
+        """Candidates that are worth a certificate."""
+        return [candidate for candidate in self.candidates if candidate.point.reached]
+
+    @property
+    def ranked(self) -> list[Candidate]:
+        """Those, the best first."""
+        return sorted(self.reached, key=functools.cmp_to_key(compared))
+
+
+def at(search: Search, step: str) -> Search:
+    """Return the search at another step, which is told."""
+    return replace(search, settings=search.settings.at(step))
+
+
+def tried(search: Search, start: Mapping[str, float], warm: Point | None = None, known: Known | None = None) -> Search:
+    """Return the search after one more solve."""
+    began = time.perf_counter()
+    point = exchange.solve(search.program, start, search.settings, warm, known=known)
+    spent = time.perf_counter() - began
+    levels = objectives(search.program, point.x) if point.reached else ()
+    count = len(search.program.objectives)
+    weighted = sum(search.settings.penalty ** (count - 1 - k) * level for k, level in enumerate(levels))
+    candidate = Candidate(point, levels, weighted if levels else point.value)
+    return replace(
+        search,
+        candidates=(*search.candidates, candidate),
+        built=search.built + point.built,
+        solved=search.solved + spent,
+    )
+
+
+def objectives(program: Program, x: Mapping[str, float]) -> tuple[float, ...]:
+    """Return the objectives of variables x (SI) in their natural sizes; infinite where they have no value."""
+    sampler = sampler_at(program, x)
+    if sampler is None:
+        return (math.inf,) * len(program.objectives)
+    return tuple(sampler.merit(objective) / objective.scale for objective in program.objectives)
+
+
+def compared(one: Candidate, other: Candidate) -> int:
+    """Order candidates by their objectives, level by level."""
+    for a, b in zip(one.objectives, other.objectives, strict=True):
+        if abs(a - b) > SAME_OBJECTIVE:
+            return -1 if a < b else 1
+    return 0
+
+
+def judged(search: Search) -> Search:
+    """Return the search with its best candidate settled and certified.
+
+    Where an earlier objective gave way to a later one, it is solved again with a stronger weight between them.
+    """
+    while search.reached:
+        first = search.ranked[0]
+        if search.best is None or search.best.candidate is not first:
+            search = _certified(search, first)
+        if search.best is None or not _too_weak(search.settings, search.best.certificate):
+            break
+        weight = search.settings.penalty * STRONGER
+        search = tried(replace(search, settings=replace(search.settings, penalty=weight)), first.point.x)
+        if not search.candidates[-1].point.reached:
+            break
+        search = replace(search, candidates=tuple(c for c in search.candidates if c is not first))
+    return search if search.passed else _another(search)
+
+
+def _another(search: Search) -> Search:
+    """Return the search with another candidate of the same objectives as its best, if one passes."""
+    best = search.best
+    if best is None:
+        return search
+    others = [c for c in search.reached if c is not best.candidate and compared(c, best.candidate) == 0]
+    for candidate in others[:MOST_ALIKE]:
+        search = _certified(search, candidate)
+        if search.passed:
+            return search
+    return _met_farther(replace(search, best=best), best)
+
+
+def _met_farther(search: Search, best: Judged) -> Search:
+    """Return the search with its best put on what just binds, where that was too far to be sure, if that passes."""
+    if not best.candidate.point.rough:
+        return search
+    farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
+    again = tried(farther, best.candidate.point.x)
+    if again.candidates[-1].point.reached:
+        again = _certified(again, again.candidates[-1])
+    return replace(again, settings=search.settings) if again.passed else search
+
+
+def _too_weak(settings: Settings, certificate: Certificate) -> bool:
+    """Say whether an earlier objective gave way to a later one: its weight must exceed its multiplier, with room."""
+    if settings.penalty * STRONGER > STRONGEST_PENALTY:
+        return False
+    held = max((level.held for level in certificate.levels[1:]), default=0.0)
+    earlier = any(level.stationarity > STATIONARY for level in certificate.levels[:-1])
+    return earlier or settings.penalty <= HELD_MARGIN * held
+
+
+def _certified(search: Search, candidate: Candidate) -> Search:
+    """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
+    accuracy = search.settings.accuracy
+    search, x, certificate = _settled(search, candidate.point.x)
+    for _ in range(CORRECTIONS):
+        precise = max(min(PRECISE, accuracy), ROUNDING)
+        close = certificate.residual <= precise and certificate.error <= accuracy
+        if not certificate.correction or close:
+            break
+        stepped = _stepped(search.program, x, certificate.correction)
+        if sampler_at(search.program, stepped) is None:
+            break
+        search, moved, better = _settled(search, stepped)
+        if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
+            break
+        x, certificate = moved, better
+    return replace(search, best=Judged(candidate, x, certificate))
+
+
+def _settled(
+    search: Search, x: Mapping[str, float], known: Mapping[str, float] | None = None
+) -> tuple[Search, dict[str, float], Certificate]:
+    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate.
+
+    known: where (SI) all levels but the last have a certificate, if anywhere.
+    """
+    job, program, began = search.job, search.program, time.perf_counter()
+    search.settings.at("certifying")
+    settled, said = settle(program, job.tidy(program, x))
+    at, there = time.perf_counter(), exact(search, settled)
+    shown = len(program.objectives) - 1 if there == known else 0
+    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=said)
+    certified = search.certified + time.perf_counter() - at
+    return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
+
+
+def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
+    """Return the variables, SI, of the design that a person reads of x (SI)."""
+    return search.job.values(search.program, search.job.design(search.program, x))
+
+
+def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Judged:
+    """Return a candidate after the silent levels with its certificate, not corrected.
+
+    known: where (SI) all levels but the last have a certificate, if anywhere.
+    """
+    _, x, certificate = _settled(search, candidate.point.x, known)
+    return Judged(candidate, x, certificate)
+
+
+def corrected(search: Search, found: Judged) -> Judged:
+    """Return a design moved by its certificate's own step and judged again; as it is where that is worse."""
+    x = _stepped(search.program, found.x, found.certificate.correction)
+    if not found.certificate.correction or sampler_at(search.program, x) is None:
+        return found
+    _, x, certificate = _settled(search, x)
+    ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
+    return Judged(found.candidate, x, certificate) if ranks[0] <= ranks[1] else found
+
+
+def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:
+    """Return x moved by a step, both SI, within its bounds."""
+    moved = {v.name: x[v.name] + step.get(v.name, 0.0) for v in program.variables}
+    return {v.name: min(max(moved[v.name], v.lower), v.upper) for v in program.variables}
