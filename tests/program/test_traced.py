@@ -22,7 +22,7 @@ from loomopt.model.reading import DATUM, Quantities
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.scenes.packaged import problem_names
+from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate.taylor_bounds import Boxes
 
 EFFECTS = {
@@ -37,7 +37,7 @@ LAWS = ("harmonic", "modified_sine", "modified_trapezoid", "polynomial_345", "fr
 def samplers():
     """Return today's machine of every packaged scene, of all effects together, of the cam laws, and made-up ones."""
     found = {}
-    for name in problem_names():
+    for name in problems():
         scene = lo.load(name)
         found[name] = registry.of(scene).sampler(scene, {})
     for name, effects in EFFECTS.items():
@@ -50,7 +50,7 @@ def samplers():
     return found
 
 
-NAMES = [*problem_names(), *(f"{name} with all effects" for name in EFFECTS), *LAWS, "a state"]
+NAMES = [*problems(), *(f"{name} with all effects" for name in EFFECTS), *LAWS, "a state"]
 
 
 def quantities(model):
