@@ -21,10 +21,10 @@ def scans(monkeypatch):
         return really(**wanted)
 
     monkeypatch.setattr(importlib.metadata, "entry_points", counted)
-    registry.entry_points.cache_clear()
+    packaged.entry_points.cache_clear()
     registry.find.cache_clear()
     yield found
-    registry.entry_points.cache_clear()
+    packaged.entry_points.cache_clear()
     registry.find.cache_clear()
 
 

@@ -8,6 +8,7 @@ import typer
 
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
+from loomopt.scenes import packaged
 
 if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
@@ -49,11 +50,10 @@ def list_problems() -> None:
     """List the packaged problems and their targets."""
     from loomopt.interface.text import layout, scenes
     from loomopt.jobs import registry
-    from loomopt.scenes import packaged
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
-    if silent or registry.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
+    if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
         from loomopt.jobs import registry
 
         others, wrong = registry.brought()
