@@ -56,11 +56,6 @@ def head(path: Path) -> Head:
     return Head(path.stem, title, job, tuple(targets) if isinstance(targets, dict) else (), source)
 
 
-def problem_names() -> list[str]:
-    """Return the names of the packaged scenes, in alphabetical order."""
-    return list(problems())
-
-
 def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadInput] = ()) -> BadInput:
     """Return the error, with the nearest name, for a scene that is not packaged.
 
@@ -75,11 +70,6 @@ def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadIn
         allowed=", ".join(known),
         remedy=f"Correct the name ({hint}), or give a path that ends in .toml",
     )
-
-
-def problems_path() -> Path:
-    """Return the folder of the packaged scenes."""
-    return _folder("problems")
 
 
 def results_path() -> Path:
