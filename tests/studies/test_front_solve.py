@@ -10,6 +10,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import results
 from loomopt.studies.front import front, plan
+from loomopt.studies.front import solver as solving
 from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import run
@@ -35,7 +36,7 @@ def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_
     asking = Asking(0, (None, 3.0))
     found = solver.solve(asking, [], False)
     assert found.status == "optimal"
-    monkeypatch.setattr(solver, "FEASIBLE", -0.01)
+    monkeypatch.setattr(solving, "FEASIBLE", -0.01)
     above = solver.solve(asking, [found.warm], False)
     assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
 
