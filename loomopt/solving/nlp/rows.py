@@ -87,6 +87,10 @@ class RowMap:
         """Return the rows of a family at stations."""
         return self._g.part(g, f"stations {family}")
 
+    def before_nodes(self, g: Any) -> Any:
+        """Return the rows that no slots are made for: of limits, below epigraph variables and at stations."""
+        return self._g.before(g, "nodes")
+
     def at_nodes(self, g: Any) -> Any:
         """Return the rows at nodes: an array (families, slots)."""
         return self._g.array(g, "nodes")
@@ -199,8 +203,7 @@ class Multipliers:
         before = self.at_nodes
         common = min(self.rows.slots, rows.slots)
         lam_g = np.zeros(rows.size)
-        firm = self.rows.size - before.size
-        lam_g[:firm] = self.lam_g[:firm]
+        rows.before_nodes(lam_g)[:] = self.rows.before_nodes(self.lam_g)
         rows.at_nodes(lam_g)[:, :common] = before[:, :common]
         return Multipliers(rows, self.lam_x, lam_g)
 
