@@ -19,7 +19,7 @@ STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 class Answer(NamedTuple):
     """What IPOPT said.
 
-    extra: the epigraph or elastic variables; multipliers: none where it did not run; value: of the objective.
+    extra: the epigraph or elastic variables; multipliers: 0 where it did not run; value: of the objective.
     """
 
     status: str
@@ -45,7 +45,8 @@ def run(
     """
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
     if calls.overdetermined(arguments):
-        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, Multipliers(), 0)
+        none = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
+        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
     if warm:
         arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.on(nlp.rows).lam_g}
     solver = nlp.solver(bool(warm), calls.settings)
