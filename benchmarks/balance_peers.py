@@ -21,6 +21,7 @@ import plain_beatup as plain
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.model import session
 from loomopt.solving.nlp import exchange, transcribe
 from loomopt.solving.nlp.point import Settings
 
@@ -102,7 +103,7 @@ class Loomopt:
 
     def build(self):
         """Solve once with nothing built, then once more."""
-        transcribe._cache.clear()
+        session.current().forget(transcribe.NLPS)
         first, self.cold = lo.solve(scene(SINGLE)), lo.solve(scene(SINGLE))
         self.times["first"].append(first.time["build_s"] + first.time["solve_s"])
         self.times["cold"].append(self.cold.time["solve_s"])

@@ -21,7 +21,7 @@ from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RA
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
-from loomopt.solving.search.settle import unchanging, wished
+from loomopt.solving.search.tie_break import unchanging, wished
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by

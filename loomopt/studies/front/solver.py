@@ -12,7 +12,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import report
+from loomopt.solving.answer import evaluation
 from loomopt.solving.certificate.active_set import Row as Touched
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.nlp import exchange
@@ -157,7 +157,7 @@ class Solver:
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        here = evaluation.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"

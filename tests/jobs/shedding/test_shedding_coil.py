@@ -14,7 +14,7 @@ from support.shedding_cases import plain, product
 
 import loomopt as lo
 from loomopt.physics.mechanisms.tension_spring import WIRES
-from loomopt.solving.engine import evaluate
+from loomopt.solving.answer.evaluation import evaluate
 
 STEEL = Steel()
 SOLD = [wire for wire in WIRES if 0.002 <= wire <= 0.0095]
