@@ -14,8 +14,7 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.model import Instant, JobModel, Row
-from loomopt.model.numbers import LEAST_CHANGE
-from loomopt.model.program import Objective, Program, Variable
+from loomopt.model.program import LEAST_CHANGE, Objective, Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
