@@ -79,7 +79,7 @@ def test_the_project_says_what_the_package_is():
     assert project["requires-python"] == ">=3.11"
     assert {"test", "notebook", "dask"} <= set(project["optional-dependencies"])
     included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
-    assert included == {"problems": "loomopt/problems", "results": "loomopt/interface/results"}
+    assert included == {"problems": "loomopt/problems", "results": "loomopt/results"}
     assert (ROOT / "LICENSE").is_file()
 
 
