@@ -8,7 +8,6 @@ import typer
 
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
-from loomopt.scenes import packaged
 
 if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
@@ -48,8 +47,8 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt.interface.text import layout, scenes
-    from loomopt.jobs import registry
+    from loomopt.interface.text import layout
+    from loomopt.scenes import packaged
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
@@ -59,7 +58,16 @@ def list_problems() -> None:
         others, wrong = registry.brought()
         read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
         heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
-    layout.show(scenes.grid(sorted(heads)))
+    lines = [
+        row
+        for head in sorted(heads)
+        for row in (
+            (head.name, head.title),
+            ("", f"job {head.job}; targets {', '.join(head.targets)}"),
+            ("", f"source: {head.source or 'not given'}"),
+        )
+    ]
+    layout.show(layout.Grid("", ("problem", "what it is"), tuple(lines)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
