@@ -1,7 +1,7 @@
 """How a job shows itself: what its own views return, and views/ renders."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
@@ -10,6 +10,17 @@ if TYPE_CHECKING:
     from loomopt.scenes.scene import Scene
 
 Numbers = Mapping[str, float]
+
+
+class Span(NamedTuple):
+    """A stretch of the cycle, rad, that may run over angle 0: where it begins and where it ends."""
+
+    begin: float
+    end: float
+
+
+Marks = Mapping[str, float | Span]
+"""Name → a crank angle, rad, or a stretch of the cycle."""
 
 
 class JobViews:
@@ -33,8 +44,8 @@ class JobViews:
         """Return the equations the scene really uses."""
         raise NotImplementedError
 
-    def marks(self, scene: "Scene", design: Numbers) -> dict[str, float]:
-        """Return the crank angles a reader looks for, rad; a stretch "begins" and "ends"."""
+    def marks(self, scene: "Scene", design: Numbers) -> Marks:
+        """Return the crank angles and stretches of the cycle a reader looks for."""
         raise NotImplementedError
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
