@@ -2,7 +2,7 @@
 
     python docs/write.py            (or: make docs)
 
-The suite compares all of it with what stands there (tests/test_documents.py).
+The suite compares all of it with what stands there (tests/end_to_end/test_documents.py).
 """
 
 import contextlib

@@ -4,11 +4,10 @@ import dataclasses
 import itertools
 import math
 
-import clear
-import inch
 import numpy as np
 import pytest
 from reference import crank_rocker_synthesis
+from support import clear, inch
 
 import loomopt as lo
 from loomopt.base.errors import BadInput

@@ -1,9 +1,9 @@
 import itertools
 import math
 
-import clear
 import numpy as np
 import pytest
+from support import clear
 
 from loomopt.picture import placing, shapes
 from loomopt.picture.drawing import LEADER, Label, along, around, dimension, ground, mass, place, spring

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-import toy
+from support import toy
 
 from loomopt.solving.certificate.certificate import certify
 

@@ -13,7 +13,6 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load
 from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
-from loomopt.picture.parted import marks
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -73,6 +72,8 @@ class SheddingViews(JobViews):
             found["least cam force"] = math.nan if angle is None else angle
         if parted is None:
             return found
+
+        from loomopt.picture.parted import marks
 
         return marks(parted, found)
 

@@ -25,7 +25,7 @@ from loomopt.solving.nlp.transcribe import Transcription
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
 """Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
-creep (tests/solving/test_infeasible.py)."""
+creep (tests/solving/search/test_infeasible.py)."""
 
 
 STANDS = 1e-7

@@ -35,7 +35,7 @@ that still leads there; share by which float64 may order two extremes wrongly.""
 
 MET_ROUNDS, MET = 6, 1e-28
 """Steps onto what binds with slopes in float64, each worth at least 8 digits, and where they have arrived: references
-must be 100 times tighter than errors of 1e-25 (tests/studies/test_accuracy_references.py)."""
+must be 100 times tighter than errors of 1e-25 (tests/studies/accuracy/test_accuracy_references.py)."""
 
 
 OPEN_RANK, OPEN_TURNS, OPEN_FLAT = 1e-9, 3, 1e-7
