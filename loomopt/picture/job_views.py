@@ -2,7 +2,7 @@
 
 import abc
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
@@ -11,6 +11,17 @@ if TYPE_CHECKING:
     from loomopt.scenes.scene import Scene
 
 Numbers = Mapping[str, float]
+
+
+class Span(NamedTuple):
+    """A stretch of the cycle, rad, that may run over angle 0: where it begins and where it ends."""
+
+    begin: float
+    end: float
+
+
+Marks = Mapping[str, float | Span]
+"""Name → a crank angle, rad, or a stretch of the cycle."""
 
 
 class JobViews(abc.ABC):
@@ -35,8 +46,8 @@ class JobViews(abc.ABC):
         """Return the equations the scene really uses."""
 
     @abc.abstractmethod
-    def marks(self, scene: "Scene", design: Numbers) -> dict[str, float]:
-        """Return the crank angles a reader looks for, rad; a stretch "begins" and "ends"."""
+    def marks(self, scene: "Scene", design: Numbers) -> Marks:
+        """Return the crank angles and stretches of the cycle a reader looks for."""
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""

@@ -21,7 +21,7 @@ from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import elastic, steady_state
 from loomopt.solving.search.search import Search
-from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
+from loomopt.studies.front.solver import Asking, Reached, Solver, capped
 from loomopt.studies.run import warm
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _tightest(one: Finding, *others: Finding) -> Finding:
 
 def _named(terms: Terms) -> tuple[Limit, ...]:
     """Return all limits, those on axes under the axis' own name where their row is the figure itself."""
-    plain = {axis.axis.name + CAPPED: axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
+    plain = {capped(axis): axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
     return tuple(replace(limit, name=plain.get(limit.name, limit.name)) for limit in terms.program.limits)
 
 
@@ -185,7 +185,7 @@ def _exact(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, floa
 
 def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
     """Yield what binds, a limit on an axis as a limit of its figure."""
-    caps = {axis.axis.name + CAPPED: (axis, cap) for axis, cap in terms.caps}
+    caps = {capped(axis): (axis, cap) for axis, cap in terms.caps}
     for each in certificate.binding:
         if each.limit.name not in caps:
             yield each
