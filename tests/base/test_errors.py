@@ -5,9 +5,11 @@ import itertools
 import pytest
 
 import loomopt as lo
-from loomopt.base.errors import LONGEST_MESSAGE, BadInput, clean
+from loomopt.base.errors import BadInput, clean
 from loomopt.interface.cli.app import run
 
+LONGEST_MESSAGE = 2000
+"""Characters of a message that is read."""
 PARTS = ("problem", "file", "key", "value", "allowed", "remedy")
 LONG = ["x" * 5000, "\x1b[2J" * 2000, "\u2028" * 3000, "织" * 4000]
 

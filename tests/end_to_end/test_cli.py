@@ -19,7 +19,7 @@ from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
-from loomopt.scenes.packaged import problem_names
+from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.search import search
 
@@ -164,7 +164,7 @@ def test_nothing_is_wrapped_in_a_pipe(capsys, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
     assert run(["list"]) == 0
     listed = capsys.readouterr().out
-    assert all(load(name).source in listed for name in problem_names())
+    assert all(load(name).source in listed for name in problems())
 
 
 @pytest.mark.parametrize("target", ["balance", "pulse", "torque", "retrofit"])

@@ -157,7 +157,7 @@ def test_the_installed_command_works_from_any_folder(installed, tmp_path):
 
 
 def test_packaged_scenes_are_found_by_name_and_paths_stay_paths(tmp_path, monkeypatch):
-    assert packaged.problem_names() == sorted(path.stem for path in (ROOT / "problems").glob("*.toml"))
+    assert list(packaged.problems()) == sorted(path.stem for path in (ROOT / "problems").glob("*.toml"))
     assert {name: path.name for name, path in packaged.problems().items()}["beatup"] == "beatup.toml"
     monkeypatch.chdir(tmp_path)
     (tmp_path / "beatup").mkdir()

@@ -175,7 +175,7 @@ def seen(scene):
 
 
 @pytest.mark.parametrize("written", ["own", "inches", "mixed"])
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_no_table_has_two_units_of_one_kind(name, written):
     """Effects that have values are on; two units of one dimension are two units of one kind: energy is no torque."""
     scene = in_inches(name) if written == "inches" else lo.load(name)

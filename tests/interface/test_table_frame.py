@@ -9,7 +9,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface import tables
-from loomopt.interface.tables import TableFrame
+from loomopt.interface.table_frame import TableFrame
 
 EXPONENT = re.compile(r"\d[eE][-+]\d")
 

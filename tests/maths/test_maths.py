@@ -32,7 +32,7 @@ def position_figures(m, lengths, phi):
 
 def linkage_figures(m, lengths, phi):
     centres = crank_rocker.dead_centres(m, lengths)
-    names = ("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear", "psi_2_front", "psi_2_rear")
+    names = ("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear", "psi_2_front")
     found = {name: getattr(centres, name) for name in names}
     found["near"] = crank_rocker.transmission_angle_near(m, lengths)
     found["far"] = crank_rocker.transmission_angle_far(m, lengths)

@@ -1,7 +1,5 @@
 """Chains of derived values: told where they hang on variables, with the corners where rows are likely to bind."""
 
-from dataclasses import replace
-
 import pytest
 
 from loomopt.jobs import registry
@@ -44,11 +42,6 @@ def test_stations_are_the_knots_of_rise_and_return_by_their_places_among_all_cor
     assert [angles[station.corner] for station in found] == pytest.approx(there, rel=1e-14)
     assert found[0] == Station(4, {shedding.SEGMENT: 0.0, shedding.LAW: 1.0}), "after four segments"
     assert station_switches(program.model, names(program)) == [station.switch for station in found]
-
-
-def test_several_cases_have_no_chain_in_common():
-    program = task()
-    assert recurrent(replace(program.model, cases=(("weight.G",),)), names(program)) == ()
 
 
 @pytest.mark.parametrize("symmetric", [False, True])

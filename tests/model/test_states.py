@@ -14,7 +14,7 @@ import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
 from loomopt.maths import systems
-from loomopt.model.model import JobModel, Quantity, Row, cased
+from loomopt.model.model import JobModel, Quantity, Row
 from loomopt.model.program import Limit, Objective, Program, Variable
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Sampler
@@ -131,21 +131,6 @@ def test_a_state_that_carries_nothing_that_is_on_has_no_force_of_its_own():
     alone = replace(ELASTIC, effects=(CLOTH, ARM))
     sampler = Sampler(alone, {name: v for name, v in WITH_ARM.items() if not name.startswith(("inertia", "spring"))})
     assert float(sampler.at("force", np.array([1]), np.array([0.5]))[0]) == pytest.approx(0.0, abs=1e-15)
-
-
-def test_every_case_has_a_state_of_its_own():
-    other = {"spring.k": 5000.0, "arm.ratio": 0.3}
-    both = replace(ELASTIC, cases=(tuple(other),))
-    sampler = Sampler(both, {**WITH_ARM, **{cased(name, 1): value for name, value in other.items()}})
-    phi = np.array([0.4, 2.5, 4.0])
-    pieces, u = sampler.cycle.located(phi)
-    values = sampler.at(cased("force", 1), pieces, u)
-    pressed = sampler.cycle.switch(pieces)["cloth [case 1]"]
-    expected = [by_hand(a, on, 0.3, spring__k=5000.0)[0] for a, on in zip(phi, pressed, strict=True)]
-    assert values == pytest.approx(expected, rel=1e-12)
-    assert sampler.at("force", pieces, u) == pytest.approx(
-        [by_hand(a, on)[0] for a, on in zip(phi, pressed, strict=True)], rel=1e-12
-    )
 
 
 def task():

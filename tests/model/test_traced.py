@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from support.bits import bits
-from test_cases import ALL, FABRICS
 from test_states import ELASTIC, WITH_ARM
 
 import loomopt as lo
@@ -23,7 +22,7 @@ from loomopt.model.reading import DATUM, Quantities
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.scenes.packaged import problem_names
+from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate.taylor_bounds import Boxes
 
 EFFECTS = {
@@ -38,7 +37,7 @@ LAWS = ("harmonic", "modified_sine", "modified_trapezoid", "polynomial_345", "fr
 def samplers():
     """Return today's machine of every packaged scene, of all effects together, of the cam laws, and made-up ones."""
     found = {}
-    for name in problem_names():
+    for name in problems():
         scene = lo.load(name)
         found[name] = registry.of(scene).sampler(scene, {})
     for name, effects in EFFECTS.items():
@@ -47,17 +46,16 @@ def samplers():
     for law in LAWS:
         scene = lo.load("shedding").update({"mechanism.law": law, "effects.warp_tension.shape": "step"})
         found[law] = registry.of(scene).sampler(scene, {})
-    found["several fabrics"] = Sampler(FABRICS, ALL)
     found["a state"] = Sampler(ELASTIC, WITH_ARM)
     return found
 
 
-NAMES = [*problem_names(), *(f"{name} with all effects" for name in EFFECTS), *LAWS, "several fabrics", "a state"]
+NAMES = [*problems(), *(f"{name} with all effects" for name in EFFECTS), *LAWS, "a state"]
 
 
 def quantities(model):
-    """Return the names of all whole-cycle quantities of a model, those of further cases too."""
-    return [*model._quantities, *(name for name, (plain, _) in model._cased.items() if plain in model._quantities)]
+    """Return the names of all whole-cycle quantities of a model."""
+    return list(model._quantities)
 
 
 def nodes(sampler, count, seed):

@@ -16,7 +16,7 @@ from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
 from loomopt.scenes import packaged
 
-NAMES = packaged.problem_names()
+NAMES = packaged.problems()
 MACHINES = 12
 """Random machines of each job."""
 

@@ -74,7 +74,7 @@ def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
     assert set(shown(monkeypatch, {})[1]) == set(range(0, 361, 15))
 
 
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_every_packaged_scene_is_drawn_and_its_equations_printed(name):
     scene = lo.load(name)
     job, view = registry.of(scene), registry.of(scene).views

@@ -65,7 +65,7 @@ def test_the_packaged_scene_reads_in_SI():
     assert least.min == pytest.approx(math.radians(56.5), rel=1e-15)
 
 
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_packaged_scenes_are_complete(name):
     found = load(name)
     assert found.name == name
@@ -78,7 +78,7 @@ def test_packaged_scenes_are_complete(name):
             assert effect in found.with_effect(*found.schema.effects[effect].beside, effect).effects
 
 
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_every_packaged_number_says_where_it_comes_from(name):
     for line in packaged.problems()[name].read_text(encoding="utf-8").splitlines():
         if re.search(r'= .*"[-0-9.]+ ', line) and not line.startswith("expected"):
@@ -235,9 +235,9 @@ def test_a_file_with_a_byte_order_mark_and_windows_lines_reads(tmp_path):
 
 
 def test_packaged_folders():
-    assert {"beatup", "beatup-light", "beatup-heavy"} <= set(packaged.problem_names())
+    assert {"beatup", "beatup-light", "beatup-heavy"} <= set(packaged.problems())
     assert packaged.results_path().name == "results"
-    assert set(registry.own_names()) == {load(name).job for name in packaged.problem_names()}
+    assert set(registry.own_names()) == {load(name).job for name in packaged.problems()}
 
 
 def calls(action):

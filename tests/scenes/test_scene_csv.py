@@ -108,7 +108,7 @@ def test_what_is_plain_is_read(tmp_path, name):
 
 
 def test_the_packaged_table_is_read_to_the_last_digit():
-    lines = (packaged.problems_path() / "rapier-wish.csv").read_text(encoding="utf-8").splitlines()[2:]
+    lines = (packaged.problems()["rapier"].with_name("rapier-wish.csv")).read_text(encoding="utf-8").splitlines()[2:]
     angles, travels = match_table(lo.load("rapier"))
     pairs = [line.split(",") for line in lines]
     assert travels == tuple(float(travel) * 1e-3 for _, travel in pairs)

@@ -21,7 +21,7 @@ LAW = "angle [deg],s [mm]\n" + "".join(f"{10 * k},{k * k * (24 - k) / 8}\n" for 
 
 
 def wish():
-    return packaged.problems_path() / "rapier-wish.csv"
+    return packaged.problems()["rapier"].with_name("rapier-wish.csv")
 
 
 @pytest.fixture

@@ -26,6 +26,11 @@ def segments(primitive):
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
+def overlap(one, other):
+    """Say whether the insides of two boxes have a point in common."""
+    return one.left < other.right and other.left < one.right and one.bottom < other.top and other.bottom < one.top
+
+
 def meets(box, strokes):
     """Say which segments, (n, 2, 2), have a point inside a box: what is left of each between the box's sides."""
     start, way = strokes[:, 0], strokes[:, 1] - strokes[:, 0]
@@ -57,7 +62,7 @@ def faults(drawing: Drawing, on: Box | None = None) -> list[str]:
     boxes = [text_box(text, drawing.height) for text in texts]
     found = []
     for (one, box), (other, second) in itertools.combinations(zip(texts, boxes, strict=True), 2):
-        found += [f"{one.text!r} overlaps {other.text!r}"] if box.meets(second) else []
+        found += [f"{one.text!r} overlaps {other.text!r}"] if overlap(box, second) else []
     for text, box in zip(texts, boxes, strict=True):
         crossing = {strokes[k].layer for k in owner[meets(box, lines)]}
         found += [f"{text.text!r} lies on a stroke of {layer}" for layer in sorted(crossing)]

@@ -52,14 +52,12 @@ class Quantities:
         """Kept: what identifies a symbol is another's once it is gone."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
         found = model.given(replace(systems.casadi(), choose=chosen), symbols)
-        pairs = zip((found, *found.cases), (given, *given.cases), strict=True)
-        first, *others = [Given(self._shared(one.values, worth.values), one.own) for one, worth in pairs]
-        self.given, self._in_symbols = given, first._replace(cases=tuple(others))
+        self.given, self._in_symbols = given, Given(self._shared(found.values, given.values), found.own)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 
     def _shared(self, values: Values, worth: Values) -> dict[str, Number]:
-        """Return a case's numbers with a symbol for each that follows from others."""
+        """Return numbers with a symbol for each that follows from others."""
         import casadi as ca
 
         found = dict(values)

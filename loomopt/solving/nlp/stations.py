@@ -98,9 +98,9 @@ def station_switches(model: JobModel, variables: Collection[str]) -> list[Values
 
 
 def _chains(model: JobModel, variables: Collection[str]) -> dict[str, Chain]:
-    """Return the chains that hang on variables by their arcs' names; several cases have none in common."""
-    arcs = () if model.cases else model.kinematics.arcs
-    return {arc.name: arc.chain for arc in arcs if arc.chain and arc.chain.roots.intersection(variables)}
+    """Return the chains that hang on variables by their arcs' names."""
+    chains = {arc.name: arc.chain for arc in model.kinematics.arcs if arc.chain}
+    return {name: chain for name, chain in chains.items() if chain.roots.intersection(variables)}
 
 
 def held(switches: Sequence[Values], family: Family) -> list[int]:

@@ -111,10 +111,6 @@ class NodeParameters(NamedTuple):
         phi = node_angle(row[1], row[2 : 2 + self.corners], corners)
         return Node(phi, dict(zip(self.switches, row[2 + 2 * self.corners :], strict=True)))
 
-    def read_width(self, row: Sequence[Number], corners: Sequence[Number]) -> Number:
-        """Return the width, rad, of a node's share of a mean."""
-        return node_angle(row[0], row[2 + self.corners : 2 + 2 * self.corners], corners)
-
 
 @dataclass(frozen=True, eq=False)
 class Structure:

@@ -25,7 +25,7 @@ EFFECTS = {
     "rapier": ("head_inertia", "tape_friction"),
     "shedding": ("damping", "dry_friction"),
 }
-CASES = [(name, kind) for name in packaged.problem_names() for kind in ("today", "solved")]
+CASES = [(name, kind) for name in packaged.problems() for kind in ("today", "solved")]
 CASES += [(name, kind) for name in JOBS for kind in ("inch", "inch solved", "effects")]
 
 
@@ -96,7 +96,7 @@ def test_today_stands_dashed_in_every_panel_beside_a_design(name, kind):
 
 
 @pytest.mark.parametrize("kind", ["today", "solved"])
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_titles_are_alike_and_names_plain(name, kind):
     figure = drawn(name, kind)
     subject = f"design for {lo.load(name).schema.default_target}" if kind == "solved" else "today's machine"

@@ -9,7 +9,7 @@ from loomopt.scenes import packaged
 RESULTS = [path.stem.rpartition(".") for path in packaged.results_path().glob("*.csv")]
 
 
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_a_head_is_what_the_whole_scene_says_and_its_targets_have_results(name):
     head, scene = packaged.head(packaged.problems()[name]), lo.load(name)
     assert (head.name, head.title, head.job, head.source) == (scene.name, scene.title, scene.job, scene.source)

@@ -111,7 +111,9 @@ def rates_by_differentiation():
     base = Vector(x0 + x1 * t + x2 * t**2 / 2, y0 + y1 * t + y2 * t**2 / 2)
     found = dyad.close(systems.casadi(), base, r1, r2, side)
     rates = dyad.rates(found, Vector(x1 + x2 * t, y1 + y2 * t))
-    closed = [*rates, *dyad.second_rates(found, Vector(x2, y2), *rates, r1, r2)]
+    second_1 = dyad.second_rate_1(found, Vector(x2, y2), *rates, r2)
+    second_2 = dyad.second_rate_2(found, Vector(x2, y2), *rates, r1)
+    closed = [*rates, second_1, second_2]
     angles = [ca.atan2(link.y, link.x) for link in (found.link1, found.link2)]
     first = [ca.jacobian(angle, t) for angle in angles]
     automatic = [*first, *(ca.jacobian(rate, t) for rate in first)]

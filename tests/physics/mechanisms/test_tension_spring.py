@@ -33,7 +33,7 @@ EXAMPLE = Coil(
     hook_factor=0.106 / (0.213 / 2),
 )
 """[Shigley, example 10-6]: hard-drawn wire; hook radii 0.106 and 0.089 in; loaded with 5.25 lbf."""
-LOAD, SIDE_BEND = 5.25 * LBF, 0.089 * INCH
+LOAD = 5.25 * LBF
 
 
 @st.composite
@@ -49,7 +49,7 @@ forces = st.floats(1, 5000)
 scales = st.floats(0.1, 10)
 
 
-def figures(system, coil, force, side_bend):
+def figures(system, coil, force):
     """Return every figure of the coil, with a strength of its wire."""
     return [
         coil.index,
@@ -67,7 +67,6 @@ def figures(system, coil, force, side_bend):
         coil.initial_stress_least(system),
         coil.initial_stress_most(system),
         coil.hook_bending(system, force),
-        coil.hook_shear(system, force, side_bend),
         strength(system, coil.wire, 2211 * 10**6, coil.elasticity * 0 + system.number(0.145)),
     ]
 
@@ -89,7 +88,6 @@ def test_shigleys_shear_stresses_with_the_factors_it_rounds_or_takes_instead():
     torsion, kpsi = EXAMPLE.torsion(FLOAT, LOAD), 1e3 * PSI
     assert f"{1.234 * torsion / kpsi:.1f} {1.18 * torsion / kpsi:.1f}" == "82.0 78.4"
     assert EXAMPLE.shear_stress(FLOAT, LOAD) / torsion == pytest.approx(1.2485, abs=5e-5)
-    assert f"{EXAMPLE.hook_shear(FLOAT, LOAD, SIDE_BEND) / torsion:.2f}" == "1.18"
 
 
 @pytest.mark.parametrize(
@@ -193,10 +191,9 @@ def test_surge_is_the_first_mode_of_a_chain_held_at_both_ends():
 def test_a_spring_scaled_as_a_whole(coil, force, scale):
     """Lengths by s: rate by s, mass by s³, surge by 1/s, stresses by 1/s²; what depends on the index alone stays."""
     larger = dataclasses.replace(coil, wire=scale * coil.wire, diameter=scale * coil.diameter)
-    bend = coil.diameter / 3
-    before = figures(FLOAT, coil, force, bend)
-    after = figures(FLOAT, larger, force, scale * bend)
-    powers = [0, 1, 0, 0, 1, 1, 0, 3, -1, -2, -2, -2, 0, 0, -2, -2, -0.145]
+    before = figures(FLOAT, coil, force)
+    after = figures(FLOAT, larger, force)
+    powers = [0, 1, 0, 0, 1, 1, 0, 3, -1, -2, -2, -2, 0, 0, -2, -0.145]
     assert after == pytest.approx([scale**p * old for p, old in zip(powers, before, strict=True)], rel=1e-12)
 
 
@@ -235,19 +232,19 @@ def test_a_tighter_coil_is_stressed_more_and_takes_more_initial_stress(coil):
 @given(coils(), forces)
 @settings(REPEATABLE, max_examples=20)
 def test_every_number_system_gives_the_same_figures(coil, force):
-    data = [*dataclasses.astuple(coil), force, coil.diameter / 3]
-    reference = figures(FLOAT, coil, force, coil.diameter / 3)
+    data = [*dataclasses.astuple(coil), force]
+    reference = figures(FLOAT, coil, force)
     for system, convert in (
         (systems.numpy(), lambda x: np.array([x, x])),
         (systems.mpmath(), systems.mpmath().number),
         (systems.sympy(), sp.Rational),
     ):
-        *own, own_force, bend = map(convert, data)
-        found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, Coil(*own), own_force, bend))]
+        *own, own_force = map(convert, data)
+        found = [float(np.ravel(value)[-1]) for value in map(_evaluated, figures(system, Coil(*own), own_force))]
         assert found == pytest.approx(reference, rel=1e-12)
     symbols = ca.SX.sym("x", len(data))
-    *own, own_force, bend = ca.vertsplit(symbols)
-    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), Coil(*own), own_force, bend))])
+    *own, own_force = ca.vertsplit(symbols)
+    function = ca.Function("figures", [symbols], [ca.vertcat(*figures(systems.casadi(), Coil(*own), own_force))])
     assert function(data).full().ravel() == pytest.approx(np.array(reference), rel=1e-12)
 
 

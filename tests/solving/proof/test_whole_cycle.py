@@ -10,11 +10,11 @@ from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
-from loomopt.scenes.packaged import problem_names
+from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.studies.check import served
 
-PAIRS = [(name, target) for name in problem_names() for target in served(lo.load(name))]
+PAIRS = [(name, target) for name in problems() for target in served(lo.load(name))]
 CLOSED = {
     "beatup": {"B to D < l2 + l3", "B to D > |l2 - l3|"},
     "rapier": {

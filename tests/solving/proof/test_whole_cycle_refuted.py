@@ -14,10 +14,10 @@ from support.shedding_cases import product
 
 import loomopt as lo
 from loomopt.model.sampling import Sampler
-from loomopt.scenes.packaged import problem_names
+from loomopt.scenes.packaged import problems
 
 
-@pytest.mark.parametrize("name", [name for name in problem_names() if name != "beatup-light"])
+@pytest.mark.parametrize("name", [name for name in problems() if name != "beatup-light"])
 def test_todays_machines_are_refuted_for_what_evaluate_says_fails(name):
     scene = lo.load(name)
     proofs = lo.prove(scene)

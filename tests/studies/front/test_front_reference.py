@@ -70,7 +70,7 @@ def test_ends_of_the_fronts_are_the_published_ones(name):
 
 
 def test_a_front_stands_for_the_scene_that_is_named_after_its_job():
-    stands = {name for name in packaged.problem_names() if check.reference_trade(load(name))}
+    stands = {name for name in packaged.problems() if check.reference_trade(load(name))}
     assert stands == {"beatup", "rapier", "shedding"}
 
 
