@@ -20,7 +20,8 @@ from loomopt.physics.schema import Values
 
 GAUSS_NODES = 32
 """Nodes of a mean on each piece: of an analytic formula the error falls by a constant factor a node. Packaged means are
-right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/tolerances.py); the rest is for narrower peaks."""
+right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/measure/tolerances.py); the rest is for narrower
+peaks."""
 
 
 WORTH_IT = 64

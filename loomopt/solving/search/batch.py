@@ -21,7 +21,7 @@ from loomopt.physics.cycle import Floats, Node, Pieces
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
 """A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
-steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
+steps, and starts kept of these and of those as drawn (benchmarks/adversarial/attack.py)."""
 
 
 class BatchReading(Reading):

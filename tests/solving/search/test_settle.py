@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from reference.beatup import DESIGN, LENGTHS, Machine
 from support import toy
 
 import loomopt as lo
 from loomopt.model.program import Move, Wish
 from loomopt.solving.search.tie_break import _directions, _ends, goal_of, moved, unchanging, wished
+from reference.beatup import DESIGN, LENGTHS, Machine
 
 
 def slide(goal, low=-100.0, high=100.0):

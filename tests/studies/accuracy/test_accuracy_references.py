@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
     [
         ("beatup", "balance", 88.6894134918),  # four solvers and 40-digit arithmetic
         ("beatup-light", "balance", 82.3371385326),
-        ("rapier", "stroke-dwell", 0.694984753569),  # benchmarks/plain_rapier.py: SLSQP exchange, Newton
+        ("rapier", "stroke-dwell", 0.694984753569),  # tests/reference/rapier_layouts.py: SLSQP exchange, Newton
         ("shedding", "stiffness", 102602.609425357),  # tests/reference/shedding.py: 30 digits
         ("shedding", "law", 59955.4638624003),  # tests/reference/shedding.py: HiGHS
         ("shedding", "force", 15679.7298884577),

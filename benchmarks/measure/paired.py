@@ -5,7 +5,8 @@ the processor's time, so that other work on the machine counts little. "Built" i
 "cold" one from the job's own starts; "warm" one from a neighbour's answer; "certificate" is part of the cold one.
 
     git worktree add ../before TAG
-    python benchmarks/paired.py ../before [--repeats N] [--only CASE] [--work evaluate,warm] [--most 1.05] [--json]
+    python benchmarks/measure/paired.py ../before [--repeats N] [--only CASE] [--work evaluate,warm] [--most 1.05]
+        [--json]
 
 Quartiles are of the ratios of each round. With `--most` the exit code says whether a piece of work took longer than
 that by all that is told: medians, least times, and three quarters of the rounds.
@@ -20,10 +21,11 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import checkouts
-import harness
 import numpy as np
-from same_answers import FRAME, REED, TAPE
+
+from benchmarks import harness
+from benchmarks.measure import checkouts
+from benchmarks.measure.same_answers import FRAME, REED, TAPE
 
 CASES = {
     "beatup": ("beatup", "balance", "operation.M0", "755 N*m"),

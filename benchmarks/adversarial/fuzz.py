@@ -1,6 +1,6 @@
 """Input spoilt at random: whatever is given is read or refused, by one plain line; nothing else is raised.
 
-    python benchmarks/fuzz.py [--count N] [--seed S] [--kind scenes|designs|tables|calls]
+    python benchmarks/adversarial/fuzz.py [--count N] [--seed S] [--kind scenes|designs|tables|calls]
 
 Without --count 10 000 scenes, 500 designs, 500 tables and 500 calls of the command, some twenty minutes; with it so
 many of each. Prints how many of each were read and refused, and each one that was neither, by its number: the same

@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from reference import shedding as plain_shedding
 
 import loomopt as lo
-from benchmarks import plain_beatup, plain_rapier
 from loomopt.studies.run.rows import Row
+from reference import balance
+from reference import rapier_layouts as layouts
+from reference import shedding as plain_shedding
 
 GRID = 360
 M0 = 745.0
@@ -44,26 +45,26 @@ class Rival(NamedTuple):
 
 
 def beatup() -> Rival:
-    """Return peak torque against |M3| at front dead centre, by plain_beatup."""
-    size, phi = plain_beatup.UPPER, np.linspace(-0.5, 2 * np.pi - 0.5, GRID, endpoint=False)
+    """Return peak torque against |M3| at front dead centre, by balance."""
+    size, phi = balance.UPPER, np.linspace(-0.5, 2 * np.pi - 0.5, GRID, endpoint=False)
 
     def evaluate(x):
         *lengths, s = (x * size).T[:, :, None]
-        peak = np.abs(plain_beatup.crank_torque(*(*lengths, s, M0, phi))).max(axis=1)
-        front_torque = np.abs(plain_beatup.front_torque(*(*lengths, s, M0))[:, 0])
-        return np.column_stack([peak, front_torque]), -plain_beatup.limits(*lengths)[:, :, 0].T
+        peak = np.abs(balance.crank_torque(*(*lengths, s, M0, phi))).max(axis=1)
+        front_torque = np.abs(balance.front_torque(*(*lengths, s, M0))[:, 0])
+        return np.column_stack([peak, front_torque]), -balance.limits(*lengths)[:, :, 0].T
 
     def judge(x):
         design = x * size
-        if plain_beatup.violation(design) > BROKEN:
+        if balance.violation(design) > BROKEN:
             return None
-        return float(plain_beatup.peaks(design, M0)[0][1]), abs(float(plain_beatup.front_torque(*(*design, M0))))
+        return float(balance.peaks(design, M0)[0][1]), abs(float(balance.front_torque(*(*design, M0))))
 
     def own(row: Row) -> np.ndarray:
         known = {**lo.load("beatup").mechanism, **row.design}
         return np.array([*(known[name] for name in ("l1", "l2", "l3", "l4")), known["m4e"] * known["r4e"] ** 2]) / size
 
-    low, high = plain_beatup.LOWER / size, plain_beatup.UPPER / size
+    low, high = balance.LOWER / size, balance.UPPER / size
     return Rival("beatup", ("peak_torque", "M3_fdc"), low, high, evaluate, judge, own)
 
 
@@ -91,42 +92,42 @@ def shedding() -> Rival:
 
 
 def rapier() -> Rival:
-    """Return peak |S''| against the lesser dwell, by plain_rapier; l4 follows from the stroke, which is an equality."""
-    low, width = plain_rapier.LOWER[1:], plain_rapier.WIDTH[1:]
+    """Return peak |S''| against the lesser dwell, by layouts; l4 follows from the stroke, which is an equality."""
+    low, width = layouts.LOWER[1:], layouts.WIDTH[1:]
     phi, side = np.linspace(0, 2 * np.pi, GRID, endpoint=False), np.linspace(0, FARTHEST, GRID // 2)
-    few, sleys = phi[:: GRID // FEW], [plain_rapier.sley(angles) for angles in (phi, phi[:: GRID // FEW], side, -side)]
+    few, sleys = phi[:: GRID // FEW], [layouts.sley(angles) for angles in (phi, phi[:: GRID // FEW], side, -side)]
 
     def full(x, l4):
         return np.stack([l4, *(low + width * x).T])[:, :, None]
 
     def strokes(x, l4):
-        return _top(plain_rapier.curves(full(x, l4), few, sleys[1])[0])
+        return _top(layouts.curves(full(x, l4), few, sleys[1])[0])
 
     def evaluate(x):
         l4 = _secant(functools.partial(strokes, x), len(x))
-        S, _, S_2, cosine, square = plain_rapier.curves(full(x, l4), phi, sleys[0])
+        S, _, S_2, cosine, square = layouts.curves(full(x, l4), phi, sleys[0])
         reach, (l5, l6) = np.sqrt(square), (low + width * x).T[:2]
-        beside = [plain_rapier.curves(full(x, l4), *on)[0] for on in ((side, sleys[2]), (-side, sleys[3]))]
+        beside = [layouts.curves(full(x, l4), *on)[0] for on in ((side, sleys[2]), (-side, sleys[3]))]
         arcs = [_arc(np.abs(travel), side) for travel in beside]
         rows = [
-            np.abs(_top(S) / plain_rapier.NEEDS.stroke - 1) - ON_GRID,
-            _top(np.abs(cosine)) - np.cos(plain_rapier.NEEDS.transmission) + BETWEEN,
-            plain_rapier.MARGIN - (l5 + l6) / reach.max(axis=1),
-            plain_rapier.MARGIN - reach.min(axis=1) / np.abs(l5 - l6),
+            np.abs(_top(S) / layouts.NEEDS.stroke - 1) - ON_GRID,
+            _top(np.abs(cosine)) - np.cos(layouts.NEEDS.transmission) + BETWEEN,
+            layouts.MARGIN - (l5 + l6) / reach.max(axis=1),
+            layouts.MARGIN - reach.min(axis=1) / np.abs(l5 - l6),
         ]
         return np.column_stack([_top(np.abs(S_2)), -np.minimum(*arcs)]), np.column_stack(rows)
 
     def judge(x):
         with np.errstate(all="ignore"):
-            l4 = _secant(lambda l4: np.array([plain_rapier.stroke(full(x[None], l4)[:, 0, 0])[0]]), 1)
+            l4 = _secant(lambda l4: np.array([layouts.stroke(full(x[None], l4)[:, 0, 0])[0]]), 1)
             design = full(x[None], l4)[:, 0, 0]
-            dwell = min(plain_rapier.dwell(design, each) for each in (1, -1))
-            needs = replace(plain_rapier.NEEDS, after=dwell * (1 - BROKEN), before=dwell * (1 - BROKEN))
-            kept = plain_rapier.violation(design, needs) <= BROKEN
-        return (float(plain_rapier.peak(design)), -float(dwell)) if kept else None
+            dwell = min(layouts.dwell(design, each) for each in (1, -1))
+            needs = replace(layouts.NEEDS, after=dwell * (1 - BROKEN), before=dwell * (1 - BROKEN))
+            kept = layouts.violation(design, needs) <= BROKEN
+        return (float(layouts.peak(design)), -float(dwell)) if kept else None
 
     def own(row: Row) -> np.ndarray:
-        return (np.array([row.design[name] for name in plain_rapier.NAMES[1:]]) - low) / width
+        return (np.array([row.design[name] for name in layouts.NAMES[1:]]) - low) / width
 
     axes, sides = ("peak_acceleration", "dwell"), (np.zeros(7), np.ones(7))
     return Rival("rapier", axes, *sides, evaluate, judge, own, "stroke-dwell", -1.0)
@@ -134,11 +135,11 @@ def rapier() -> Rival:
 
 def _secant(strokes: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
     """Return of each design the l4 with which it has the stroke, by secants within the bounds of l4."""
-    ends = plain_rapier.LOWER[0], plain_rapier.UPPER[0]
-    before, l4 = np.full(count, plain_rapier.TODAY[0]), np.full(count, 1.1 * plain_rapier.TODAY[0])
-    missed = strokes(before) - plain_rapier.NEEDS.stroke
+    ends = layouts.LOWER[0], layouts.UPPER[0]
+    before, l4 = np.full(count, layouts.TODAY[0]), np.full(count, 1.1 * layouts.TODAY[0])
+    missed = strokes(before) - layouts.NEEDS.stroke
     for _ in range(SECANTS):
-        now = strokes(l4) - plain_rapier.NEEDS.stroke
+        now = strokes(l4) - layouts.NEEDS.stroke
         turned = now - missed
         step = np.where(turned != 0.0, now * (l4 - before) / np.where(turned != 0.0, turned, 1.0), 0.0)
         before, missed, l4 = l4, now, np.clip(l4 - step, *ends)
@@ -155,9 +156,9 @@ def _top(values: np.ndarray) -> np.ndarray:
 
 def _arc(travel: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Return the angle up to which |S| (designs, angles) stays in the dwells' band, by the line between two angles."""
-    out = travel > plain_rapier.NEEDS.band
+    out = travel > layouts.NEEDS.band
     first = np.where(out.any(axis=1), np.maximum(out.argmax(axis=1), 1), len(angles) - 1)
     every = np.arange(len(travel))
     low, high = travel[every, first - 1], travel[every, first]
-    share = np.clip((plain_rapier.NEEDS.band - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    share = np.clip((layouts.NEEDS.band - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
     return angles[first - 1] + share * (angles[first] - angles[first - 1])

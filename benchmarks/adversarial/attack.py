@@ -6,7 +6,7 @@ matched where the attack, not knowing it, ends within 1e-6 of it, which measures
 where an admissible design is found. Whatever is not certified is told with its reasons. Each failure is printed with
 its scene and design. Any of them but "second order open" ends in exit status 1.
 
-    python benchmarks/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding] [--seconds T]
+    python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding] [--seconds T]
                                 [--only K] [--compare] [--json]
 
 --count: scenes of each job; --seconds: no scene is begun later. Scene K of a job and seed is always the same one:
@@ -23,7 +23,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-import harness
+from benchmarks import harness
 
 BETTER = 1e-6
 """What counts as better, in natural sizes; an earlier objective counts as held within 1e-9."""
@@ -67,7 +67,7 @@ def scene_of(job: str, seed: int, number: int) -> Any:
     import numpy as np
 
     rng = np.random.default_rng([zlib.crc32(job.encode()), seed, number])
-    return importlib.import_module(f"attack_{job}").drawn(rng)
+    return importlib.import_module(f"benchmarks.adversarial.attack_{job}").drawn(rng)
 
 
 class Trial:

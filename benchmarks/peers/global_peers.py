@@ -4,7 +4,7 @@ Level 1 of `balance` (least |M3| at front dead centre): the same bounds and limi
 products and quotients of its own, for which angles are written through their cosines. Where PySCIPOpt is not installed
 its row says so. The referee draws designs in plain NumPy: none that keeps all limits may lie below a proven bound.
 
-    python benchmarks/global_peers.py [--quick] [--json]
+    python benchmarks/peers/global_peers.py [--quick] [--json]
 """
 
 import argparse
@@ -12,11 +12,11 @@ import importlib
 import time
 from typing import Any
 
-import harness
 import numpy as np
-import plain_beatup as plain
 
 import loomopt as lo
+from benchmarks import harness
+from reference import balance as plain
 
 CLOTHS = {"beatup-light": 600.0, "beatup": 745.0}
 DRAWN = 400_000

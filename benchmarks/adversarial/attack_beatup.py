@@ -6,10 +6,10 @@ Half of the scenes are drawn around a random machine that meets their static lim
 from dataclasses import dataclass
 
 import numpy as np
-from attackers import View, attacked
-from reference import beatup as by_hand
 
 import loomopt as lo
+from benchmarks.adversarial.attackers import View, attacked
+from reference import beatup as by_hand
 
 TARGETS = ("balance", "balance", "balance", "torque", "pulse", "retrofit")
 NAMES = ("l1", "l2", "l3", "l4", "m4e", "r4e")

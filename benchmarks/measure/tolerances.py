@@ -1,6 +1,6 @@
 """The numbers of the solver, one at a time a tenth and ten times as large (counts half and double): what do they do?
 
-    python benchmarks/tolerances.py [--only NAME] [--json]
+    python benchmarks/measure/tolerances.py [--only NAME] [--json]
 
 Every target of three packaged scenes is solved from its first start, then warm at two neighbours. Told of each number:
 solves that were not reached, by how much the worst objective is off (natural sizes), excess between nodes, IPOPT's
@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 from unittest import mock
 
-import harness
-
+from benchmarks import harness
 from loomopt.jobs import registry
 from loomopt.model import reading, session
 from loomopt.model.program import Program

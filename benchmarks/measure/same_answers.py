@@ -6,15 +6,15 @@ relaxation is the same to 1e-9; of a refusal, when its words are. Every exceptio
 whether there are any.
 
     git worktree add ../before TAG
-    python benchmarks/same_answers.py ../before [--only SCENE] [--json]
+    python benchmarks/measure/same_answers.py ../before [--only SCENE] [--json]
 """
 
 import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import checkouts
-import harness
+from benchmarks import harness
+from benchmarks.measure import checkouts
 
 SAME = 1e-12
 RELAXED = 1e-9

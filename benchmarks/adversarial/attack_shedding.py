@@ -7,36 +7,19 @@ sought by SLSQP and evolution. Half of the springs' upper ends lie so low that n
 import math
 from dataclasses import dataclass, replace
 
-import attackers
 import numpy as np
-from reference import shedding as plain
 from scipy.optimize import linprog
 
+from benchmarks.adversarial import attackers
+from reference import cam_force
+from reference import shedding as plain
+from reference.cam_force import RPM
+
 TARGETS = ("stiffness", "stiffness", "force", "law", "speed", "angles")
-LAWS = tuple(plain.FIRST_HALF)
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
-RPM = math.pi / 30
-FINE, SHARES, CLOSER = 2001, 65, 201
+SHARES = 65
 SPEEDS = 400
 """Speeds tried up to three times the one claimed."""
-
-
-def summits(of, low, high, keep=0.02):
-    """Return the places of the local maxima of a function within a share of its range of the largest, refined."""
-    if low == high:
-        return np.array([low])
-    u = np.linspace(low, high, FINE)
-    value = of(u)
-    inner = np.flatnonzero((value[1:-1] >= value[:-2]) & (value[1:-1] > value[2:])) + 1
-    spots = [low, high]
-    for k in inner[value[inner] >= value.max() - keep * np.ptp(value)]:
-        left, right = u[k - 1], u[k + 1]
-        for _ in range(4):
-            near = np.linspace(left, right, CLOSER)
-            j = int(of(near).argmax())
-            left, right = near[max(j - 1, 0)], near[min(j + 1, CLOSER - 1)]
-        spots.append((left + right) / 2)
-    return np.array(spots)
 
 
 @dataclass
@@ -56,17 +39,7 @@ class Frame:
         self.target = "stiffness" if self.question == "angles" else self.question
         scene = replace(self.plain_scene, X0=self.X0[1])
         self.force_size = scene.G + scene.T1 + scene.T2 + scene.M * 6 * scene.travel * (scene.rpm * RPM) ** 2
-        self.stiffness_size = max(self._needed(scene), 1.0)
-
-    def _needed(self, scene):
-        tops = []
-        for stretch in plain.stretches(scene):
-            spots = summits(self._need(scene, stretch), float(stretch[3]), float(stretch[4]))
-            tops.append(self._need(scene, stretch)(spots).max())
-        return float(max(tops))
-
-    def _need(self, scene, stretch):
-        return lambda u: plain.needed(np, scene, stretch, u) + 0 * u
+        self.stiffness_size = max(cam_force.softest(scene, scene.X0), 1.0)
 
     def _of(self, design):
         """Return the plain scene of a design."""
@@ -80,21 +53,6 @@ class Frame:
             scene = replace(scene, angles=(*angles, 360 - sum(angles)))
         return scene
 
-    def _force(self, scene, stretch, K1, sign):
-        """Return sign·N by u; in a dwell friction is taken at its worst."""
-        slip = 2 * scene.F if sign > 0 and not stretch[0] else 0.0
-        return lambda u: sign * (plain.force(np, scene, stretch, u, K1) + slip) + 0 * u
-
-    def _extreme(self, scene, K1, sign):
-        """Return the largest sign·N over the turn with its stretch and u."""
-        best = (-math.inf, None, 0.0)
-        for stretch in plain.stretches(scene):
-            of = self._force(scene, stretch, K1, sign)
-            spots = summits(of, float(stretch[3]), float(stretch[4]))
-            k = int(of(spots).argmax())
-            best = max(best, (float(of(spots)[k]), stretch, float(spots[k])), key=lambda each: each[0])
-        return best
-
     def point(self, design):
         """Return the point of a design where angles are free."""
         if not self.moves:
@@ -106,7 +64,7 @@ class Frame:
     def objectives(self, design):
         """Return the target's true objective, in natural sizes."""
         if self.target == "force":
-            return (self._extreme(self._of(design), design["K1"], 1)[0] / self.force_size,)
+            return (cam_force.extreme(self._of(design), design["K1"], 1)[0] / self.force_size,)
         if self.target == "speed":
             return (-design["speed"] / (self.plain_scene.rpm * RPM),)
         return (design["K1"] / self.stiffness_size,)
@@ -122,7 +80,7 @@ class Frame:
     def excess(self, design):
         """Return the largest violation, relative to the forces' and the bounds' sizes."""
         scene, K1, X0 = self._of(design), design["K1"], design["X0"]
-        worst = (scene.N_min + self._extreme(scene, K1, -1)[0]) / self.force_size
+        worst = (scene.N_min + cam_force.extreme(scene, K1, -1)[0]) / self.force_size
         if self.target == "speed":
             return worst
         for value, (low, high) in ((K1, self.K1), (X0, self.X0)):
@@ -175,7 +133,7 @@ class Frame:
             rows, right = [[self.X0[0], -1, 0], [-self.X0[1], 1, 0]], [0.0, 0.0]
             for stretch, u in spots:
                 X = float(plain.state(np, scene, stretch, u)[0])
-                least, most = (float(self._force(scene, stretch, 0.0, sign)(np.float64(u))) for sign in (-1, 1))
+                least, most = (float(cam_force.signed(scene, stretch, 0.0, sign)(np.float64(u))) for sign in (-1, 1))
                 rows += [[-X, -1, 0], [X, 1, -1]]
                 right += [-least - scene.N_min, -most]
             scaled = np.array(rows) * np.array([size, F, F]) / F
@@ -188,8 +146,8 @@ class Frame:
             K1 = min(max(K1 * (1 + 1e-12), self.K1[0]), self.K1[1])
             X0 = min(max(P / K1 if K1 > 0 else self.X0[0], self.X0[0]), self.X0[1])
             at = replace(scene, X0=X0)
-            top, high, where = self._extreme(at, K1, 1)
-            below, low, there = self._extreme(at, K1, -1)
+            top, high, where = cam_force.extreme(at, K1, 1)
+            below, low, there = cam_force.extreme(at, K1, -1)
             if max((top - peak) * (self.target == "force"), below + scene.N_min) < 3e-10 * F:
                 break
             spots += [(high, where), (low, there)]
@@ -234,14 +192,14 @@ class Angled:
         scene = self.frame._of(design)
         found = []
         for stretch, u in zip(plain.stretches(scene), angles, strict=True):
-            spots = summits(self.frame._need(scene, stretch), float(stretch[3]), float(stretch[4]))
+            spots = cam_force.summits(cam_force.need(scene, stretch), float(stretch[3]), float(stretch[4]))
             found.append(np.append(u, spots))
         return tuple(found)
 
     def design(self, z):
         values = self.values(z)
         design = dict(zip(ANGLES[:3], map(math.radians, values[:3]), strict=True)) | {"X0": float(values[3])}
-        needed = self.frame._needed(replace(self.frame._of(design), X0=design["X0"]))
+        needed = cam_force.softest(self.frame._of(design), design["X0"])
         return design | {"K1": max(needed, self.frame.K1[0])}
 
 
@@ -268,7 +226,7 @@ def drawn(rng):
         C=some(100, 0.4),
         F=some(40, 0.4),
         N_min=some(200, 0.4),
-        law=str(rng.choice(LAWS)),
+        law=str(rng.choice(plain.LAWS)),
         angles=angles,
     )
     return _framed(rng, question, scene, X0_max)

@@ -3,19 +3,20 @@
 Both evaluate the same closed forms in chunks of 8192, side by side in one run. Further rows show what other ways of
 evaluating the same formula cost. Error: largest over ψ, ψ', ψ'' against 40 digits.
 
-    python benchmarks/kinematics_speed.py [--quick] [--json]
+    python benchmarks/measure/kinematics_speed.py [--quick] [--json]
 """
 
 import argparse
+import functools
 
 import casadi as ca
-import harness
 import numpy as np
-import plain_beatup as plain
 
+from benchmarks import harness
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose
+from reference import balance as plain
 
 LENGTHS = (0.031, 0.065, 0.155, 0.167)
 CHUNK = 8192
@@ -61,10 +62,10 @@ def run(positions: int, repeats: int):
         "mpmath, 40 digits": (few, exact, 1),
     }
     promised = dict(list(methods.items())[:2])
-    times = harness.least({name: lambda at=at, f=f: f(at) for name, (at, f, _) in promised.items()}, repeats)
+    times = harness.least({name: functools.partial(f, at) for name, (at, f, _) in promised.items()}, repeats)
     for name, (at, f, often) in methods.items():
         if name not in times:
-            times |= harness.least({name: lambda at=at, f=f: f(at)}, often)
+            times |= harness.least({name: functools.partial(f, at)}, often)
     reference = exact(few)
     plain_time = times["plain NumPy, chunks of 8192"]
     rows = [

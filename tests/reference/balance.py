@@ -1,13 +1,16 @@
-"""Beat-up of [Yuan24] in plain NumPy, as an engineer writes it by hand: closed forms, vectorised, nothing general.
+"""The balance of [Yuan24]'s loom as an engineer writes it by hand for speed: closed forms of many designs at once.
 
-Knows nothing of loomopt. SI units and rad. A design is l1, l2, l3, l4 (m) and s = m4e r4e² (kg·m²); its numbers
-broadcast against crank angles, so one call serves one design (floats) or many (columns).
+Effects: inertia and resistance; `beatup.Machine` has the others. SI units and rad. A design is l1, l2, l3, l4 (m) and
+s = m4e r4e² (kg·m²); its numbers broadcast against crank angles, so one call serves one design (floats) or many
+(columns).
 
 [Yuan24] Yuan R., Ai M., Analysis of moment balance in beating-up mechanism and its regulation strategies under
 restricted space, J. Tiangong Univ. 43(4), 2024, doi 10.3969/j.issn.1671-024x.2024.04.013
 """
 
 import numpy as np
+
+from reference.beatup import dead_centres, extreme_transmission, front_angle
 
 CHUNK = 8192
 SPEED = 600 * 2 * np.pi / 60
@@ -49,20 +52,11 @@ def curves(l1, l2, l3, l4, phi, chunk=CHUNK):
     return found
 
 
-def front_angle(l1, l2, l3, l4):
-    """Return β, the crank angle of front dead centre [eq 12]."""
-    return np.arccos(((l2 + l1) ** 2 + l4**2 - l3**2) / (2 * (l2 + l1) * l4))
-
-
 def limits(l1, l2, l3, l4):
     """Return six rows, rad, none of which may be negative: swing, θ and transmission angle, each from both sides."""
-    beta_r = np.arccos(((l2 - l1) ** 2 + l4**2 - l3**2) / (2 * (l2 - l1) * l4))
-    theta = front_angle(l1, l2, l3, l4) - beta_r
-    open_front = np.arccos((l3**2 + l4**2 - (l2 + l1) ** 2) / (2 * l3 * l4))
-    open_rear = np.arccos((l3**2 + l4**2 - (l2 - l1) ** 2) / (2 * l3 * l4))
-    swing = open_front - open_rear
-    near = np.arccos((l2**2 + l3**2 - (l4 - l1) ** 2) / (2 * l2 * l3))
-    far = np.pi - np.arccos((l2**2 + l3**2 - (l4 + l1) ** 2) / (2 * l2 * l3))
+    beta, beta_r, psi_f, psi_r = dead_centres(l1, l2, l3, l4)
+    swing, theta = psi_r - psi_f, beta - beta_r
+    near, far = extreme_transmission(l1, l2, l3, l4)
     rows = (swing - SWING[0], SWING[1] - swing, THETA - theta, THETA + theta, near - TRANSMISSION, far - TRANSMISSION)
     return np.array(rows)
 

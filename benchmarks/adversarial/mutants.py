@@ -1,6 +1,6 @@
 """Mutants of the solver's rooms: would the tests notice a wrong number, comparison or sign?
 
-    python benchmarks/mutants.py [--count 150] [--seed 0] [--workers 2] [--only FILE] [--list]
+    python benchmarks/adversarial/mutants.py [--count 150] [--seed 0] [--workers 2] [--only FILE] [--list]
 
 A fixed random choice of small changes in loomopt/solving and loomopt/physics/tolerances.py is made one
 at a time, in a copy of the package, and the tests that mirror the changed file are run against it:
@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-TOP = Path(__file__).resolve().parents[1]
+TOP = Path(__file__).resolve().parents[2]
 ROOMS = ("solving",)
 TOLERANCES = "loomopt/physics/tolerances.py"
 SECONDS = 600

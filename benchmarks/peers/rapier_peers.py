@@ -6,7 +6,7 @@ judged by a referee that shares nothing with loomopt (plain NumPy, extremes refi
 there if its true peak is within 1e-6 of the best known and no limit is exceeded by more than 1e-6 of itself (the
 angle: of 1 rad). "ms for 1e-6" is the time spent on all starts over the number that got there.
 
-    python benchmarks/rapier_peers.py [--quick] [--json]
+    python benchmarks/peers/rapier_peers.py [--quick] [--json]
 
 --quick leaves out the slow peers, and takes fewer starts.
 """
@@ -16,15 +16,15 @@ import functools
 import time
 import warnings
 
-import harness
 import numpy as np
-import plain_rapier as plain
 from scipy.optimize import differential_evolution, minimize
 
 import loomopt as lo
+from benchmarks import harness
 from loomopt.jobs import registry
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
+from reference import rapier_layouts as plain
 
 KNOWN = 0.6949847535697
 """Best-known peak |S''|, m/rad²: see `best_known`."""

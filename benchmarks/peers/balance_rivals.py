@@ -6,8 +6,9 @@ in φ; only `reference` looks between the points.
 
 import casadi as ca
 import numpy as np
-import plain_beatup as plain
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
+
+from reference import balance as plain
 
 GRID = 360
 SIZE = np.array([0.167, 0.167, 0.167, 0.167, plain.UPPER[4]])

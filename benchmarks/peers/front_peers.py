@@ -1,7 +1,7 @@
 """Whole fronts beside NSGA-II [pymoo], which gets ten times the time; both judged by plain evaluators of their own.
 
-`python -m benchmarks.front_peers [--points N] [--only PROBLEM] [--quick] [--json]`: as many points are asked of the
-front as NSGA-II has designs. Without --only also what two workers reach beside two plain loops, and memory.
+`python benchmarks/peers/front_peers.py [--points N] [--only PROBLEM] [--quick] [--json]`: as many points are asked of
+the front as NSGA-II has designs. Without --only also what two workers reach beside two plain loops, and memory.
 """
 
 import argparse
@@ -18,8 +18,8 @@ import numpy as np
 
 import loomopt as lo
 from benchmarks import harness
-from benchmarks.front_rivals import Rival, Spot, beatup, rapier, shedding
-from benchmarks.fronts import asked_at
+from benchmarks.measure.fronts import asked_at
+from benchmarks.peers.front_rivals import Rival, Spot, beatup, rapier, shedding
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import executors, run
@@ -167,7 +167,7 @@ def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool)
 
 MEMORY = """
 import resource, sys
-from benchmarks.front_peers import plain_loop
+from benchmarks.peers.front_peers import plain_loop
 plain_loop(3)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 rows = plain_loop(int(sys.argv[1]))

@@ -42,9 +42,10 @@ class View(NamedTuple):
 class Task(Protocol):
     """A scene's question by hand; `angles` are the task's own record of where it looks over the turn."""
 
-    size: int
-    coarse: tuple[np.ndarray, ...]
-
+    @property
+    def size(self) -> int: ...
+    @property
+    def coarse(self) -> tuple[np.ndarray, ...]: ...
     def view(self, z: np.ndarray, angles: tuple[np.ndarray, ...]) -> View: ...
     def sharper(self, z: np.ndarray, angles: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]: ...
 

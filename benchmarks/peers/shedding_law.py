@@ -12,7 +12,7 @@ hand for this one question: s, s' and s'' at the knots as variables, the spline'
 force at every knot of rise and return as a row. Both are built anew for each answer; the clock counts the processor's
 time.
 
-    python benchmarks/shedding_law.py [--intervals 8 16 32 64] [--quick] [--json]
+    python benchmarks/peers/shedding_law.py [--intervals 8 16 32 64] [--quick] [--json]
 
 --quick takes 8 and 16 intervals, and fewer repeats beside IPOPT.
 """
@@ -23,13 +23,13 @@ from dataclasses import replace
 from typing import Any
 
 import casadi as ca
-import harness
 import numpy as np
-from reference import shedding as plain
 
 import loomopt as lo
+from benchmarks import harness
 from loomopt.model import session
 from loomopt.solving.nlp import transcribe
+from reference import shedding as plain
 
 SCENES = {"shedding": plain.PAPER, "shedding-printed-travel": plain.PRINTED}
 BOUND = 2 * np.pi

@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from support.shedding_cases import plain
+
+from reference import shedding as plain
 
 POINTS, DIAMETERS, CLOSER, FINER = 20_001, 401, 10, 11
 

@@ -1,7 +1,7 @@
 """Whole fronts of the packaged machines beside known points; certified points per CPU second; is any dominated?
 
-`python -m benchmarks.fronts` (CPU minutes); `--cold` also searches every third point from scratch, to see whether a
-front stays in a worse basin.
+`python benchmarks/measure/fronts.py` (CPU minutes); `--cold` also searches every third point from scratch, to see
+whether a front stays in a worse basin.
 """
 
 import argparse

@@ -3,12 +3,12 @@
 Commands run in turn, each in a process of its own, all with bytecode cached in a folder of this run, so that noise
 hits all alike and nothing has to be compiled. "loomopt solve beatup, less the solve" leaves out what `lo.solve` itself
 takes in that process; the rest is start-up: Python, imports, words, scene, tables. From one start: how wide a search
-is made is no start-up (benchmarks/answers.py).
+is made is no start-up (benchmarks/measure/answers.py).
 
 Importing CasADi and NumPy is mostly loading shared libraries, a command is mostly running Python: their ratio differs
 by machine. "The same, with Typer and pydantic at work" is both, and so the fairer measure between machines.
 
-    python benchmarks/startup.py [--quick] [--json]
+    python benchmarks/measure/startup.py [--quick] [--json]
 """
 
 import argparse
@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 
-import harness
+from benchmarks import harness
 
 ALONE = "import casadi, numpy"
 FLOOR = "the same, with Typer and pydantic at work"

@@ -1,6 +1,6 @@
 """How many certified answers a second: warm ones from a neighbour's, one after the other, and where their time goes.
 
-    python benchmarks/answers.py [--count 60] [--memory 1000] [--json]
+    python benchmarks/measure/answers.py [--count 60] [--memory 1000] [--json]
 
 The clock counts the processor's time; the steps are those that every answer tells in its `time`, as shares of it. An
 answer counts where it is optimal and certified. Memory: what the process holds after the first tenth of so many
@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-import harness
+from benchmarks import harness
 
 CASES = {
     "beatup balance": ("beatup", "balance", "operation.M0", "{} N*m", 700.0, 2.0),

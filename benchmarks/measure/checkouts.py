@@ -14,10 +14,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from harness import THREADS
+from benchmarks.harness import THREADS
 
-HERE = Path(__file__).resolve().parents[1]
+HERE = Path(__file__).resolve().parents[2]
 WORKER = "--worker"
+STARTED = """
+import runpy, sys
+import loomopt
+here, script = sys.argv[1:3]
+sys.path.insert(0, here)
+runpy.run_path(script, run_name="__main__")
+"""
+"""A worker takes loomopt from the checkout it stands in, all else from here."""
 
 
 class Worker:
@@ -25,7 +33,7 @@ class Worker:
 
     def __init__(self, script: str, checkout: Path) -> None:
         env = {**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": str(checkout)}
-        command = [sys.executable, script, WORKER]
+        command = [sys.executable, "-c", STARTED, str(HERE), script, WORKER]
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=env, cwd=checkout)
         self.checkout = checkout

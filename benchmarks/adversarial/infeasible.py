@@ -1,8 +1,9 @@
 """Infeasible targets drawn at random: CPU seconds of each, and the least relaxations told.
 
-    python benchmarks/infeasible.py --count 30 --out now.json          # in this checkout
-    PYTHONPATH=OTHER python benchmarks/infeasible.py --out before.json # in another one
-    python benchmarks/infeasible.py --compare before.json now.json     # what is told otherwise, and the ratio of times
+    python benchmarks/adversarial/infeasible.py --count 30 --out now.json # in this checkout
+    PYTHONPATH=OTHER python benchmarks/adversarial/infeasible.py --out before.json # in another one
+    python benchmarks/adversarial/infeasible.py --compare before.json now.json
+                                      # what is told otherwise, and the ratio of times
 
 A scene that is admissible after all is told and not counted.
 """

@@ -5,7 +5,7 @@ cases that differ in travel, law, damping, tension and cam angles. Every answer 
 nothing with loomopt (tests/reference, 30 digits): how far K1 is off, and how far the cam force falls below N_min
 somewhere in the turn, as a share of the largest spring force. Times are for all cases; loomopt's whole call = 1.
 
-    python benchmarks/shedding_peers.py [--quick] [--json]
+    python benchmarks/peers/shedding_peers.py [--quick] [--json]
 
 --quick repeats less and leaves out the slow peers.
 """
@@ -17,13 +17,13 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
-import harness
 import numpy as np
 from mpmath import mp
-from reference import shedding as plain
 from scipy.optimize import minimize
 
 import loomopt as lo
+from benchmarks import harness
+from reference import shedding as plain
 
 GRIDS = (36, 72, 180, 360, 3600)
 COARSE, ENOUGH = 36, 1e-10
@@ -219,7 +219,7 @@ def main():
     def kept(name):
         found[name] = {of: methods[name](case) for of, case in CASES.items()}
 
-    times = harness.least({name: lambda name=name: kept(name) for name in methods}, 2 if asked.quick else 5)
+    times = harness.least({name: functools.partial(kept, name) for name in methods}, 2 if asked.quick else 5)
     unit = times["loomopt: whole call"]
     table = [{"method": name, "time": times[name] / unit, **judged(found[name], best)} for name in methods]
     pressed = {count: float(plain.uniform_grid(plain.PRESSED, count) / best["pressed on"] - 1) for count in GRIDS}

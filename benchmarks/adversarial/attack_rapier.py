@@ -6,8 +6,9 @@ Half of the scenes are drawn around a random drive that meets them, so that `inf
 from dataclasses import dataclass, replace
 
 import numpy as np
-import plain_rapier as plain
-from attackers import View, attacked
+
+from benchmarks.adversarial.attackers import View, attacked
+from reference import rapier_layouts as plain
 
 TARGETS = ("stroke-dwell", "stroke-dwell", "stroke-dwell", "dwell", "smooth")
 UNITS = ("mm", "mm", "mm", "mm", "deg", "mm", "mm", "deg")

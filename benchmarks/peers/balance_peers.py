@@ -5,7 +5,7 @@ Errors are those of the designs handed in, judged by a referee that shares nothi
 against the best-known optimum; the peak a method claims against its true one; the worst limit. Times are the least of
 interleaved repeats, one thread each.
 
-    python benchmarks/balance_peers.py [--quick] [--json]
+    python benchmarks/peers/balance_peers.py [--quick] [--json]
 
 --quick leaves out the slow peers, and judges the designs of a few M0 only.
 """
@@ -14,16 +14,16 @@ import argparse
 import time
 import warnings
 
-import harness
 import numpy as np
-import peers
-import plain_beatup as plain
 
 import loomopt as lo
+from benchmarks import harness
+from benchmarks.peers import balance_rivals as peers
 from loomopt.jobs import registry
 from loomopt.model import session
 from loomopt.solving.nlp import exchange, transcribe
 from loomopt.solving.nlp.point import Settings
+from reference import balance as plain
 
 SWEEP = range(600, 901, 10)
 BEFORE, SINGLE = 590, 745
