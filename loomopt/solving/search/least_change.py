@@ -20,7 +20,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
-from loomopt.solving.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, corrected, exact, judged_as_is, objectives, tried
 from loomopt.solving.search.tie_break import unchanging, wished
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
@@ -65,7 +65,7 @@ def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, floa
     return any(abs(one[v.name] - other[v.name]) > most * v.scale for v in program.variables)
 
 
-def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) -> Judged | None:
+def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats) -> Candidate | None:
     """Return the design of least change with its certificate; None where it has none, or a level is not as good.
 
     kept: variables that stay; ways: directions that are open. The weight of the earlier levels against the change is
@@ -73,7 +73,7 @@ def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) ->
     itself: its rows are the same ones, and often it has changed least already.
     """
     program = search.program
-    warm = replace(best.candidate.point, x=dict(best.x))
+    warm = replace(best.point, x=dict(best.x))
     task = changing(program, best.x, kept, search.today)
     if task is None:
         return None
@@ -99,7 +99,7 @@ def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]
     return all(abs(now - then) <= FEASIBLE for now, then in levels)
 
 
-def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> tuple[Judged, Certificate] | None:
+def _held(search: Search, best: Candidate, task: Program, candidate: Candidate) -> tuple[Candidate, Certificate] | None:
     """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
     judging, here = Search(search.job, task, search.settings), exact(search, best.x)
     found = judged_as_is(judging, candidate, here)
@@ -114,7 +114,7 @@ def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> 
     return (found, alone) if alone.passed else None
 
 
-def _named(found: tuple[Judged, Certificate], best: Judged, task: Program, ways: Floats) -> Judged:
+def _named(found: tuple[Candidate, Certificate], best: Candidate, task: Program, ways: Floats) -> Candidate:
     """Return a design of least change with its certificate, which says what was settled and what is still open."""
     moved, alone = found
     said = f"{', '.join(_called(task, ways, best))}: {LEAST_CHANGE}"
@@ -125,7 +125,7 @@ def _named(found: tuple[Judged, Certificate], best: Judged, task: Program, ways:
         change=moved.certificate.levels[-1],
         open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
     )
-    return Judged(best.candidate, moved.x, certificate)
+    return replace(best, moved=moved.x, certificate=certificate)
 
 
 def changing(
@@ -234,7 +234,7 @@ def _inside(level: Floats, scales: Mapping[str, float], move: Mapping[str, float
     return shares if np.linalg.norm(way - shares @ level) <= RANK else None
 
 
-def _called(program: Program, ways: Floats, of: Judged) -> tuple[str, ...]:
+def _called(program: Program, ways: Floats, of: Candidate) -> tuple[str, ...]:
     """Return what a designer calls the variables that directions (k, variables) of a judged design move."""
     labels = {v.name: v.called for v in program.variables}
     pairs = zip(of.certificate.level[0], np.abs(ways).max(axis=0), strict=True) if len(ways) else ()

@@ -38,26 +38,27 @@ HELD_MARGIN = 2.0
 OnStart = Callable[[int, int], None]
 
 
+NOT_JUDGED = Certificate(False, ("it has not been judged",), (), math.inf, math.inf, False, False)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle.
 
     value: of the NLP's objective there, in which each level weighs far more than the next; that of the NLP itself
-    where the solve was left.
+    where the solve was left. Once it is judged: moved: variables, SI, after the tie-break; certificate: of these.
     """
 
     point: Point
     objectives: tuple[float, ...]
     value: float = math.inf
+    moved: Mapping[str, float] | None = None
+    certificate: Certificate = NOT_JUDGED
 
-
-@dataclass(frozen=True)
-class Judged:
-    """A candidate after the silent levels: its variables, SI, and their certificate."""
-
-    candidate: Candidate
-    x: Mapping[str, float]
-    certificate: Certificate
+    @property
+    def x(self) -> Mapping[str, float]:
+        """The variables of the design, SI."""
+        return self.point.x if self.moved is None else self.moved
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Search:
     settings: Settings
     today: Mapping[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
-    best: Judged | None = None
+    best: Candidate | None = None
     nearest: Point | None = None
     sought: int = 0
     designs: int = 0
@@ -152,7 +153,7 @@ def judged(search: Search) -> Search:
     """
     while search.reached:
         first = search.ranked[0]
-        if search.best is None or search.best.candidate is not first:
+        if search.best is None or search.best.point is not first.point:
             search = _certified(search, first)
         if search.best is None or not _too_weak(search.settings, search.best.certificate):
             break
@@ -169,7 +170,7 @@ def _another(search: Search) -> Search:
     best = search.best
     if best is None:
         return search
-    others = [c for c in search.reached if c is not best.candidate and compared(c, best.candidate) == 0]
+    others = [c for c in search.reached if c.point is not best.point and compared(c, best) == 0]
     for candidate in others[:MOST_ALIKE]:
         search = _certified(search, candidate)
         if search.passed:
@@ -177,12 +178,12 @@ def _another(search: Search) -> Search:
     return _met_farther(replace(search, best=best), best)
 
 
-def _met_farther(search: Search, best: Judged) -> Search:
+def _met_farther(search: Search, best: Candidate) -> Search:
     """Return the search with its best put on what just binds, where that was too far to be sure, if that passes."""
-    if not best.candidate.point.rough:
+    if not best.point.rough:
         return search
     farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
-    again = tried(farther, best.candidate.point.x)
+    again = tried(farther, best.point.x)
     if again.candidates[-1].point.reached:
         again = _certified(again, again.candidates[-1])
     return replace(again, settings=search.settings) if again.passed else search
@@ -213,7 +214,7 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
             break
         x, certificate = moved, better
-    return replace(search, best=Judged(candidate, x, certificate))
+    return replace(search, best=replace(candidate, moved=x, certificate=certificate))
 
 
 def _settled(
@@ -238,23 +239,23 @@ def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
     return search.job.values(search.program, search.job.design(search.program, x))
 
 
-def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Judged:
+def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Candidate:
     """Return a candidate after the silent levels with its certificate, not corrected.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
     _, x, certificate = _settled(search, candidate.point.x, known)
-    return Judged(candidate, x, certificate)
+    return replace(candidate, moved=x, certificate=certificate)
 
 
-def corrected(search: Search, found: Judged) -> Judged:
+def corrected(search: Search, found: Candidate) -> Candidate:
     """Return a design moved by its certificate's own step and judged again; as it is where that is worse."""
     x = _stepped(search.program, found.x, found.certificate.correction)
     if not found.certificate.correction or sampler_at(search.program, x) is None:
         return found
     _, x, certificate = _settled(search, x)
     ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
-    return Judged(found.candidate, x, certificate) if ranks[0] <= ranks[1] else found
+    return replace(found, moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

@@ -19,7 +19,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import elastic, steady_state
+from loomopt.solving.search import elastic, multistart
 from loomopt.solving.search.search import Search
 from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
 from loomopt.studies.run import warm
@@ -155,7 +155,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}
-    search = steady_state.searched(Search(job, program, Settings(solver.accuracy), today))
+    search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
     return elastic.clash(search, Words(scene))
 
 
