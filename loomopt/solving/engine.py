@@ -91,4 +91,4 @@ def solve(
 
             settings.at("proving")
             answer = whole_cycle.proven(scene, target, answer)
-        return report.completed(answer, bound, evaluations, clock.told(search))
+        return report.completed(answer, bound, evaluations, clock.seconds(search))

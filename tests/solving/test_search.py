@@ -236,7 +236,7 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
     assert (twice.solved, twice.built) == (0.75, 0.25)
     judged = searching._certified(twice, twice.candidates[0])
-    assert (judged.settled, judged.certified) == (1.0, 2.0)
+    assert (judged.tie_broken, judged.certified) == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(

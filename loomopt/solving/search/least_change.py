@@ -20,7 +20,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
-from loomopt.solving.search.search import Candidate, Search, corrected, exact, judged_as_is, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, as_read, corrected, judged_as_is, objectives, tried
 from loomopt.solving.search.tie_break import unchanging, wished
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
@@ -44,7 +44,7 @@ def with_least_change(search: Search) -> Search:
     if best is None or not best.certificate.passed or not best.certificate.level:
         return search
     began, program = time.perf_counter(), search.program
-    here = exact(search, best.x)
+    here = as_read(search, best.x)
     kept = _kept(program, here, best.certificate)
     ways = left(program, here, best.certificate, kept)
     unique = best.certificate.unique
@@ -57,7 +57,7 @@ def with_least_change(search: Search) -> Search:
         moved = replace(best, certificate=replace(best.certificate, open=_called(program, ways, best)))
     elif moved and unique and not _differ(program, moved.x, best.x):
         moved = None
-    return replace(search, best=moved or best, settled=search.settled + time.perf_counter() - began)
+    return replace(search, best=moved or best, tie_broken=search.tie_broken + time.perf_counter() - began)
 
 
 def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float], most: float = MOVED) -> bool:
@@ -101,7 +101,7 @@ def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]
 
 def _held(search: Search, best: Candidate, task: Program, candidate: Candidate) -> tuple[Candidate, Certificate] | None:
     """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
-    judging, here = Search(search.job, task, search.settings), exact(search, best.x)
+    judging, here = Search(search.job, task, search.settings), as_read(search, best.x)
     found = judged_as_is(judging, candidate, here)
     for _ in range(CORRECTIONS):
         before, found = found, corrected(judging, found)
@@ -109,7 +109,7 @@ def _held(search: Search, best: Candidate, task: Program, candidate: Candidate) 
             break
     if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
         return None
-    there = exact(search, found.x)
+    there = as_read(search, found.x)
     alone = best.certificate if there == here else certify(search.program, there, search.settings.accuracy)
     return (found, alone) if alone.passed else None
 

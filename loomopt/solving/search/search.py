@@ -1,4 +1,4 @@
-"""The search for the best certified design: starts → exchange → silent levels → certificate, as steps on records."""
+"""The search for the best certified design: starts → exchange → tie-break → certificate, as steps on records."""
 
 import functools
 import math
@@ -68,7 +68,7 @@ class Search:
     settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
     best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
     no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
-    basin; built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of
+    basin; built, solved, tie_broken, certified: seconds of making NLPs, of solves with that, of tie-breaks, of
     certificates.
     """
 
@@ -84,7 +84,7 @@ class Search:
     stayed: bool = False
     built: float = 0.0
     solved: float = 0.0
-    settled: float = 0.0
+    tie_broken: float = 0.0
     certified: float = 0.0
 
     @property
@@ -147,7 +147,7 @@ def compared(one: Candidate, other: Candidate) -> int:
 
 
 def judged(search: Search) -> Search:
-    """Return the search with its best candidate settled and certified.
+    """Return the search with its best candidate tie-broken and certified.
 
     Where an earlier objective gave way to a later one, it is solved again with a stronger weight between them.
     """
@@ -201,7 +201,7 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
 def _certified(search: Search, candidate: Candidate) -> Search:
     """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
     accuracy = search.settings.accuracy
-    search, x, certificate = _settled(search, candidate.point.x)
+    search, x, certificate = _judged_at(search, candidate.point.x)
     for _ in range(CORRECTIONS):
         precise = max(min(PRECISE, accuracy), ROUNDING)
         close = certificate.residual <= precise and certificate.error <= accuracy
@@ -210,41 +210,41 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         stepped = _stepped(search.program, x, certificate.correction)
         if sampler_at(search.program, stepped) is None:
             break
-        search, moved, better = _settled(search, stepped)
+        search, moved, better = _judged_at(search, stepped)
         if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
             break
         x, certificate = moved, better
     return replace(search, best=replace(candidate, moved=x, certificate=certificate))
 
 
-def _settled(
+def _judged_at(
     search: Search, x: Mapping[str, float], known: Mapping[str, float] | None = None
 ) -> tuple[Search, dict[str, float], Certificate]:
-    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate.
+    """Return the search with the seconds this took, x (SI) after the tie-break, and its certificate.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
     job, program, began = search.job, search.program, time.perf_counter()
     search.settings.at("certifying")
-    settled, said = tie_break.moved(program, job.tidy(program, x))
-    at, there = time.perf_counter(), exact(search, settled)
+    moved, rules = tie_break.moved(program, job.tidy(program, x))
+    at, there = time.perf_counter(), as_read(search, moved)
     shown = len(program.objectives) - 1 if there == known else 0
-    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=said)
+    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=rules)
     certified = search.certified + time.perf_counter() - at
-    return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
+    return replace(search, tie_broken=search.tie_broken + at - began, certified=certified), moved, certificate
 
 
-def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
+def as_read(search: Search, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return search.job.values(search.program, search.job.design(search.program, x))
 
 
 def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Candidate:
-    """Return a candidate after the silent levels with its certificate, not corrected.
+    """Return a candidate after the tie-break with its certificate, not corrected.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
-    _, x, certificate = _settled(search, candidate.point.x, known)
+    _, x, certificate = _judged_at(search, candidate.point.x, known)
     return replace(candidate, moved=x, certificate=certificate)
 
 
@@ -253,7 +253,7 @@ def corrected(search: Search, found: Candidate) -> Candidate:
     x = _stepped(search.program, found.x, found.certificate.correction)
     if not found.certificate.correction or sampler_at(search.program, x) is None:
         return found
-    _, x, certificate = _settled(search, x)
+    _, x, certificate = _judged_at(search, x)
     ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
     return replace(found, moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
 

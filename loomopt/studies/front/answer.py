@@ -132,7 +132,7 @@ def answer(solver: Solver, target: str | None, found: Reached, asking: Asking, b
         if point:
             terms = Terms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))
-            certificate = certify(program, _exact(solver.job, program, point.x), solver.accuracy)
+            certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
             made = _certified(solver, terms, here, certificate, found, asking)
             return replace(made, point=point, time=_time(began, solved))
     terms = Terms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
@@ -178,7 +178,7 @@ def _certified(
     )
 
 
-def _exact(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return job.values(program, job.design(program, x))
 
