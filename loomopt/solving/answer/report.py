@@ -14,7 +14,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.kkt import figure_of
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound
 from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.search.search import Candidate, Judged, Search, compared
+from loomopt.solving.search.search import Candidate, Search, compared
 
 Today = Callable[[], Evaluation]
 """Evaluates today's machine."""
@@ -32,9 +32,9 @@ def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
     return _with(scene, target, search, search.best)
 
 
-def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
+def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solution:
     """Return the answer of the best design that was reached."""
-    job, program, point = search.job, search.program, best.candidate.point
+    job, program, point = search.job, search.program, best.point
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
@@ -56,7 +56,7 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
 def _counts(search: Search) -> dict[str, Any]:
     """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
     best = search.best
-    same = [c for c in search.candidates if _is_there(c, best.candidate)] if best else []
+    same = [c for c in search.candidates if _is_there(c, best)] if best else []
     accuracy = search.settings.accuracy
     counts = {
         "starts": len(search.candidates) + search.sought,

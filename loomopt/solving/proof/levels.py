@@ -250,7 +250,7 @@ def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
     found = judged(tried(search, start))
     if not found.passed or found.best is None or search.best is None:
         return None
-    return found if compared(found.best.candidate, search.best.candidate) < 0 else None
+    return found if compared(found.best, search.best) < 0 else None
 
 
 def _bound(outcome: Outcome, boxes: int, began: float) -> GlobalBound:

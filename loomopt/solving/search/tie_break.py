@@ -1,6 +1,6 @@
-"""The two silent levels that end every target: least added mass, then least change from today's machine.
+"""The tie-break that ends every target: least added mass, then least change from today's machine.
 
-They run only along moves verified flat at this design: objectives unchanged to 1e-10, every limit still held.
+It goes only along moves verified flat at this design: objectives unchanged to 1e-10, every limit still held.
 """
 
 import math
@@ -14,7 +14,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 
 UNCHANGED = 1e-10
-"""Change of an objective along a move that costs nothing: a hundredth of the usual accuracy (silent levels)."""
+"""Change of an objective along a move that costs nothing: a hundredth of the usual accuracy."""
 
 
 BEYOND = 1e-3
@@ -22,14 +22,14 @@ BEYOND = 1e-3
 
 
 BISECTIONS, NODES = 60, 64
-"""Halvings of a silent level's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
+"""Halvings of a move's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
 
 
 Numbers = Mapping[str, float]
 
 
 def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return x (SI) after the silent levels, and what they settled."""
+    """Return x (SI) after all moves along which nothing is lost, and what was chosen."""
     settled = []
     for move in program.moves:
         wish = wished(program, move, x)

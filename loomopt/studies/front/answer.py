@@ -19,7 +19,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import elastic, steady_state
+from loomopt.solving.search import elastic, multistart
 from loomopt.solving.search.search import Search
 from loomopt.studies.front.solver import Asking, Reached, Solver, capped
 from loomopt.studies.run import warm
@@ -132,7 +132,7 @@ def answer(solver: Solver, target: str | None, found: Reached, asking: Asking, b
         if point:
             terms = Terms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))
-            certificate = certify(program, _exact(solver.job, program, point.x), solver.accuracy)
+            certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
             made = _certified(solver, terms, here, certificate, found, asking)
             return replace(made, point=point, time=_time(began, solved))
     terms = Terms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
@@ -155,7 +155,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}
-    search = steady_state.searched(Search(job, program, Settings(solver.accuracy), today))
+    search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
     return elastic.clash(search, Words(scene))
 
 
@@ -178,7 +178,7 @@ def _certified(
     )
 
 
-def _exact(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return job.values(program, job.design(program, x))
 
