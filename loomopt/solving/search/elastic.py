@@ -17,6 +17,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
 from loomopt.solving.nlp.stations import families
+from loomopt.solving.search.search import Search
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
@@ -34,12 +35,14 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     return best
 
 
-def clash(program: Program, nearest: Point, settings: Settings, words: Words) -> Clash:
-    """Return the limits that clash and the least relaxations that make a design possible.
+def clash(search: Search, words: Words) -> Clash:
+    """Return the limits that clash and the least relaxations that make a design possible; none where one was reached.
 
-    nearest: where the sum of all excesses is least. First that sum's limits; then each other limit by itself, where
-    that suffices.
+    First the limits of the least sum of all excesses; then each other limit by itself, where that suffices.
     """
+    program, nearest, settings = search.program, search.nearest, search.settings
+    if search.best or nearest is None or not nearest.relaxed:
+        return Clash()
     needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
