@@ -17,6 +17,7 @@ from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import POINTS, read_front
 from loomopt.studies.run import run
+from loomopt.studies.run.findings import Findings
 from loomopt.studies.run.rows import Row, Task
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
@@ -111,15 +112,16 @@ def main() -> None:
             searched(trade, found)
 
 
-def told(case: Case, trade: trade.Trade, found: trade.Front, spent: float) -> None:
+def told(case: Case, trade: trade.Trade, found: Findings, spent: float) -> None:
     """Print a front's points beside known ones, its ends, its changes and its speed."""
     first, second = case.axes
-    sought, paid = found.values(first), found.values(second)
+    sought, paid = plan.values(found.rows, first), plan.values(found.rows, second)
     print(f"\n{case.problem}: {first} against {second}, {found.message}")
     for k in (0, -1):
         print(f"  end: {second} {paid[k]:.9g}, {first} {sought[k]:.9g}")
     for change in found.changes:
-        print(f"  {change['kind']} at {second} {change['at']:.9g}: {', '.join(change['limits'])}")
+        limits = ", ".join(side.text for side in change.limits)
+        print(f"  {change.kind} at {second} {change.at:.9g}: {limits}")
     for value, expected in case.known.items():
         row = asked_at(trade, found, value)
         reached = plan.value(row, first)
@@ -134,7 +136,7 @@ def told(case: Case, trade: trade.Trade, found: trade.Front, spent: float) -> No
     print(f" (asked: {case.least:g}); median {sorted(row.seconds for row in between)[len(between) // 2]:.3f} s a point")
 
 
-def asked_at(trade: trade.Trade, found: trade.Front, value: float) -> Row:
+def asked_at(trade: trade.Trade, found: Findings, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
@@ -146,7 +148,7 @@ def trade_value(trade: trade.Trade, row: Row) -> float:
     return plan.value(row, trade.axes[1])
 
 
-def searched(trade: trade.Trade, found: trade.Front) -> None:
+def searched(trade: trade.Trade, found: Findings) -> None:
     """Print which of every third point a search from scratch is better at, and which it is worse at."""
     better, worse, count = [], [], 0
     sought = trade.solver.axes[0]

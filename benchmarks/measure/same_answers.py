@@ -135,7 +135,6 @@ def name_of(asked: Case) -> str:
 def answered(asked: Case) -> Case:
     """Return what is compared of a case's answer."""
     import loomopt as lo
-    from loomopt.base.errors import BadInput
 
     try:
         scene = lo.load(asked["scene"])
@@ -144,7 +143,7 @@ def answered(asked: Case) -> Case:
         scene = scene.update(asked["set"])
         scene = scene.free(asked["free"]) if asked["free"] else scene
         answer = lo.solve(scene, asked["target"], **asked["options"])
-    except BadInput as error:
+    except lo.BadInput as error:
         return {"status": "refused", "message": str(error)}
     objectives = program_of(scene, asked["target"]).objectives
     found = answer.as_dict()
@@ -164,13 +163,9 @@ def answered(asked: Case) -> Case:
 
 
 def program_of(scene: Any, target: str) -> Any:
-    """Return the program of a target; a checkout of before the registry of jobs kept them in a table."""
-    try:
-        from loomopt.jobs import registry
-    except ImportError:
-        from loomopt.jobs.tasks import TASKS
+    """Return the program of a target."""
+    from loomopt.jobs import registry
 
-        return TASKS[scene.job.name].program(scene, target)
     return registry.of(scene).program(scene, target)
 
 

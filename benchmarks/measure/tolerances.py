@@ -17,7 +17,7 @@ from unittest import mock
 
 from benchmarks import harness
 from loomopt.jobs import registry
-from loomopt.model import reading
+from loomopt.model import reading, session
 from loomopt.model.program import Program
 from loomopt.solving.nlp import exchange, transcribe
 from loomopt.solving.nlp.point import PENALTY, Settings, sampler_at
@@ -63,7 +63,7 @@ def tasks() -> Iterator[tuple[Program, ...]]:
 
 def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
     """Return what all solves lead to."""
-    transcribe._cache.clear()
+    session.current().forget(transcribe.NLPS)
     found: list[tuple[float, ...] | None] = []
     excess, iterations, left = 0.0, 0, 0
     for first, *others in programs:

@@ -20,6 +20,7 @@ import loomopt as lo
 from benchmarks import harness
 from benchmarks.peers import balance_rivals as peers
 from loomopt.jobs import registry
+from loomopt.model import session
 from loomopt.solving.nlp import exchange, transcribe
 from loomopt.solving.nlp.point import Settings
 from reference import balance as plain
@@ -96,13 +97,13 @@ class Loomopt:
             program = JOB.program(given, "balance")
             point = exchange.solve(program, {}, Settings(), point)
             took.append(time.perf_counter() - began)
-            claimed = point.raw["extra"][-1] * program.objectives[-1].scale
+            claimed = point.extra[-1] * program.objectives[-1].scale
             designs[M0] = plain_design(JOB.design(program, point.x)), claimed
         return took, designs
 
     def build(self):
         """Solve once with nothing built, then once more."""
-        transcribe._cache.clear()
+        session.current().forget(transcribe.NLPS)
         first, self.cold = lo.solve(scene(SINGLE)), lo.solve(scene(SINGLE))
         self.times["first"].append(first.time["build_s"] + first.time["solve_s"])
         self.times["cold"].append(self.cold.time["solve_s"])

@@ -20,9 +20,10 @@ import loomopt as lo
 from benchmarks import harness
 from benchmarks.measure.fronts import asked_at
 from benchmarks.peers.front_rivals import Rival, Spot, beatup, rapier, shedding
-from loomopt.studies.front import front, trade
+from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import executors, run
+from loomopt.studies.run.findings import Findings
 from loomopt.studies.run.rows import Row, Task
 
 LONGER = 10.0
@@ -95,9 +96,9 @@ def _judged(rival: Rival, designs: Sequence[np.ndarray]) -> list[Spot]:
     return [spot for design in designs if (spot := rival.judge(design))]
 
 
-def _asked(trade: trade.Trade, found: trade.Front, second: float) -> Row | None:
+def _asked(trade: trade.Trade, found: Findings, second: float) -> Row | None:
     """Return the front's design at a place; None beside the front."""
-    paid = found.values(trade.axes[1])
+    paid = plan.values(found.rows, trade.axes[1])
     row = asked_at(trade, found, second) if min(paid) < second < max(paid) else None
     return row if row and row.certified else None
 

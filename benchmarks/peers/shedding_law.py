@@ -27,6 +27,7 @@ import numpy as np
 
 import loomopt as lo
 from benchmarks import harness
+from loomopt.model import session
 from loomopt.solving.nlp import transcribe
 from reference import shedding as plain
 
@@ -158,7 +159,7 @@ def beside(name, n, repeats):
     for _ in range(repeats):
         (solver, asked, unit), built = clocked(lambda: by_hand(SCENES[name], n))
         said, solved = clocked(lambda: solver(**asked))  # noqa: B023
-        transcribe._cache.clear()
+        session.current().forget(transcribe.NLPS)
         answer, own = clocked(lambda: lo.solve(scene, "law"))
         for part, seconds in zip(taken.values(), (built, solved, own), strict=True):
             part.append(seconds)

@@ -23,7 +23,7 @@ LEAST_GAP, MOST_GAP = 1e-6, 0.5
 """Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
 
 
-class Everywhere(NamedTuple):
+class GlobalProof(NamedTuple):
     """That an answer be proven best of all admissible designs; say: is told how far the proof has come.
 
     gap: relative, what is left open; seconds: how long it may take.
@@ -34,7 +34,16 @@ class Everywhere(NamedTuple):
     say: Callable[[str], None] = lambda text: None
 
 
-def check_everywhere(asked: Everywhere | None) -> None:
+def check(
+    scene: Scene, accuracy: float, starts: int | None, seed: int, global_proof: GlobalProof | None = None
+) -> None:
+    """Raise BadInput for a scene that cannot be solved, or options outside what can be kept."""
+    check_sought(scene)
+    check_numbers(accuracy, starts, seed)
+    check_global_proof(global_proof)
+
+
+def check_global_proof(asked: GlobalProof | None) -> None:
     """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
     if asked is None:
         return

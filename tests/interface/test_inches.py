@@ -132,8 +132,8 @@ def test_show_and_evaluate_differ_in_units_only(name):
     assert evaluated[0].as_dict() == evaluated[1].as_dict()
     told = [masked(answers.evaluation(found, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
     assert told[0] == told[1]
-    curves = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
-    assert curves[0].count("U") == curves[1].count("U") > 2
+    drawn = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
+    assert drawn[0].count("U") == drawn[1].count("U") > 2
     shown = [parts(scene) for scene in scenes]
     own, inches = ([part for part in parts if isinstance(part, layout.Grid)] for parts in shown)
     numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (own, inches)]

@@ -13,7 +13,7 @@ from support import inch
 
 import loomopt as lo
 from loomopt.interface.cli.app import run
-from loomopt.interface.figures.figure import ShownFigure
+from loomopt.interface.figures.shown_figure import ShownFigure
 
 PNG = b"\x89PNG"
 

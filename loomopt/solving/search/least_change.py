@@ -14,14 +14,13 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.model import Instant, JobModel, Row
-from loomopt.model.numbers import LEAST_CHANGE
-from loomopt.model.program import Objective, Program, Variable
+from loomopt.model.program import LEAST_CHANGE, Objective, Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
-from loomopt.solving.search.settle import unchanging, wished
+from loomopt.solving.search.tie_break import unchanging, wished
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by

@@ -21,7 +21,7 @@ from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, Settings, sampler_at
-from loomopt.solving.search.settle import settle
+from loomopt.solving.search import tie_break
 
 MOST_ALIKE = 4
 """Points of one optimum that are put to the certificate where the first does not pass."""
@@ -225,7 +225,7 @@ def _settled(
     """
     job, program, began = search.job, search.program, time.perf_counter()
     search.settings.at("certifying")
-    settled, said = settle(program, job.tidy(program, x))
+    settled, said = tie_break.moved(program, job.tidy(program, x))
     at, there = time.perf_counter(), exact(search, settled)
     shown = len(program.objectives) - 1 if there == known else 0
     certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=said)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from loomopt.solving.nlp.structure import Layout
+from loomopt.solving.nlp.layout import Layout
 
 
 def test_layout_gives_back_what_was_written():
@@ -17,3 +17,7 @@ def test_layout_gives_back_what_was_written():
     assert layout.read(vector, "one") == [9]
     assert layout.read(vector, "pair") == [7, 8]
     assert layout.rows(vector, "grid") == [[1, 2, 3], [4, 5, 6]]
+    assert layout.part(range(9), "pair") == range(7, 9)
+    assert layout.before(vector, "pair").tolist() == [9, 1, 2, 3, 4, 5, 6]
+    layout.array(vector, "grid")[1, :2] = 0
+    assert vector.tolist() == [9, 1, 2, 3, 0, 0, 6, 7, 8]

@@ -40,7 +40,7 @@ def test_what_lacks_something_stays_out_and_displaces_nothing():
     assert found.out == {"lost": "it needs the effect nowhere", "leaning": "it needs the effect push"}
     scene = made_up.scene(blind=1)
     document = {**scene.document, "mechanism": {k: v for k, v in scene.document["mechanism"].items() if k != "m4"}}
-    bare = made_up.scenes.build(document, made_up.Jobs(), "beatup.toml")
+    bare = made_up.build(document, made_up.Jobs(), "beatup.toml")
     assert study.combined(study.known(bare), bare).out == {"blind": "it needs mechanism.m4"}
 
 

@@ -21,14 +21,14 @@ BEYOND = 1e-3
 """Share of a variable by which a flat move is tried beyond the design too: a bump at both ends of it would show."""
 
 
-SETTLE_BISECTIONS, SETTLE_NODES = 60, 64
+BISECTIONS, NODES = 60, 64
 """Halvings of a silent level's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
 
 
 Numbers = Mapping[str, float]
 
 
-def settle(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ...]]:
+def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return x (SI) after the silent levels, and what they settled."""
     settled = []
     for move in program.moves:
@@ -37,8 +37,8 @@ def settle(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, .
         if wish is None or not goal or not is_flat(program, x, goal):
             continue
         share = _reach(program, x, goal)
-        moved = [share * abs(goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in goal]
-        if max(moved, default=0.0) > MOVED:
+        sizes = [share * abs(goal[v.name] - x[v.name]) / v.scale for v in program.variables if v.name in goal]
+        if max(sizes, default=0.0) > MOVED:
             settled.append(f"{move.name}: {wish.reason}")
         x = _part_way(x, goal, share)
     return dict(x), tuple(settled)
@@ -151,7 +151,7 @@ def is_flat(program: Program, x: Numbers, *goals: Numbers) -> bool:
 def _objectives(program: Program, x: Numbers) -> Floats:
     """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
     sampler = sampled(program.model, {**program.parameters, **x})
-    pieces, u = sampler.grid(SETTLE_NODES)
+    pieces, u = sampler.grid(NODES)
     parts = []
     for objective in program.objectives:
         if objective.form == "peak":
@@ -172,7 +172,7 @@ def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
     if holds(1.0):
         return 1.0
     low, high = 0.0, 1.0
-    for _ in range(SETTLE_BISECTIONS):
+    for _ in range(BISECTIONS):
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
