@@ -235,8 +235,8 @@ class Job(abc.ABC):
         """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending."""
         return numbers.sizes(scene)
 
-    def explain(self, scene: Scene, clash: Sequence[str]) -> str:
-        """Return what physics says of why the limits `clash` (phrases) do; "" where it says nothing."""
+    def explain(self, scene: Scene, clash: Collection[str]) -> str:
+        """Return what physics says of why the limits named `clash` do; "" where it says nothing."""
         return numbers.explained(scene, self.numbers(scene), clash)
 
 

@@ -254,8 +254,8 @@ def sizes(scene: Scene) -> dict[str, Sequence[float]]:
     return found
 
 
-def explained(scene: Scene, known: Mapping[str, float], clash: Sequence[str]) -> str:
-    """Return what the effects that are on say of why limits (phrases) clash; "" where they say nothing."""
+def explained(scene: Scene, known: Mapping[str, float], clash: Collection[str]) -> str:
+    """Return what the effects that are on say of why limits, by name, clash; "" where they say nothing."""
     limited = bounds(scene, known)
     on = zip(scene.active, scene.effects.values(), strict=True)
     told = [effect.explain(known, limited, own, clash, scene.show) for effect, own in on if isinstance(effect, Check)]

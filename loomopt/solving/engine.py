@@ -237,7 +237,7 @@ def _without(scene: Scene, target: str, search: "Search", clash: Clash) -> Solut
     today = functools.partial(_evaluated, scene, job, target, {})
     design = job.design(program, clash.x) if clash.x else job.today(scene)
     here = report.evaluation(scene, job, program, design)
-    return report.without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
+    return report.without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits.values()))
 
 
 def _with(scene: Scene, target: str, search: "Search", best: "Judged") -> Solution:

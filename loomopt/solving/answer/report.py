@@ -162,7 +162,7 @@ def without_optimum(
         status="infeasible" if found.relaxations else "failed",
         message=message,
         relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
-        clash=found.limits,
+        clash=tuple(found.limits),
         explanation=explanation if found.relaxations else "",
         solver=solver,
         today=today,

@@ -69,8 +69,8 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     return needs if len(needs) == 1 else None
 
 
-def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
-    """Return the limits with a price in the least relaxation: without any of them it would be less."""
+def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
+    """Return the limits, phrase → name, with a price in the least relaxation: without any of them it would be less."""
     rows = [limit for limit in program.limits if limit.family != "cycle"]
     cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
     prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
@@ -78,7 +78,7 @@ def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     of = [*rows, *(cycles[k] for k in owners(program, families(program, elastic=True), rest))] if len(prices) else []
     priced = zip(of, prices, strict=True)
     told = (each for each, price in priced if price > PRICED and each.name in program.told)
-    return tuple(dict.fromkeys(map(words.limit, told)))
+    return {words.limit(each): each.name for each in told}
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:
