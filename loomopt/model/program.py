@@ -137,6 +137,9 @@ class Objective:
         return self.form == "value" and len(self.groups) == len(self.rows)
 
 
+LEAST_CHANGE = "least change from today"
+
+
 class Wish(NamedTuple):
     """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
 

@@ -1,5 +1,6 @@
 """How a job shows itself: what its own views return, and views/ renders."""
 
+import abc
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,7 +24,7 @@ Marks = Mapping[str, float | Span]
 """Name → a crank angle, rad, or a stretch of the cycle."""
 
 
-class JobViews:
+class JobViews(abc.ABC):
     """A job's own views; a design, SI, may name only some numbers, the others are today's.
 
     angle: what phi is; lists: part of a design that is a list → what its numbers are, "{count}" for how many.
@@ -32,21 +33,21 @@ class JobViews:
     angle: str = "crank angle"
     lists: Mapping[str, str] = {}
 
+    @abc.abstractmethod
     def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
         """Return the mechanism drawn at full scale in the positions that matter. Raises BadInput."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
         """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def marks(self, scene: "Scene", design: Numbers) -> Marks:
         """Return the crank angles and stretches of the cycle a reader looks for."""
-        raise NotImplementedError
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""

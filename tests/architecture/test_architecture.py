@@ -22,7 +22,7 @@ FACE = ("__init__", "__main__")
 FLOOR = {name: floor for floor, name in enumerate((*ROOMS, *FACE))}
 MOST_ENTRIES = 14
 """Files and folders that a reader finds in the package."""
-IN_A_JOB = {"__init__", "job", "scene", "model", "program", "design", "equations", "drawing", "views"}
+IN_A_JOB = {"__init__", "scene", "model", "program", "job", "views", "drawing", "equations"}
 """The files that every job's folder has, beside template.toml."""
 WITHOUT_TYPES = {
     *("solving.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),
@@ -200,6 +200,57 @@ def test_rows_are_read_in_one_place_and_names_are_never_parted():
             assert ".residual(" not in source, name
         if room(name) in {"model", "jobs", "solving", "studies", "interface"}:
             assert not re.search(r"r?(partition|split)\(\"\.\"", source), name
+
+
+VECTORS = {"g", "lam_g", "lbg", "ubg", "lam_x", "lbx", "ubx"}
+"""What an NLP's rows, its variables, their bounds and multipliers are called."""
+SEE_ROWS = ("solving.nlp.", "solving.search.", "solving.engine", "studies.")
+"""Folders and files that meet an NLP; certificates and proofs do without."""
+ORDERED_IN = {"solving.nlp.rows"}
+"""The file that knows their order."""
+
+
+def counted(source):
+    """Return the lines where a place in an NLP's rows or variables is counted: by an index, slice or new shape."""
+
+    def is_vector(node):
+        if isinstance(node, ast.Subscript):
+            return isinstance(node.slice, ast.Constant) and node.slice.value in VECTORS
+        return getattr(node, "attr", getattr(node, "id", "")) in VECTORS
+
+    lines = []
+    for node in ast.walk(tree_of(source)):
+        if isinstance(node, ast.Subscript):
+            lines += [node.lineno] if is_vector(node.value) else []
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            parted = node.func.attr in {"reshape", "split"} and any(map(is_vector, [node.func.value, *node.args]))
+            lines += [node.lineno] if parted else []
+    return lines
+
+
+def test_the_order_of_an_nlps_rows_and_variables_is_known_in_one_file():
+    files = {name: path for name, path in modules().items() if name.startswith(SEE_ROWS) and name not in ORDERED_IN}
+    found_ = {name: counted(path.read_text(encoding="utf-8")) for name, path in files.items()}
+    assert {name: lines for name, lines in found_.items() if lines} == {}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "point.multipliers.lam_g[-len(nodes) * slots :]",
+        "raw['lam_g'][:first]",
+        "lam_x[k]",
+        "lam_g.reshape(2, 3)",
+        "np.split(lam_g, [3])",
+        "arguments['ubg'][3:] = 1.0",
+    ],
+)
+def test_a_place_that_is_counted_is_found(source):
+    assert counted(source) == [1]
+
+
+def test_rows_that_are_read_by_name_are_allowed():
+    assert counted("rows.at_nodes(lam_g)[:2] = arguments['ubg']; np.all(values <= arguments['ubg'] + 1)") == []
 
 
 def anything(path):

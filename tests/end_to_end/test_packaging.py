@@ -13,6 +13,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 import loomopt
 from loomopt.base.errors import BadInput
@@ -23,7 +26,8 @@ from loomopt.scenes import packaged
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXPECTED = {
-    *(".ci", ".gitignore", "CHANGELOG.md", "LICENSE", "Makefile", "README.md", "pyproject.toml"),
+    *(".ci", ".github", ".gitignore", ".pre-commit-config.yaml", "Makefile", "pyproject.toml", "requirements.lock"),
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md"),
     *("benchmarks", "docs", "loomopt", "notebooks", "problems", "results", "tests"),
 }
 
@@ -79,8 +83,33 @@ def test_the_project_says_what_the_package_is():
     assert project["requires-python"] == ">=3.11"
     assert {"test", "notebook", "dask"} <= set(project["optional-dependencies"])
     included = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
-    assert included == {"problems": "loomopt/problems", "results": "loomopt/interface/results"}
+    assert included == {"problems": "loomopt/problems", "results": "loomopt/results"}
     assert (ROOT / "LICENSE").is_file()
+
+
+def test_the_citation_is_of_this_version():
+    said = dict(re.findall(r"^([\w-]+): +(.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE))
+    assert said["cff-version"] == "1.2.0"
+    assert (said["title"], said["version"], said["license"]) == ("loomopt", loomopt.__version__, "MIT")
+
+
+def test_what_is_handed_over_as_source_is_there():
+    included = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert [name for name in included if not (ROOT / name.strip("/")).exists()] == []
+    left_out = {".ci", ".github", ".gitignore", ".pre-commit-config.yaml", "pyproject.toml"}
+    assert {name.strip("/") for name in included} == EXPECTED - left_out
+
+
+def test_the_lock_pins_every_dependency_and_nothing_but_versions():
+    lines = (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    pinned = dict(line.split("==") for line in lines)
+    assert [line for line in lines if not re.fullmatch(r"[A-Za-z0-9._-]+==[0-9][0-9a-z.]*", line)] == []
+    locked = {canonicalize_name(name): Version(version) for name, version in pinned.items()}
+    wanted = [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["test"]]
+    for requirement in map(Requirement, wanted):
+        version = locked[canonicalize_name(requirement.name)]
+        assert requirement.specifier.contains(version), requirement
+    assert "loomopt" not in locked
 
 
 def imported(tree):

@@ -9,7 +9,6 @@ import dataclasses
 import math
 
 import pytest
-from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.interface.text import glossary
@@ -20,6 +19,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 from loomopt.picture.job_views import Span
+from reference import crank_rocker_synthesis
 
 ROWS = {row.key: row._asdict() for row in glossary.read("rapier").figures}
 RAPIER = lo.load("rapier")

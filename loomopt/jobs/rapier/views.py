@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.rapier.design import read
+from loomopt.jobs.rapier.model import read
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.cycle import TURN
 from loomopt.picture.job_views import JobViews, Marks, Span

@@ -16,6 +16,7 @@ from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.solving.nlp.lifted import Lifts, Options, chosen, identity
+from loomopt.solving.nlp.rows import SIGNS
 from loomopt.solving.nlp.stations import Family, followed
 from loomopt.solving.nlp.structure import NodeParameters, Structure
 
@@ -140,10 +141,10 @@ def expressions(structure: Structure) -> Expressions:
     import casadi as ca
 
     scaled = ca.SX.sym("x", len(structure.program.variables))
-    extra = ca.SX.sym("t", structure.extras)
+    extra = ca.SX.sym("t", structure.rows.extras)
     p = ca.SX.sym("p", structure.layout.size)
     built = _Built(structure, scaled, extra, p)
-    rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
+    rows = structure.rows.stacked(built.limits(), built.pieces(), built.held(), built.cycle())
     return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
 
@@ -195,7 +196,8 @@ class _Built:
     def __init__(self, structure: Structure, scaled: Any, extra: Any, column: Any) -> None:
         import casadi as ca
 
-        program, layout, vector = structure.program, structure.layout, ca.vertsplit(column[: structure.layout.nodes])
+        program, layout = structure.program, structure.layout
+        vector = ca.vertsplit(layout.before(column, "nodes"))
         self.structure, self.program, self.extra = structure, program, ca.vertsplit(extra)
         self.vector, self.column = vector, column
         self.lifts = Lifts(ca.vertcat(scaled, extra))
@@ -236,7 +238,7 @@ class _Built:
         """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
         import casadi as ca
 
-        limits, static = self.program.limits, self.structure.static
+        limits, static = self.program.limits, self.structure.rows.limits
         self.rows.read([limits[k].row for k in static])
         columns = [
             (self.rows.excess(limits[k], self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
@@ -251,9 +253,8 @@ class _Built:
         found = []
         for t, epigraph in zip(self.extra, self.structure.epigraphs, strict=not self.structure.elastic):
             form = self.program.objectives[epigraph.objective].form
-            signs = {"magnitude": (1, -1), "value": (1,), "peak": ()}[form]
             scale = self.scales[epigraph.objective]
-            found += [sign * self.rows.single(row) / scale - t for row in epigraph.rows for sign in signs]
+            found += [sign * self.rows.single(row) / scale - t for row in epigraph.rows for sign in SIGNS[form]]
         return found
 
     def held(self) -> list[Any]:

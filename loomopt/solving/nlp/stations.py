@@ -108,13 +108,6 @@ def held(switches: Sequence[Values], family: Family) -> list[int]:
     return [k for k, switch in enumerate(switches) if family.counts(switch)]
 
 
-def owners(program: Program, families: Sequence[Family], rows: int) -> list[int]:
-    """Return the place of the family that each of so many whole-cycle rows is of: rows of stations, then slots."""
-    switches = station_switches(program.model, [variable.name for variable in program.variables])
-    first = [k for k, family in enumerate(families) for _ in held(switches, family)]
-    return first + [k for k in range(len(families)) for _ in range((rows - len(first)) // len(families))]
-
-
 class Stood:
     """Stations in a cycle, each on the piece whose switches of the motion's arcs are its own."""
 

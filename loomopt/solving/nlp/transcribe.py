@@ -1,6 +1,5 @@
 """From a program's structure to one parametric NLP: built once, solved for any numbers."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
@@ -73,8 +72,8 @@ def graph_size(program: Program, x: Mapping[str, float]) -> int | None:
     return int(ca.n_nodes(ca.vertcat(made.f, made.g)))
 
 
-CACHE_SIZE = 32
-"""NLPs that are kept; a study of many scenes meets no more structures at a time."""
+NLPS, CACHE_SIZE = "NLPs", 32
+"""What a session calls built NLPs, and how many it keeps; a study of many scenes meets no more structures at a time."""
 
 
 class Transcription:
@@ -84,11 +83,10 @@ class Transcription:
     """
 
     def __init__(self, made_of: Structure) -> None:
-        self.structure, self.slots = made_of, made_of.slots
+        self.structure, self.rows = made_of, made_of.rows
         written = expressions(made_of)
         self.nlp = {"x": written.x, "p": written.p, "f": written.f, "g": written.g}
-        self.rows = int(written.g.numel())
-        self._eliminated = Elimination(written) if written.lifts.defined else None
+        self._eliminated = Elimination(written, self.rows) if written.lifts.defined else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
         if self._eliminated:
@@ -135,9 +133,6 @@ class Transcription:
         return self._eliminated.curvature if self._eliminated else self._derivatives["hess_lag"]
 
 
-_cache: OrderedDict[Hashable, Transcription] = OrderedDict()
-
-
 def transcribe(
     program: Program,
     sampler: Sampler,
@@ -147,12 +142,11 @@ def transcribe(
 ) -> tuple[Transcription, bool]:
     """Return the NLP of a program's structure, and whether it had to be built; before: called where it has to be."""
     wanted = structure(program, sampler, slots, elastic)
-    if wanted.key in _cache:
-        _cache.move_to_end(wanted.key)
-        return _cache[wanted.key], False
-    if before:
-        before()
-    _cache[wanted.key] = Transcription(wanted)
-    if len(_cache) > CACHE_SIZE:
-        _cache.popitem(last=False)
-    return _cache[wanted.key], True
+
+    def built() -> Transcription:
+        if before:
+            before()
+        return Transcription(wanted)
+
+    nlp = sampler.session.kept(NLPS, CACHE_SIZE, wanted.key, built)
+    return nlp, nlp.structure is wanted

@@ -18,6 +18,7 @@ from loomopt.jobs.base import Job
 from loomopt.model import model
 from loomopt.model.program import Limit, Program
 from loomopt.model.sampling import Sampler
+from loomopt.model.session import working
 from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
@@ -31,6 +32,7 @@ RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""
 
 
+@working()
 def prove(
     scene: Scene,
     design: Mapping[str, float],

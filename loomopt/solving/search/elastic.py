@@ -16,7 +16,8 @@ from loomopt.solving.answer.solution import Clash
 from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
-from loomopt.solving.nlp.stations import families, owners
+from loomopt.solving.nlp.stations import families
+from loomopt.solving.search.search import Search
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
@@ -34,12 +35,14 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     return best
 
 
-def clash(program: Program, nearest: Point, settings: Settings, words: Words) -> Clash:
-    """Return the limits that clash and the least relaxations that make a design possible.
+def clash(search: Search, words: Words) -> Clash:
+    """Return the limits that clash and the least relaxations that make a design possible; none where one was reached.
 
-    nearest: where the sum of all excesses is least. First that sum's limits; then each other limit by itself, where
-    that suffices.
+    First the limits of the least sum of all excesses; then each other limit by itself, where that suffices.
     """
+    program, nearest, settings = search.program, search.nearest, search.settings
+    if search.best or nearest is None or not nearest.relaxed:
+        return Clash()
     needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
@@ -71,14 +74,14 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
 
 def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
     """Return the limits, phrase → name, with a price in the least relaxation: without any of them it would be less."""
-    rows = [limit for limit in program.limits if limit.family != "cycle"]
-    cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
-    prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
-    rest = len(prices) - len(rows) if cycles else 0
-    of = [*rows, *(cycles[k] for k in owners(program, families(program, elastic=True), rest))] if len(prices) else []
-    priced = zip(of, prices, strict=True)
-    told = (each for each, price in priced if price > PRICED and each.name in program.told)
-    return {words.limit(each): each.name for each in told}
+    prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
+    if not prices:
+        return {}
+    found = list(prices.of_limits.items())
+    for rows in (prices.at_stations, prices.at_nodes):
+        found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
+    priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
+    return {words.limit(limit): limit.name for limit in priced if limit.name in program.told}
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

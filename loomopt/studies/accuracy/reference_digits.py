@@ -3,7 +3,7 @@
 Each whole-cycle value stands on its own extreme, found by Newton's method in these digits.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,42 +101,48 @@ class _Rows:
         self.maths = systems.mpmath(digits)
         self.fixed: dict[str, Number] = {}
         self.number: Callable[[Number], Number] = self.maths.number
-        prices = point.raw["lam_x"]
+        prices = point.multipliers
         self.free = []
-        for k, variable in enumerate(program.variables):
-            end = variable.upper if prices[k] > BINDING else variable.lower if prices[k] < -BINDING else None
+        for variable, price in zip(program.variables, prices.of_variables, strict=True):
+            end = variable.upper if price > BINDING else variable.lower if price < -BINDING else None
             if end is not None or variable.lower == variable.upper:
                 self.fixed[variable.name] = self.number(variable.lower if end is None else end)
             else:
                 self.free.append(variable)
         self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
         self.sampler = Sampler(program.model, {**program.parameters, **x})
-        static = [limit for limit in program.limits if limit.family == "static"]
-        rows = point.raw["lam_g"]
-        self.static = [limit for k, limit in enumerate(static) if limit.sign == 0 or abs(rows[k]) > BINDING]
-        magnitudes = [o for o in program.objectives if o.form == "magnitude"]
-        pairs = np.abs(rows[len(static) : len(static) + 2 * len(magnitudes)]).reshape(-1, 2)
-        self.zero = [o for o, pair in zip(magnitudes, pairs, strict=True) if pair.min() > BINDING]
+        priced = [(program.limits[k], abs(price)) for k, price in prices.of_limits.items()]
+        self.static = [limit for limit, price in priced if limit.sign == 0 or price > BINDING]
         above = epigraphs(program)
+        self.zero = list(self._zero(above))
         self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].form == "peak"]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
-        before = len(static) + sum(2 * len(o.rows) for o in magnitudes)
-        self.binding = self._binding(rows[before:])
+        self.binding = self._binding()
         self.start += [self._top(above[k]) for k in self.tops]
 
-    def _binding(self, prices: Floats) -> list[list[Extreme]]:
-        """Return the nodes that bind of each family, those of rows at corners too; prices: of whole-cycle rows."""
+    def _zero(self, above: Sequence[Epigraph]) -> Iterator[tuple[str, float]]:
+        """Yield rows whose magnitude is an objective and which bind with both signs, and their natural sizes, SI."""
+        for k, epigraph in enumerate(above):
+            objective = self.program.objectives[epigraph.objective]
+            if objective.form == "magnitude":
+                prices = np.abs(self.point.multipliers.of_pieces(k)).min(axis=1)
+                pairs = zip(epigraph.rows, prices, strict=True)
+                yield from ((row, objective.scale) for row, price in pairs if price > BINDING)
+
+    def _binding(self) -> list[list[Extreme]]:
+        """Return the nodes that bind of each family, those of rows at corners too."""
         program, sampler = self.program, self.sampler
         found = [list(of) for of in self.point.binding]
         corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
-        stood, place = Stood(corners, sampler.cycle), 0
-        for family, of in zip(self.families, found, strict=True):
-            signs = stood.signs(sampler, family.row)
-            for k in held([corner.switch for corner in corners], family):
-                if prices[place] > BINDING:
-                    of.append(Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k])))
-                place += 1
+        stood = Stood(corners, sampler.cycle)
+        for family, of, prices in zip(self.families, found, self.point.multipliers.at_stations, strict=True):
+            signs, own = stood.signs(sampler, family.row), held([corner.switch for corner in corners], family)
+            of += [
+                Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k]))
+                for k, price in zip(own, prices, strict=True)
+                if price > BINDING
+            ]
         return found
 
     def _top(self, epigraph: Epigraph) -> Number:
@@ -167,7 +173,7 @@ class _Rows:
         """Return every row: 0 where it is met."""
         exact, number = self.design(unknown), self.number
         found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
-        found += [exact.single(o.row) / number(o.scale) for o in self.zero]
+        found += [exact.single(row) / number(scale) for row, scale in self.zero]
         for family, binding in zip(self.families, self.binding, strict=True):
             bound, scale = self._bound(family, unknown[len(self.free) :])
             for node in binding:

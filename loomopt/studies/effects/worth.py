@@ -11,7 +11,7 @@ from loomopt.jobs import registry
 from loomopt.model.program import Objective, Program
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
+from loomopt.solving.answer import evaluation
 from loomopt.solving.answer.solution import Evaluation, Finding
 from loomopt.studies.run.rows import Row
 
@@ -227,4 +227,4 @@ def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evalua
         for name, value in design.items()
         if scene.full(name) in numbers or designs.in_list(name, scene.schema.lists)
     }
-    return engine.evaluate(scene, own, target)
+    return evaluation.evaluate(scene, own, target)

@@ -12,14 +12,14 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import report
+from loomopt.solving.answer import evaluation
 from loomopt.solving.certificate.active_set import Row as ActiveRow
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import least_change
 from loomopt.solving.search.multistart import searched, spread, tied
-from loomopt.solving.search.search import Judged, Search, judged, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import Touched, sloped
 from loomopt.studies.run import warm
 from loomopt.studies.run.rows import PEAK, Multiplier, Side
@@ -162,14 +162,14 @@ class Solver:
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        here = evaluation.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
         status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
-            "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
+            "point": warm.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
@@ -184,7 +184,7 @@ class Solver:
             told,
         )
 
-    def _held(self, search: Search, best: Judged, asking: Asking) -> str:
+    def _held(self, search: Search, best: Candidate, asking: Asking) -> str:
         """Return why the point does not count, though one may be there: an axis is above its cap; "" where it does."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, asking.caps, strict=True):
@@ -197,7 +197,7 @@ class Solver:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
         return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
 
-    def _multipliers(self, best: Judged, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
+    def _multipliers(self, best: Candidate, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
         sought, paid = self.axes
         found: dict[Multiplier, float] = {}

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from loomopt.base.errors import BadInput
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
+from loomopt.model.session import working
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
 from loomopt.scenes import designs
@@ -224,6 +225,7 @@ class Trade:
         """Return the scene: all designs of the front stand in it."""
         return self.scene
 
+    @working()
     def solve(self, task: Task, parent: Row | None) -> Solution:
         """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()

@@ -25,34 +25,31 @@ def put(lifted, bend, elastic=False):
     sampler = calls.sampler(x)
     nodes = [[e for e in of if 0.0 < e.u < 1.0][:2] for of in calls.peaks(sampler)]
     nlp = calls.transcribed(sampler, nodes, warm=False)
-    extra = np.linspace(0.1, 0.9, nlp.structure.extras)
+    extra = np.linspace(0.1, 0.9, nlp.rows.extras)
     return calls, nlp, calls.arguments(nlp, sampler, x, extra, nodes), nodes
 
 
-def shared(calls, nlp):
+def shared(nlp):
     """Return which rows there are without stations, in both NLPs alike: single rows, and two slots of each family."""
-    first = len(nlp.structure.static)
-    slots = nlp.rows - nlp.slots * len(calls.families)
-    return [*range(first), *(slots + nlp.slots * k + j for k in range(len(calls.families)) for j in (0, 1))]
+    places = np.arange(nlp.rows.size)
+    return [*nlp.rows.of_limits(places), *nlp.rows.at_nodes(places)[:, :2].ravel()]
 
 
 @pytest.mark.parametrize("bend", BENDS)
 @pytest.mark.parametrize("elastic", [False, True])
 def test_rows_and_derivatives_are_those_without_lifted_variables(bend, elastic):
-    (calls, nlp, ours, nodes), (plain_calls, plain, theirs, same) = (
-        put(lifted, bend, elastic) for lifted in (True, False)
-    )
+    (_, nlp, ours, nodes), (_, plain, theirs, same) = (put(lifted, bend, elastic) for lifted in (True, False))
     assert nodes == same
     assert isinstance(nlp.jacobian.__self__, Elimination)
     assert ours["x0"] == pytest.approx(theirs["x0"], abs=0)
     (rows, slopes), (expected, wanted) = nlp.jacobian(ours["x0"], ours["p"]), plain.jacobian(theirs["x0"], theirs["p"])
-    mine, others = shared(calls, nlp), shared(plain_calls, plain)
+    mine, others = shared(nlp), shared(plain)
     assert rows[mine] == pytest.approx(np.asarray(expected).ravel()[others], rel=1e-14, abs=1e-14)
     assert slopes[mine] == pytest.approx(np.asarray(wanted)[others], rel=1e-13, abs=1e-13)
     (value, slope), (least, steepest) = (each.gradient(a["x0"], a["p"]) for each, a in ((nlp, ours), (plain, theirs)))
     assert value == pytest.approx(float(least), rel=1e-14)
     assert slope == pytest.approx(np.asarray(steepest).ravel(), rel=1e-13, abs=1e-13)
-    prices, other = np.zeros(nlp.rows), np.zeros(plain.rows)
+    prices, other = np.zeros(nlp.rows.size), np.zeros(plain.rows.size)
     prices[mine] = other[others] = np.linspace(-1.0, 2.0, len(mine))
     bends = nlp.curvature(ours["x0"], ours["p"], 0.7, prices)
     curved = np.asarray(plain.curvature(theirs["x0"], theirs["p"], 0.7, other))
@@ -65,14 +62,13 @@ def test_rows_and_derivatives_are_those_without_lifted_variables(bend, elastic):
 def test_stations_have_the_rows_of_nodes_at_their_corners(bend):
     calls, nlp, arguments, _ = put(True, bend)
     rows, slopes = nlp.jacobian(arguments["x0"], arguments["p"])
-    first = len(nlp.structure.static)
     sampler = calls.sampler(calls.design(arguments["x0"]))
     raised = [1.25 if 1 <= k <= 6 else 1.0 for k in range(COUNT)]
     heights = np.array([sampler.given.values[f"h{k}"] for k in range(COUNT)])
-    assert rows[first : first + COUNT] == pytest.approx(heights * raised - 1.5, rel=1e-14)
+    assert nlp.rows.at_stations(rows, 0) == pytest.approx(heights * raised - 1.5, rel=1e-14)
     swings = np.abs(heights * raised + sampler.values["x0"] ** 2 / 4)
     assert heights.min() < -0.3 < 0.3 < heights.max()
-    assert rows[first + COUNT : first + 2 * COUNT] == pytest.approx(swings - 2.0, rel=1e-13)
+    assert nlp.rows.at_stations(rows, 1) == pytest.approx(swings - 2.0, rel=1e-13)
     step = 1e-6
     for k in (0, 5):
         ends = [nlp.jacobian(arguments["x0"] + sign * step * np.eye(COUNT)[k], arguments["p"])[0] for sign in (1, -1)]

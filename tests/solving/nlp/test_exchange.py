@@ -202,6 +202,15 @@ def test_where_the_solver_gives_up_the_rows_decide(limits, moved, stands, monkey
     assert point.reached is stands
 
 
+def test_equalities_that_leave_nothing_to_solve_for_are_met_by_a_start_that_stands_on_them():
+    task = program([("x", 0, 0.5), ("y", 0, 0.25), ("sum", 0, 0.75)])
+    start = {"x": 0.5, "y": 0.25}
+    point = exchange.solve(task, start, Settings())
+    assert (point.status, point.reached, point.x) == ("Not_Enough_Degrees_Of_Freedom", True, start)
+    assert exchange.solve(task, {}, Settings(), warm=point).x == start
+    assert not exchange.solve(task, {"x": 0.5, "y": 0.3}, Settings()).reached
+
+
 def test_rounds_that_run_out_leave_a_point_with_its_violation(monkeypatch):
     monkeypatch.setattr(exchange, "EXCHANGE_ROUNDS", 1)
     task = program(limits=(("circle", 1, 1.0),))

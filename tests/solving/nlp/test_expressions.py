@@ -96,7 +96,7 @@ def test_an_elastic_program_has_room_for_every_limit_and_no_objective():
     nlp, arguments, *_ = put(program, elastic=True)
     sides = {(limit.name, limit.sign) for limit in program.limits if limit.relaxable}
     value = ca.Function("f", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])
-    assert nlp.structure.extras == sum(2 if sign == 0 else 1 for _, sign in sides)
+    assert nlp.rows.extras == sum(2 if sign == 0 else 1 for _, sign in sides)
     assert float(value(arguments["x0"], arguments["p"])) >= 0
     assert families(program, elastic=True) == []
 

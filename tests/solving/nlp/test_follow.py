@@ -183,5 +183,5 @@ def test_multipliers_of_bounds_keep_their_signs():
     near, cold = solved(bounded(2.0)), solved(bounded(2.1))
     found = followed(bounded(2.1), near)
     assert found.x == pytest.approx(cold.x, abs=1e-9)
-    assert found.raw["lam_x"] == pytest.approx(cold.raw["lam_x"], abs=1e-6)
-    assert found.raw["lam_x"][1] < -0.1
+    assert found.multipliers.lam_x == pytest.approx(cold.multipliers.lam_x, abs=1e-6)
+    assert found.multipliers.lam_x[1] < -0.1

@@ -7,7 +7,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.solving.nlp import pivot
-from loomopt.solving.nlp.pivot import active_by, reach
+from loomopt.solving.nlp.pivot import reach
+from loomopt.solving.nlp.rows import binding
 
 WIDE = 10.0
 
@@ -30,7 +31,7 @@ def call(start, lower=-WIDE, upper=WIDE, rows=0):
 def bound(rows, upper=(), lower=()):
     """Return which limits bind: rows by flag, bounds by variable."""
     lam_x = np.array([(k in upper) - 1.0 * (k in lower) for k in range(2)])
-    return active_by(lam_x, np.array(rows, float), 0.5)
+    return binding(lam_x, np.array(rows, float))
 
 
 @pytest.mark.parametrize(
@@ -105,7 +106,8 @@ def bound(rows, upper=(), lower=()):
 def test_pivots_reach_the_optimum(case, nlp, arguments, first, expected):
     found = reach(nlp, arguments, first, farthest=5.0)
     assert found.x == pytest.approx(expected, abs=1e-14)
-    assert found.multipliers.min() >= -1e-9
+    assert found.lam_g.min(initial=0.0) >= -1e-9
+    assert np.all(np.where(found.active.at_lower, -1, 1) * found.lam_x >= -1e-9)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +166,7 @@ def test_a_slight_curvature_says_how_far_a_limit_lets_go():
     nlp = curved([-1, 1e-5], [[0, 0], [0, 1e-4]], [[1, 0], [0, 1]], [1.0, 0.0])
     found = reach(nlp, call([1, 0], rows=2), bound([1, 1]), 5.0)
     assert found.x == pytest.approx([1, -0.1], abs=1e-6)
-    assert list(found.active[:2]) == [True, False]
+    assert list(found.active.rows) == [True, False]
 
 
 @pytest.mark.parametrize("slope", [1e-8, -1e-8])
@@ -186,7 +188,7 @@ def test_a_row_broken_by_a_ten_billionth_is_seen():
     nlp = programme([-2, -1], 0, [[1, 0], [0, 1], [1, 1]], [1, 1, 2 - 1e-10])
     found = reach(nlp, call([1, 1], rows=3), bound([1, 1, 0]), 5.0)
     assert found.x == pytest.approx([1, 1 - 1e-10], abs=1e-14)
-    assert list(found.active[:3]) == [True, False, True]
+    assert list(found.active.rows) == [True, False, True]
 
 
 def polygon(sides):
@@ -208,8 +210,9 @@ def test_corner_after_corner_is_taken_to_the_best(sides):
         (np.linalg.solve(rows[[k, (k + 1) % sides]], np.ones(2)) for k in range(sides)), key=lambda x: x @ [1, 2]
     )
     assert found.x == pytest.approx(best, abs=1e-12)
-    assert found.multipliers[:sides] @ rows == pytest.approx([1, 2], abs=1e-12)
-    assert np.count_nonzero(found.multipliers) == 2
+    assert found.lam_g @ rows == pytest.approx([1, 2], abs=1e-12)
+    assert np.count_nonzero(found.lam_g) == 2
+    assert not found.lam_x.any()
 
 
 def test_rows_may_curve_and_prices_are_those_of_the_meeting():
@@ -225,7 +228,7 @@ def test_rows_may_curve_and_prices_are_those_of_the_meeting():
     )
     found = reach(nlp, call([0.7, 0.5], rows=2), bound([1, 1]), 5.0)
     assert found.x == pytest.approx([0.8, 0.6], abs=1e-12)
-    assert found.multipliers[:2] == pytest.approx([1 / 1.6, 1 - 0.6 / 0.8], abs=1e-9)
+    assert found.lam_g == pytest.approx([1 / 1.6, 1 - 0.6 / 0.8], abs=1e-9)
     loose = reach(nlp, call([0.7, 0.5], rows=2), bound([1, 0]), 5.0)
     assert loose.x == pytest.approx([0.8, 0.6], abs=1e-12)
 
@@ -236,8 +239,9 @@ def test_held_variables_stay_active_and_give_way_to_none():
     arguments["lbx"][0] = arguments["ubx"][0] = 1.25
     found = reach(nlp, arguments, bound([1]), 5.0)
     assert found.x == pytest.approx([1.25, 0.25], abs=1e-12)
-    assert list(found.active) == [True, True, False, False, False]
-    assert found.multipliers == pytest.approx([1, 1, 0, 0, 0], abs=1e-12)
+    assert list(map(list, found.active)) == [[True], [False, False], [True, False]]
+    assert found.lam_g == pytest.approx([1], abs=1e-12)
+    assert found.lam_x == pytest.approx([1, 0], abs=1e-12)
 
 
 def test_a_step_along_curvature_is_newton_s(monkeypatch):

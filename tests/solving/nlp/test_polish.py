@@ -8,6 +8,7 @@ import loomopt as lo
 from loomopt.solving.nlp import exchange, polish
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Settings
+from loomopt.solving.nlp.rows import binding
 
 PEAK = (objective("circle", "peak", ("shifted",)),)
 """Two cones of equal height: on the line y = b they cross at x = (10 − 2 b) / 6."""
@@ -19,26 +20,19 @@ def solved(task):
 
 def polished(task, x, extra, point):
     calls = Calls(task, Settings())
-    return polish.polish(calls, x, extra, point, calls.peaks(calls.sampler(x)))
+    return polish.polish(calls, x, extra, point.multipliers, calls.peaks(calls.sampler(x)))
 
 
 def test_a_point_is_polished_onto_what_binds_and_no_farther():
     task = program([("y", -1, 2.0)], PEAK)
     exact = solved(task)
     x = {"x": exact.x["x"] + 1e-9, "y": 2.0 + 3e-9}
-    moved, touching = polished(task, x, exact.raw["extra"] + 2e-9, exact)
+    moved, touching = polished(task, x, exact.extra + 2e-9, exact)
     assert moved["x"] == pytest.approx((10 - 4) / 6, abs=1e-11)
     assert moved["y"] == pytest.approx(2.0, abs=1e-14)
     assert [len(of) > 0 for of in touching] == [True, True]
     far = {"x": exact.x["x"], "y": 2.0 + 1e-3}
-    assert polished(task, far, exact.raw["extra"], exact)[0] == far, "no small step"
-
-
-def test_multipliers_say_what_binds():
-    bound = polish.binding(np.array([2e-6, -2e-6, 1e-7, 0.0]), np.array([2e-6, -2e-6, 5e-7]))
-    assert list(bound.at_upper) == [True, False, False, False]
-    assert list(bound.at_lower) == [False, True, False, False]
-    assert list(bound.rows) == [True, True, False]
+    assert polished(task, far, exact.extra, exact)[0] == far, "no small step"
 
 
 def test_what_clashes_is_left_as_it_is():
@@ -48,9 +42,9 @@ def test_what_clashes_is_left_as_it_is():
     def jacobian(x, p):
         return np.array([x[0] - 1.0, x[0] - 1.0 - 1e-9]), np.ones((2, 1))
 
-    bound = polish.binding(np.zeros(1), np.ones(2))
+    bound = binding(np.zeros(1), np.ones(2))
     assert polish.met(jacobian, arguments, np.array([1.0]), bound) is None
-    alone = polish.binding(np.zeros(1), np.array([1.0, 0.0]))
+    alone = binding(np.zeros(1), np.array([1.0, 0.0]))
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
     assert polish.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
     assert polish.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
@@ -68,7 +62,7 @@ def row(value):
 
 
 def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
-    return polish.met(nlp, arguments, np.array(x), polish.binding(np.array(lam_x), np.array(lam_g)))
+    return polish.met(nlp, arguments, np.array(x), binding(np.array(lam_x), np.array(lam_g)))
 
 
 def test_what_binds_at_its_bound_is_put_on_it():
@@ -96,13 +90,6 @@ def test_rounding_beyond_a_row_passes_and_more_is_refused():
         (-1.1e-12, equal, False),
     ):
         assert (holds(row(value), arguments, (0.5, 0.5)) is not None) is passes
-
-
-def test_only_a_multiplier_above_the_threshold_binds():
-    bound = polish.binding(np.array([1e-6, -1e-6]), np.array([1e-6, 1.1e-6]))
-    assert list(bound.rows) == [False, True]
-    assert not bound.at_upper.any()
-    assert not bound.at_lower.any()
 
 
 def test_idle_rows_are_no_rows():

@@ -10,7 +10,7 @@ from loomopt.physics.cycle import TURN
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Settings, sampler_at
-from loomopt.solving.nlp.stations import Family, Stood, families, held, owners, stations
+from loomopt.solving.nlp.stations import Family, Stood, held, stations
 from loomopt.solving.nlp.structure import structure
 
 
@@ -90,14 +90,12 @@ def test_families_of_part_of_the_turn_have_rows_there_only():
 
 
 @pytest.mark.parametrize("where", [None, ("step", 2.0)])
-def test_every_whole_cycle_row_has_its_family(where):
+def test_every_station_that_a_family_is_asked_for_has_a_row(where):
     task = program(limits=(("wave", 1, 1.0), ("swing", 1, 2.0)), where=where)
-    own, count = families(task), COUNT if where is None else 1
-    sampler = sampler_at(task, task.starts[0])
-    built = structure(task, sampler, 2)
+    built = structure(task, sampler_at(task, task.starts[0]), 2)
+    count = COUNT if where is None else 1
     assert [len(places) for places in built.held] == [count, count]
-    assert owners(task, own, 2 * count + 2 * 2) == [0] * count + [1] * count + [0, 0, 1, 1]
-    assert owners(program(lifted=False), own, 12) == [0] * 6 + [1] * 6
+    assert built.rows.stations == (count, count)
 
 
 def test_nodes_are_for_what_no_station_holds():

@@ -141,6 +141,6 @@ def test_what_may_give_way_has_an_excess_and_a_row_of_its_own():
     task = program([("sum", 1, 1.0), ("sum", -1, 0.0), ("wave", 1, 3.0)], (objective("circle", "peak"),))
     sampler = Sampler(task.model, {"x": 1.0, "y": 0.5})
     plain, elastic = structure(task, sampler, 6), structure(task, sampler, 6, elastic=True)
-    assert (plain.extras, elastic.extras) == (1, 3)
+    assert (plain.rows.extras, elastic.rows.extras) == (1, 3)
     assert (plain.ways, elastic.ways) == ({}, {0: (0,), 1: (1,), 2: (2,)})
-    assert plain.static == elastic.static == [0, 1]
+    assert plain.rows.limits == elastic.rows.limits == (0, 1)

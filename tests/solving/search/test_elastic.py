@@ -11,6 +11,7 @@ from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic
 from loomopt.solving.search.elastic import clash, least
+from loomopt.solving.search.search import Search
 
 ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
 
@@ -18,7 +19,7 @@ ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"]
 def found(limits, sizes=None, waves=None):
     program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
     words = Words(toy.scene_of(toy.ToyJob(program)))
-    return clash(program, least(program, [program.starts[0]], Settings()), Settings(), words)
+    return clash(Search(None, program, Settings(), nearest=least(program, [program.starts[0]], Settings())), words)
 
 
 def told(answer):

@@ -9,6 +9,7 @@ from loomopt.jobs import registry
 from loomopt.physics.tolerances import NEEDED, PRICED
 from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.rows import Multipliers, row_map
 from loomopt.solving.nlp.stations import families
 from loomopt.solving.search import elastic
 
@@ -21,8 +22,14 @@ def program(limits=LIMITS):
 
 
 def priced(made, prices):
-    point = Point({}, "", True, raw={"lam_g": np.array(prices)} if prices else {})
-    return tuple(elastic._priced(made, point, Words(toy.scene_of(toy.ToyJob(made)))))
+    return tuple(elastic._priced(made, point_of(made, prices), Words(toy.scene_of(toy.ToyJob(made)))))
+
+
+def point_of(made, prices):
+    """Return a point with these multipliers of rows, in their order; without any where there are none."""
+    rows = row_map(made, 0, elastic=True).sized(len(prices))
+    lam_x = np.zeros(rows.variables + rows.extras)
+    return Point({}, "", True, multipliers=Multipliers(rows, lam_x, np.array(prices)) if len(prices) else Multipliers())
 
 
 def test_single_values_come_first_and_each_whole_cycle_limit_has_a_row_per_slot():
@@ -53,8 +60,8 @@ def test_rows_at_corners_are_priced_with_their_limit():
     for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
         prices = np.zeros(len(single) + 2 * 22 + 2 * 2)
         prices[len(single) + place] = 1.0
-        point = Point({}, "", True, raw={"lam_g": prices})
-        assert elastic._priced(made, point, Words(scene)) == ({"N_min >= 100 N": "N_min"} if named else {}), place
+        found = elastic._priced(made, point_of(made, prices), Words(scene))
+        assert found == ({"N_min >= 100 N": "N_min"} if named else {}), place
 
 
 def test_without_multipliers_nothing_has_a_price():
