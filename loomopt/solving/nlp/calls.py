@@ -152,7 +152,7 @@ class Calls:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.ways:
             beside = self.ways.beside
-            return np.array(beside.excesses) if beside else np.ones(nlp.rows.extras)
+            return beside.extra if beside else np.ones(nlp.rows.extras)
         first = np.array([self._worst(k, sampler, peaks) for k in range(len(self.epigraphs))])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)

@@ -27,7 +27,7 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     """
     best = None
     for start in starts:
-        known = Known(best.binding, sum(best.excesses) - NEEDED) if best else Known()
+        known = Known(best.binding, sum(best.extra.tolist()) - NEEDED) if best else Known()
         point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
         best = point if point.reached else best
         if best and not best.relaxed:
@@ -61,7 +61,7 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     With this limit all but free, the others' excesses fall to nothing exactly where it suffices; only then is its own
     least sought, with the others firm.
     """
-    count = len(nearest.excesses)
+    count = len(nearest.extra)
     free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
     screened = exchange.solve(program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(most=SCREENED))
     if not screened.reached:

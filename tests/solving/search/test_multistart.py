@@ -3,6 +3,7 @@
 import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from searches import BAD, certified, empty, solved
 from support import toy
@@ -123,7 +124,7 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     calls, points = solved
     program = toy.program("xy", limits=(("x", -1, 2.0), ("x", 1, 1.0)), objectives=("x",))
     points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
-    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, excesses=(1.0,))
+    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, extra=np.ones(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
@@ -137,7 +138,7 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
     program = toy.program("xy", limits=(("x", -1, 2.0),), objectives=("x",))
     points += [Point(program.starts[0], "Infeasible_Problem_Detected", False)]
     points += [Point({"x": 2.0, "y": 0.0}, "Solve_Succeeded", True)] * 40
-    nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, excesses=(0.0,))
+    nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, extra=np.zeros(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
