@@ -3,12 +3,14 @@
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 from loomopt.base.errors import BadInput
 from loomopt.model import drive
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel, with_words_fixed
-from loomopt.model.program import Limit, Move, Objective, Program, Variable, Wish
+from loomopt.model.objectives import Objective, Value
+from loomopt.model.program import Move, Program, Variable, Wish
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, label, owned
@@ -63,10 +65,10 @@ def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]
     """Return the bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
     name, v = variable.called, variable
     if v.lower == v.upper:
-        return [Limit(name, 0, v.name, v.lower, v.scale, "variable")]
+        return [BoundLimit(name, 0, v.name, v.lower, v.scale)]
     ends = [(sign, value) for sign, value in ((-1, v.lower), (1, v.upper)) if math.isfinite(value)]
     return [
-        Limit(name, sign, v.name, value, v.scale, "variable", relaxable=relaxable_from or sign > 0 or value > 0.0)
+        BoundLimit(name, sign, v.name, value, v.scale, relaxable=relaxable_from or sign > 0 or value > 0.0)
         for sign, value in ends
     ]
 
@@ -102,7 +104,7 @@ def _asking(variable: Variable, asked: Sequence[tuple[str, float]]) -> Iterator[
     known = set[str | float]()
     for name, value in sorted(asked, key=lambda each: -each[1]):
         if not known & {name, value}:
-            yield Limit(name, -1, variable.name, value, variable.scale, "variable")
+            yield BoundLimit(name, -1, variable.name, value, variable.scale)
         known |= {name, value}
 
 
@@ -145,12 +147,11 @@ def settled(scene: Scene, model: JobModel, known: Mapping[str, float], design: M
 
 def figure_limits(scene: Scene, sampler: Sampler) -> list[Limit]:
     """Return the scene's limits on figures that are rows or quantities of the same name; sampler: today's machine."""
-    found = []
+    found: list[Limit] = []
     for name, limit in scene.limits.items():
-        cycle = sampler.model.has_quantity(name)
+        kind = CycleLimit if sampler.model.has_quantity(name) else DesignLimit
         size = figure_size(sampler, name)
-        sides = ends(limit.min, limit.max)
-        found += [Limit(name, sign, name, value, size, "cycle" if cycle else "static") for sign, value in sides]
+        found += [kind(name, sign, name, value, size) for sign, value in ends(limit.min, limit.max)]
     return found
 
 
@@ -162,14 +163,14 @@ def demanded(
     sizes: natural size by row; the value asked, or 1, without one. What a table asks for may give way; what the nature
     of the thing demands may not.
     """
-    found = []
+    found: list[Limit] = []
     for check in checks:
         for each in check.demands:
             value = each.value if isinstance(each.value, float) else known[owned(check, each.value)]
             firm = each.row in scene.schema.margins or not isinstance(each.value, str)
-            family: Literal["static", "cycle"] = "cycle" if each.row in check.quantities else "static"
+            kind = CycleLimit if each.row in check.quantities else DesignLimit
             size = sizes.get(each.row) or abs(value) or 1.0
-            found.append(Limit(each.row, each.sign, each.row, value, size, family, relaxable=not firm))
+            found.append(kind(each.row, each.sign, each.row, value, size, relaxable=not firm))
     return found
 
 
@@ -207,7 +208,7 @@ def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
 def least(sampler: Sampler) -> tuple[Objective, ...]:
     """Return the levels after a target's own: rows that the checks would have least; sampler: today's machine."""
     rows = [check.least for check in sampler.model.checks if check.least]
-    return tuple(Objective(row, row, "value", abs(sampler.static[row]) or 1.0) for row in rows)
+    return tuple(Value(row, row, abs(sampler.static[row]) or 1.0) for row in rows)
 
 
 def inside(variables: Iterable[Variable], values: Mapping[str, float]) -> dict[str, float]:

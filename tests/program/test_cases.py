@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 from scipy.optimize import minimize
+from worst import WorstPeak
 
 from loomopt.maths import systems
+from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import Integral, JobModel, Quantity, Row, cased
-from loomopt.model.program import Limit, Objective, Program, Variable
+from loomopt.model.objectives import Peak
+from loomopt.model.program import Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN, Node
 from loomopt.solving.nlp import exchange
@@ -111,7 +114,7 @@ def test_a_case_s_derivatives_are_traced_with_its_own_numbers():
             assert (slopes[name_of("cloth.F", other)] != 0.0) == (other == case)
 
 
-def task(combine, limits=(), rows=("torque",)):
+def task(limits=(), rows=("torque",)):
     """Return the program that balances the three fabrics by a spring; limits: (row, sign, value)."""
     variables = (
         Variable("spring.k", 0.0, 2e4, 1e3, (0.0, 2e4)),
@@ -119,16 +122,16 @@ def task(combine, limits=(), rows=("torque",)):
     )
     parameters = {name: value for name, value in ALL.items() if name not in ("spring.k", "spring.p")}
     names = [name_of(row, case) for row in rows for case in range(3)]
-    level = Objective("torque", names[0], "peak", 10.0, others=tuple(names[1:]), combine=combine)
+    level = WorstPeak("torque", names[0], 10.0, tuple(names[1:]))
     own = tuple(
-        Limit(row, sign, row, value, 100.0, "cycle" if FABRICS.has_quantity(row) else "static")
+        (CycleLimit if FABRICS.has_quantity(row) else DesignLimit)(row, sign, row, value, 100.0)
         for row, sign, value in limits
     )
     start = {"spring.k": 3000.0, "spring.p": 0.04}
     return Program(FABRICS, variables, parameters, own, (level,), (start,))
 
 
-def dense(combine, x):
+def dense(x):
     """Return the objective by plain formulas on many crank angles, without the model."""
     phi = np.linspace(0, 2 * np.pi, 20_001)
     k, p = x
@@ -141,50 +144,49 @@ def dense(combine, x):
         fade = v["cloth.F"] * (-np.cos(phi) - met) / (1 - met)
         force += np.where((phi > np.pi - v["cloth.width"]) & (phi < np.pi), fade, 0.0)
         peaks.append(np.abs(force * v["r"] * np.sin(phi)).max())
-    return max(peaks) if combine == "worst" else sum(peaks)
+    return max(peaks)
 
 
-@pytest.mark.parametrize("combine", ["worst", "sum"])
-def test_the_least_peak_over_all_fabrics_is_that_of_brute_force(combine):
-    program = task(combine)
+def test_the_least_peak_over_all_fabrics_is_that_of_brute_force():
+    program = task()
     point = exchange.solve(program, program.starts[0], Settings())
     assert point.reached
     best = np.array([point.x["spring.k"], point.x["spring.p"]])
-    value = Sampler(FABRICS, {**program.parameters, **point.x}).merit(program.objectives[0])
-    assert dense(combine, best) == pytest.approx(value, rel=1e-6)
+    value = program.objectives[0].merit(Sampler(FABRICS, {**program.parameters, **point.x}))
+    assert dense(best) == pytest.approx(value, rel=1e-6)
     tried = []
     for start in ([3000, 0.04], [5000, 0.1], [8000, 0.05]):
         simplex = [start, [start[0] * 1.3, start[1]], [start[0], start[1] + 0.03]]
         options = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 4000, "initial_simplex": simplex}
         bounds = [(v.lower, v.upper) for v in program.variables]
-        found = minimize(lambda x: dense(combine, x), start, method="Nelder-Mead", bounds=bounds, options=options)
+        found = minimize(dense, start, method="Nelder-Mead", bounds=bounds, options=options)
         tried.append(found.fun)
     assert value <= min(tried) * (1 + 1e-6)
-    assert value < dense(combine, (3000, 0.04)) * 0.99
+    assert value < dense((3000, 0.04)) * 0.99
 
 
 @pytest.mark.parametrize("case", range(3))
 def test_the_worst_of_all_is_worse_than_any_fabric_alone(case):
-    together = task("worst")
+    together = task()
     point = exchange.solve(together, together.starts[0], Settings())
-    worst = Sampler(FABRICS, {**together.parameters, **point.x}).merit(together.objectives[0])
-    own = replace(together, objectives=(Objective("torque", name_of("torque", case), "peak", 10.0),))
+    worst = together.objectives[0].merit(Sampler(FABRICS, {**together.parameters, **point.x}))
+    own = replace(together, objectives=(Peak("torque", name_of("torque", case), 10.0),))
     single = exchange.solve(own, own.starts[0], Settings())
     best = Sampler(FABRICS, {**own.parameters, **single.x}).peak(name_of("torque", case))
     assert best <= worst * (1 + 1e-9)
 
 
 def test_limits_may_speak_of_one_case():
-    free = task("worst")
+    free = task()
     at = Sampler(FABRICS, {**free.parameters, **exchange.solve(free, free.starts[0], Settings()).x})
     peak, front = at.peak("force [case 2]"), at.single("front_force [case 1]")
     for row, sign, value in (("force [case 2]", 1, 0.9 * peak), ("front_force [case 1]", -1, front + 20.0)):
-        program = task("worst", ((row, sign, value),))
+        program = task(((row, sign, value),))
         point = exchange.solve(program, program.starts[0], Settings())
         assert point.reached
         held = Sampler(FABRICS, {**program.parameters, **point.x})
-        assert held.excess(program.limits[0]) == pytest.approx(0.0, abs=1e-9)
-        assert held.merit(program.objectives[0]) > at.merit(free.objectives[0])
+        assert program.limits[0].excess(held) == pytest.approx(0.0, abs=1e-9)
+        assert program.objectives[0].merit(held) > free.objectives[0].merit(at)
 
 
 def test_a_mean_is_that_of_the_first_case():

@@ -12,9 +12,11 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.model import numbers as scene_numbers
 from loomopt.model.drive import TORQUE
+from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import Bounds, bound_limits, demand_figures, demanded, ends
-from loomopt.model.program import Limit, Move, Numbers, Objective, Program, Variable, Wish, goals
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value
+from loomopt.model.program import Move, Numbers, Program, Variable, Wish, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.tolerances import NO_MASS
@@ -98,7 +100,7 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sizes)]
     limits += demanded(scene, physics.checks, known, {})
     margins = physics.kinematics.groups[""].margins
-    limits += [Limit(row, -1, row, 0.0, sizes.length, "static", relaxable=False) for row in margins]
+    limits += [DesignLimit(row, -1, row, 0.0, sizes.length, relaxable=False) for row in margins]
     fallen = "M3_fdc" in (traded or ())
     asked = [] if fallen else _target_limits(scene, target, sizes)
     limits += asked
@@ -257,31 +259,29 @@ def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: B
 def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
     """Return the counterweight's mass bounds as limits on s against r4e²."""
     return [
-        Limit("m4e", sign, "s", value, sizes.inertia, "static", "r4e_square", relaxable=sign >= 0 or value > 0.0)
+        RatioLimit("m4e", sign, "s", value, sizes.inertia, "r4e_square", relaxable=sign >= 0 or value > 0.0)
         for sign, value in ends(*mass)
     ]
 
 
 def _figure_limits(name: str, limit: Limited, sizes: _Sizes) -> list[Limit]:
     """Return the limits on one figure, row by row."""
-    cycle, scale = sizes.sampler.model.has_quantity(name), sizes.figure(name)
+    kind = CycleLimit if sizes.sampler.model.has_quantity(name) else DesignLimit
     sides = ends(limit.min, limit.max)
     rows = ROWS.get(name, (name,)) if sides[0][0] else (name,)
-    return [
-        Limit(name, sign, row, value, scale, "cycle" if cycle else "static") for sign, value in sides for row in rows
-    ]
+    return [kind(name, sign, row, value, sizes.figure(name)) for sign, value in sides for row in rows]
 
 
 def _target_limits(scene: Scene, target: str, sizes: _Sizes) -> list[Limit]:
     """Return what the target itself demands of the reed torque at front dead centre."""
     if target == "retrofit":
-        return [Limit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque, "static")]
+        return [DesignLimit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque)]
     if target != "torque":
         return []
     tolerance = scene.table(TorqueTarget).M3_tolerance
     tolerance = 0.01 * scene.operation["M0"] if tolerance is None else tolerance
     sides = [(0, 0.0)] if tolerance == 0.0 else [(-1, -tolerance), (1, tolerance)]
-    return [Limit("M3_fdc", sign, "M3_fdc", value, sizes.torque, "static") for sign, value in sides]
+    return [DesignLimit("M3_fdc", sign, "M3_fdc", value, sizes.torque) for sign, value in sides]
 
 
 def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds) -> dict[str, float]:
@@ -297,10 +297,10 @@ def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds
 
 def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
     """Return the target's levels in order."""
-    peak = Objective(TORQUE, TORQUE, "peak", sizes.peak)
+    peak = Peak(TORQUE, TORQUE, sizes.peak)
     return {
-        "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", sizes.torque), peak),
+        "balance": (Magnitude("M3_fdc", "M3_fdc", sizes.torque), peak),
         "torque": (peak,),
-        "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", sizes.mean_square, power=2),),
-        "retrofit": (Objective("change", "change", "value", 1.0),),
+        "pulse": (Value("pulse_rms", "pulse_mean_square", sizes.mean_square, power=2),),
+        "retrofit": (Value("change", "change", 1.0),),
     }.get(target, ())

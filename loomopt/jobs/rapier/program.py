@@ -14,9 +14,11 @@ from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
 from loomopt.maths.systems import FLOAT
 from loomopt.model import numbers as scene_numbers
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
-from loomopt.model.program import Limit, Move, Objective, Program, Variable, goals
+from loomopt.model.objectives import Objective, Peak, Value
+from loomopt.model.program import Move, Program, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive
@@ -106,7 +108,7 @@ def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Pro
     own = []
     for name in (name for name in kept if name not in named):
         variables.append(Variable(name, known[name], known[name], _size(name, known), (known[name],) * 2))
-        own.append(Limit(name, REQUIRED[name], name, known[name], _size(name, known), "variable"))
+        own.append(BoundLimit(name, REQUIRED[name], name, known[name], _size(name, known)))
     wanted = [limit for limit in (*limits, *own) if limit.name in kept and limit.name in FIGURES]
     turn = (0.0, 2 * math.pi)
     variables.append(Variable("phi_stroke", *turn, 1.0, turn))
@@ -193,47 +195,49 @@ def _kept_limits(arcs: Sequence[tuple[float, str]], kept: Sequence[str], known: 
     """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
     size = known["stroke"] if "stroke" in kept else 1.0
     rows = {"head at rest at phi_stroke": "rest"} | ({"stroke is reached": "stroke_short"} if "stroke" in kept else {})
-    found = [Limit(name, 0, row, 0.0, size, "static", relaxable=False, hidden=True) for name, row in rows.items()]
+    found: list[Limit] = [
+        DesignLimit(name, 0, row, 0.0, size, relaxable=False, hidden=True) for name, row in rows.items()
+    ]
     for side, name in arcs:
         if name in (*kept, DWELL):
             text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
             where = (DWELL, side)
-            row = Limit(text, 1, "dwell_travel", 1.0, 1.0, "cycle", relaxable=False, where=where, hidden=True)
+            row = CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, relaxable=False, where=where, hidden=True)
             found.append(row)
     return found
 
 
 def _margins(sley: bool, known: Mapping[str, float]) -> list[Limit]:
     """Return the margins by which every dyad closes over the whole turn; the sley's where it may change."""
-    found = [Limit(name, 1, row, 1.0, 1.0, "cycle", relaxable=False) for name, row in CLOSES.items()]
+    found: list[Limit] = [CycleLimit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
     rows = SLEY_MARGINS if sley else ()
-    return found + [Limit(row, -1, row, 0.0, known["l71"], "static", relaxable=False) for row in rows]
+    return found + [DesignLimit(row, -1, row, 0.0, known["l71"], relaxable=False) for row in rows]
 
 
 def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
     """Return the limits on one figure, row by row."""
     if name == "mu_min" and limit.min is not None:
-        return [Limit(name, -1, "obliquity", limit.min, 1.0, "cycle", complement=math.pi / 2)]
+        return [CycleLimit(name, -1, "obliquity", limit.min, 1.0, complement=math.pi / 2)]
     if name in (DWELL, *SIDES):
         return []
     sides = ends(limit.min, limit.max)
     if sampler.model.has_quantity(name):
         size = sampler.peak(name) or 1.0
-        return [Limit(name, sign, name, value, size, "cycle") for sign, value in sides]
+        return [CycleLimit(name, sign, name, value, size) for sign, value in sides]
     rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
     size = sampler.single(name) if name == "rms_jerk" else read(sampler).stroke if name == "stroke" else 1.0
     if any(name in check.rows for check in sampler.model.checks):
         size = max(abs(value) for _, value in sides) or 1.0
-    return [Limit(name, sign, row, value, size, "static") for sign, value in sides for row in rows]
+    return [DesignLimit(name, sign, row, value, size) for sign, value in sides for row in rows]
 
 
 def _objectives(target: str, sampler: Sampler, stroke: float) -> tuple[Objective, ...]:
     peak = sampler.peak("peak_acceleration") or 1.0
     return {
-        "stroke-dwell": (Objective("peak_acceleration", "peak_acceleration", "peak", peak),),
-        "dwell": (Objective("dwell", "dwell_rest", "value", 1.0),),
-        "smooth": (Objective("rms_jerk", "jerk_mean_square", "value", peak**2, power=2),),
-        "match": (Objective("match_rms", "match_mean_square", "value", (stroke or 1.0) ** 2, power=2),),
+        "stroke-dwell": (Peak("peak_acceleration", "peak_acceleration", peak),),
+        "dwell": (Value("dwell", "dwell_rest", 1.0),),
+        "smooth": (Value("rms_jerk", "jerk_mean_square", peak**2, power=2),),
+        "match": (Value("match_rms", "match_mean_square", (stroke or 1.0) ** 2, power=2),),
     }[target]
 
 

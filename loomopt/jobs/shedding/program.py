@@ -13,9 +13,11 @@ from loomopt.jobs.shedding.model import AT_REST, FASTEST, FOLLOWER, LIFT, law_ro
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
 from loomopt.model import drive
 from loomopt.model import numbers as scene_numbers
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
-from loomopt.model.program import Limit, Move, Objective, Program, Variable, Wish, goals, nothing_follows
+from loomopt.model.objectives import Objective, Peak, Value
+from loomopt.model.program import Move, Program, Variable, Wish, goals, nothing_follows
 from loomopt.model.sampling import sampled
 from loomopt.model.speeds import followed
 from loomopt.physics.effects.kinds import Check, owned
@@ -198,10 +200,10 @@ class _Task:
     def _objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order; what checks would have least comes after the spring."""
         if self.target == "force":
-            return (Objective("contact_max", "cam_force", "peak", self.sizes.force),)
+            return (Peak("contact_max", "cam_force", self.sizes.force),)
         if self.target == "speed":
-            return (Objective("speed", "cam_period", "value", 1 / self.fastest, power=-1),)
-        return Objective("K1", "K1", "value", self.sizes.stiffness), *scene_numbers.least(self.sampler)
+            return (Value("speed", "cam_period", 1 / self.fastest, power=-1),)
+        return Value("K1", "K1", self.sizes.stiffness), *scene_numbers.least(self.sampler)
 
     def _starts(self, variables: Sequence[Variable]) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""
@@ -232,12 +234,13 @@ class _Task:
 
     def _bounds(self, variables: Sequence[Variable]) -> list[Limit]:
         """Return the bounds of variables as limits; a requirement gives way on one side only."""
-        found, knots = [], set(self.law.names) if self.law else set()
+        found: list[Limit] = []
+        knots = set(self.law.names) if self.law else set()
         for v in (v for v in variables if v.name not in knots):
             if v.lower == v.upper:
                 sign = -1 if v.name in self.kept else 1 if self.target == "speed" and v.name in VARIABLES else 0
                 bounded = v.called in self.scene.bounds or sign
-                found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
+                found += [BoundLimit(v.called, sign, v.name, v.lower, v.scale)] if bounded else []
                 continue
             own = v.name not in SPEEDS or v.name in self.limited
             found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
@@ -247,7 +250,7 @@ class _Task:
         """Return the limit that is the job: contact where the warp's pull is known, up to a speed that is traded."""
         least, size = self.known["N_min"], self.sizes.force
         row = FASTEST if self.lasting and not self.sped else LIFT
-        found = Limit("N_min", -1, row, least, size, "cycle", relaxable=least > 0.0)
+        found = CycleLimit("N_min", -1, row, least, size, relaxable=least > 0.0)
         raced = [replace(found, row=other, hidden=True) for other in self.raced if other != row]
         if least > 0.0:
             # What is asked beyond contact may give way; contact itself may not.
@@ -260,7 +263,7 @@ class _Task:
             return []
         low, high = self.limited.get("near_dwell", (0.0, math.inf))
         return [
-            Limit("near_dwell", sign, "near_dwell", value, 1.0, "static", relaxable=value > 0.0)
+            DesignLimit("near_dwell", sign, "near_dwell", value, 1.0, relaxable=value > 0.0)
             for sign, value in ends(low, high)
             if math.isfinite(value)
         ]
@@ -270,7 +273,7 @@ class _Task:
         remedy = f"Give the follower ({', '.join(FOLLOWER)}), or take the limit out."
         read = {name: (row,) for name, row in CYCLE.items()} | {CONTACT_SPEED: ()}
         demand_figures(self.scene, self.physics, read, remedy)
-        found = []
+        found: list[Limit] = []
         for name, limit in self.scene.limits.items():
             if name == CONTACT_SPEED or (name == "law_acceleration" and self.law):
                 continue
@@ -279,9 +282,9 @@ class _Task:
             for sign, value in ((-1, limit.min), (1, limit.max)):
                 if value is not None and cycle:
                     # The least of a quantity is the largest of its opposite, which the row then is.
-                    found.append(Limit(name, sign, row, value, self.sizes.figure(name, row, value), "cycle"))
+                    found.append(CycleLimit(name, sign, row, value, self.sizes.figure(name, row, value)))
                 elif value is not None:
-                    found.append(Limit(name, sign, name, value, abs(value) or 1.0, "static"))
+                    found.append(DesignLimit(name, sign, name, value, abs(value) or 1.0))
         return found
 
     def _checks(self) -> list[Limit]:
@@ -302,9 +305,9 @@ class _Task:
         most, firm = self.most_acceleration, {"relaxable": False, "hidden": True}
         rows = law_rows(law)
         last = [("law_end", 1.0), *([] if law.mirrored else [("law_end_slope", 0.0)])]
-        found = [Limit(row, 0, row, value, 1.0, "static", **firm) for row, value in last]  # type: ignore[arg-type]
+        found: list[Limit] = [DesignLimit(row, 0, row, value, 1.0, **firm) for row, value in last]
         knots = range(1, law.intervals // 2 + 1 if law.mirrored else law.intervals)
         slopes = [f"law_slope_{k}" for k in knots]
-        found += [Limit(row, -1, row, 0.0, 1.0, "static", **firm) for row in slopes if row in rows]  # type: ignore[arg-type]
+        found += [DesignLimit(row, -1, row, 0.0, 1.0, **firm) for row in slopes if row in rows]
         peaks = [f"law_{side}_{k}" for side in ("push", "pull") for k in knots]
-        return found + [Limit("law_acceleration", 1, row, most, most, "static") for row in peaks if row in rows]
+        return found + [DesignLimit("law_acceleration", 1, row, most, most) for row in peaks if row in rows]

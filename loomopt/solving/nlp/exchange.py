@@ -129,11 +129,11 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     of the rounds before.
     """
     nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
-    extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
+    extra = calls.first_extra(nlp, here.sampler) if here.extra is None else here.extra
     answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.raw)
     iterations += answer.iterations
     if answer.status not in SUCCESS and here.raw:
-        extra = calls.first_extra(nlp, here.sampler, here.peaks)
+        extra = calls.first_extra(nlp, here.sampler)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, {})
         iterations += answer.iterations
     if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):

@@ -151,8 +151,7 @@ class Structure:
     @functools.cached_property
     def static(self) -> list[int]:
         """Places of limits that are a row each; bounds of variables are the solver's own, unless they may give way."""
-        own = ("static", "variable") if self.elastic else ("static",)
-        return [k for k, limit in enumerate(self.program.limits) if limit.family in own]
+        return list(self.program.single_limits if self.elastic else self.program.design_limits)
 
     @functools.cached_property
     def ways(self) -> dict[int, tuple[int, ...]]:
@@ -234,7 +233,7 @@ class Structure:
         write(p, "values", list(program.parameters.values()))
         write(p, "hints", list(sampler.hints.values()))
         write(p, "variable scale", [variable.scale for variable in program.variables])
-        write(p, "limit", [x.bound if x.family == "cycle" else x.value for x in program.limits])
+        write(p, "limit", [limit.bound for limit in program.limits])
         write(p, "limit scale", [limit.scale for limit in program.limits])
         write(p, "objective weight", weights)
         write(p, "way weight", costs)

@@ -71,7 +71,7 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
 
 def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     """Return the limits with a price in the least relaxation: without any of them it would be less."""
-    rows = [limit for limit in program.limits if limit.family != "cycle"]
+    rows = list(program.single_limits.values())
     cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
     prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
     rest = len(prices) - len(rows) if cycles else 0

@@ -15,7 +15,8 @@ import numpy as np
 from loomopt.maths.systems import Number
 from loomopt.model.model import Instant, JobModel, Row
 from loomopt.model.numbers import LEAST_CHANGE
-from loomopt.model.program import Objective, Program, Variable
+from loomopt.model.objectives import Value
+from loomopt.model.program import Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
@@ -30,7 +31,7 @@ the first. IPOPT fails at a large one from afar; from one to the next, pivots le
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
-CHANGED = Objective(CHANGE, CHANGE, "value", 1.0)
+CHANGED = Value(CHANGE, CHANGE, 1.0)
 MODELS = 8
 """Models with the change as a row that are kept: a front has one for every set of variables that are held."""
 
@@ -144,13 +145,14 @@ def changing(
     if not free:
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
+    bounds = program.bound_limits
     held = tuple(replace(v, lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
     return replace(
         program,
         model=_measuring(program.model, tuple(free)),
         variables=held,
         parameters={**program.parameters, **given},
-        limits=tuple(limit for limit in program.limits if limit.family != "variable" or limit.row not in kept),
+        limits=tuple(limit for k, limit in enumerate(program.limits) if k not in bounds or limit.row not in kept),
         objectives=(*program.objectives, CHANGED),
         moves=(),
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from loomopt.physics.tolerances import SAME_OBJECTIVE
-from loomopt.solving.certificate.kkt import figure_of
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
 from loomopt.solving.search.batch import SCREENED_STARTS
@@ -140,8 +139,7 @@ def unbeatable(search: Search) -> bool:
     lower = {v.name: v.lower for v in search.program.variables}
     least = 0.0
     for level in search.program.objectives:
-        alone = lower.get(level.row, -math.inf) if level.form == "value" and len(level.rows) == 1 else -math.inf
-        least = search.settings.penalty * least + (0.0 if level.form == "magnitude" else alone / level.scale)
+        least = search.settings.penalty * least + level.least_within(lower) / level.scale
     return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
 
 
@@ -204,7 +202,7 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
     sampler = sampler_at(search.program, candidate.point.x)
     if sampler is None:
         return {}
-    return {objective.figure: figure_of(sampler, objective) for objective in search.program.objectives}
+    return {objective.figure: objective.figure_of(sampler) for objective in search.program.objectives}
 
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:

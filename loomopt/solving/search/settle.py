@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from loomopt.model.program import Limit, Move, Program, Wish
+from loomopt.model.program import Move, Program, Wish
 from loomopt.model.sampling import sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
@@ -120,17 +120,14 @@ def _is_same(program: Program, x: Numbers, ends: Sequence[Numbers]) -> bool:
             return False
     except (ValueError, ZeroDivisionError):
         return False
+    # The bounds of what moves may be touched on the way.
+    bounds = program.bound_limits
     return all(
         abs(other - one) <= UNCHANGED
         for end, after in zip(ends, there, strict=True)
-        for limit, one, other in zip(program.limits, before, after, strict=True)
-        if one >= -ACTIVE and not _bounds(limit, end)
+        for k, (one, other) in enumerate(zip(before, after, strict=True))
+        if one >= -ACTIVE and not (k in bounds and bounds[k].row in end)
     )
-
-
-def _bounds(limit: Limit, goal: Numbers) -> bool:
-    """Say whether a limit is the bound of a variable that moves."""
-    return limit.family == "variable" and limit.row in goal
 
 
 def _part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
@@ -152,13 +149,7 @@ def _objectives(program: Program, x: Numbers) -> Floats:
     """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
     sampler = sampled(program.model, {**program.parameters, **x})
     pieces, u = sampler.grid(SETTLE_NODES)
-    parts = []
-    for objective in program.objectives:
-        if objective.form == "peak":
-            parts += [sampler.at(row, pieces, u) / objective.scale for row in objective.rows]
-        else:
-            parts.append(np.array([sampler.merit(objective) / objective.scale]))
-    return np.concatenate(parts)
+    return np.concatenate([each.watched(sampler, pieces, u) / each.scale for each in program.objectives])
 
 
 def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
@@ -181,5 +172,4 @@ def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
 def _excesses(program: Program, x: Numbers) -> list[float]:
     """Return by how much every limit is exceeded, in its natural size; an equality how far it is missed."""
     sampler = sampled(program.model, {**program.parameters, **x})
-    found = [(limit, sampler.excess(limit)) for limit in program.limits]
-    return [abs(excess) if limit.sign == 0 else excess for limit, excess in found]
+    return [limit.violation(sampler) for limit in program.limits]

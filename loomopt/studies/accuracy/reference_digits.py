@@ -111,17 +111,17 @@ class _Rows:
                 self.free.append(variable)
         self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
         self.sampler = Sampler(program.model, {**program.parameters, **x})
-        static = [limit for limit in program.limits if limit.family == "static"]
+        static = list(program.design_limits.values())
         rows = point.raw["lam_g"]
         self.static = [limit for k, limit in enumerate(static) if limit.sign == 0 or abs(rows[k]) > BINDING]
-        magnitudes = [o for o in program.objectives if o.form == "magnitude"]
+        magnitudes = [o for o in program.objectives if o.is_magnitude]
         pairs = np.abs(rows[len(static) : len(static) + 2 * len(magnitudes)]).reshape(-1, 2)
         self.zero = [o for o, pair in zip(magnitudes, pairs, strict=True) if pair.min() > BINDING]
         above = epigraphs(program)
-        self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].form == "peak"]
+        self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].quantities]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
-        before = len(static) + sum(2 * len(o.rows) for o in magnitudes)
+        before = len(static) + 2 * len(magnitudes)
         self.binding = self._binding(rows[before:])
         self.start += [self._top(above[k]) for k in self.tops]
 
@@ -166,7 +166,7 @@ class _Rows:
     def values(self, unknown: Sequence[Number]) -> list[Number]:
         """Return every row: 0 where it is met."""
         exact, number = self.design(unknown), self.number
-        found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
+        found = [limit.residual(exact) / number(limit.scale) for limit in self.static]
         found += [exact.single(o.row) / number(o.scale) for o in self.zero]
         for family, binding in zip(self.families, self.binding, strict=True):
             bound, scale = self._bound(family, unknown[len(self.free) :])

@@ -3,8 +3,10 @@
 from loomopt.jobs.base import Figures, Job
 from loomopt.model import numbers
 from loomopt.model.curves import Columns
+from loomopt.model.limits import DesignLimit
 from loomopt.model.model import JobModel
-from loomopt.model.program import Limit, Numbers, Objective, Program, Variable
+from loomopt.model.objectives import Peak
+from loomopt.model.program import Numbers, Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.scenes.scene import Scene
 from loomopt_press import model as press
@@ -37,14 +39,14 @@ class Press(Job):
         limits = [each for v in variables if v.called in scene.bounds for each in numbers.bound_limits(v)]
         limits += numbers.figure_limits(scene, sampler)
         limits += numbers.demanded(scene, sampler.model.checks, known, {})
-        limits += [Limit(press.LONGER, -1, press.LONGER, 0.0, known["rod"], "static", relaxable=False)]
+        limits += [DesignLimit(press.LONGER, -1, press.LONGER, 0.0, known["rod"], relaxable=False)]
         return Program(
             sampler.model,
             variables,
             {name: value for name, value in known.items() if name not in limited},
             tuple(limits),
             (
-                Objective("peak_torque", "peak_torque", "peak", sampler.peak("peak_torque") or 1.0),
+                Peak("peak_torque", "peak_torque", sampler.peak("peak_torque") or 1.0),
                 *numbers.least(sampler),
             ),
             (numbers.inside(variables, known),),
