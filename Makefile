@@ -1,17 +1,28 @@
-# make solve: balance the packaged loom.   make test: the suite; make slow: its slow studies.   All make .venv themselves.
+# make solve: balance the packaged loom.   make test: the suite; make slow: its slow studies.   All make .venv first.
 PYTHON ?= python3
 BIN := .venv/bin
+SUITE := $(BIN)/python -m pytest -n auto --dist loadfile --durations 10
+# make coverage: how much of loomopt the suite runs, COVERED="tests/jobs" part of it.   make test COVER=1: both at once.
+COVERED ?= tests
+COVER ?=
+COVERING := --cov loomopt --cov-report=
+TOTAL = @echo "Coverage by $(1): $$($(BIN)/python -m coverage report --format=total) % of the lines of loomopt"
 
-.PHONY: solve test slow lint types docs notebooks benchmark clean
+.PHONY: solve test slow coverage lint types docs notebooks benchmark locked clean
 
 solve: .venv/installed
 	$(BIN)/loomopt solve beatup --target balance
 
 test: .venv/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow" --durations 10
+	$(SUITE) -m "not slow" $(if $(COVER),$(COVERING))
+	$(if $(COVER),$(call TOTAL,make test))
 
 slow: .venv/installed-test
-	$(BIN)/python -m pytest -n auto --dist loadfile -m slow --durations 10
+	$(SUITE) -m slow
+
+coverage: .venv/installed-test
+	$(SUITE) -m "not slow" $(COVERING) $(COVERED)
+	$(call TOTAL,$(COVERED))
 
 lint: .venv/installed-test
 	$(BIN)/ruff check .
@@ -43,6 +54,14 @@ benchmark: .venv/installed-test
 .venv/installed-test: .venv/installed
 	$(BIN)/pip install -q -e '.[test]'
 	touch $@
+
+# In the place of the newest versions those of requirements.lock, with which the suite has passed.
+locked:
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install -q -c requirements.lock -e '.[test]'
+	$(BIN)/python -m compileall -q loomopt
+	touch .venv/installed
+	touch .venv/installed-test
 
 clean:
 	rm -rf .venv

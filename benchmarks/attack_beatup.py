@@ -3,13 +3,11 @@
 Half of the scenes are drawn around a random machine that meets their static limits.
 """
 
-import importlib.util
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from attackers import View, attacked
+from reference import beatup as by_hand
 
 import loomopt as lo
 
@@ -24,20 +22,6 @@ BENDS = 12
 """Nodes of the Gauss rule on either side of front dead centre."""
 
 
-def by_hand() -> Any:
-    """Return the tests' beat-up in plain NumPy; benchmarks have a module of the same name."""
-    path = Path(__file__).parents[1] / "tests" / "solving" / "plain_beatup.py"
-    spec = importlib.util.spec_from_file_location("beatup_by_hand", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-HAND = by_hand()
-
-
 @dataclass
 class Machine:
     """A beat-up scene and target: `changes` to the packaged scene."""
@@ -48,7 +32,7 @@ class Machine:
 
     def __post_init__(self):
         self.scene = lo.load(self.base).update(self.changes)
-        self.hand = HAND.Machine(self.scene)
+        self.hand = by_hand.Machine(self.scene)
         ends = np.array([self.hand.bounds[name] for name in NAMES])
         self.lower, self.upper = ends.T
         self.free = self.upper > self.lower
@@ -82,7 +66,7 @@ class Machine:
     def view(self, z, angles):
         design = dict(zip(NAMES, self.designs(z).T[:, :, None], strict=True))
         l1, l2, l3, l4 = (design[name] for name in LENGTHS)
-        beta, beta_r, psi_f, psi_r = HAND.dead_centres(l1, l2, l3, l4)
+        beta, beta_r, psi_f, psi_r = by_hand.dead_centres(l1, l2, l3, l4)
         near = np.arccos((l2**2 + l3**2 - (l4 - l1) ** 2) / (2 * l2 * l3))
         far = np.pi - np.arccos((l2**2 + l3**2 - (l4 + l1) ** 2) / (2 * l2 * l3))
         values = {"swing": (psi_r - psi_f,), "theta": (beta - beta_r,), "mu_min": (near, far)}
@@ -122,7 +106,7 @@ class Machine:
         design, (low, high) = self.design(z), self._corners
         found = []
         with np.errstate(all="ignore"):
-            beta = HAND.dead_centres(*(design[name] for name in LENGTHS))[0]
+            beta = by_hand.dead_centres(*(design[name] for name in LENGTHS))[0]
             for begin, end in ((low, high), (high, 2 * np.pi + low)):
                 offsets, step = np.linspace(begin, end, FINE, retstep=True)
                 size = np.abs(self.hand.torques(design, beta + offsets)[1])
@@ -180,7 +164,7 @@ def drawn(rng):
     }
     changes["bounds.m4e.max"] = f"{round(rng.uniform(0, 15), 1)} kg"
     changes["bounds.r4e.max"] = f"{round(rng.uniform(10, 90), 1)} mm"
-    beta, beta_r, psi_f, psi_r = HAND.dead_centres(*anchor)
+    beta, beta_r, psi_f, psi_r = by_hand.dead_centres(*anchor)
     l1, l2, l3, l4 = anchor
     reach = [(l2**2 + l3**2 - (l4 + sign * l1) ** 2) / (2 * l2 * l3) for sign in (-1, 1)]
     mu = np.degrees(min(np.arccos(reach[0]), np.pi - np.arccos(reach[1])))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import attackers
 import numpy as np
-import plain_shedding as plain
+from reference import shedding as plain
 from scipy.optimize import linprog
 
 TARGETS = ("stiffness", "stiffness", "force", "law", "speed", "angles")

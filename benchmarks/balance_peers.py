@@ -96,7 +96,7 @@ class Loomopt:
             program = JOB.program(given, "balance")
             point = exchange.solve(program, {}, Settings(), point)
             took.append(time.perf_counter() - began)
-            claimed = point.raw["extra"][-1] * program.objectives[-1].scale
+            claimed = point.extra[-1] * program.objectives[-1].scale
             designs[M0] = plain_design(JOB.design(program, point.x)), claimed
         return took, designs
 

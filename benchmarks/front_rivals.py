@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from reference import shedding as plain_shedding
 
 import loomopt as lo
-from benchmarks import plain_beatup, plain_rapier, plain_shedding
+from benchmarks import plain_beatup, plain_rapier
 from loomopt.studies.run.rows import Row
 
 GRID = 360

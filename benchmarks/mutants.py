@@ -4,7 +4,7 @@
 
 A fixed random choice of small changes in loomopt/solving and loomopt/physics/tolerances.py is made one
 at a time, in a copy of the package, and the tests that mirror the changed file are run against it:
-tests/ROOM/test_FILE*.py (for a tolerance, those of every file that reads it). A mutant that no test notices survives,
+tests/FOLDER/test_FILE*.py (for a tolerance, those of every file that reads it). A mutant that no test notices survives,
 and is printed. Tests that fail without any mutant would notice everything, so each is run on the files as they are
 first."""
 
@@ -97,7 +97,7 @@ def _numbers(value: float) -> tuple[str, ...]:
 
 def files() -> list[str]:
     """Return the files that are changed, in order."""
-    found = [str(path.relative_to(TOP)) for room in ROOMS for path in sorted((TOP / "loomopt" / room).glob("*.py"))]
+    found = [str(path.relative_to(TOP)) for room in ROOMS for path in sorted((TOP / "loomopt" / room).rglob("*.py"))]
     return [TOLERANCES, *(name for name in found if not name.endswith("__init__.py"))]
 
 
@@ -116,11 +116,10 @@ def tests(mutant: Mutant) -> list[str]:
         ]
     else:
         readers = [mutant.file]
-    found = [
-        path
-        for file in readers
-        for path in sorted((TOP / "tests" / Path(file).parent.name).glob(f"test_{Path(file).stem}*.py"))
-    ]
+    found = []
+    for file in readers:
+        folder = TOP / "tests" / Path(file).relative_to("loomopt").parent
+        found += sorted(folder.glob(f"test_{Path(file).stem}*.py"))
     return [str(path.relative_to(TOP)) for path in dict.fromkeys(found)]
 
 

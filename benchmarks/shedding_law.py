@@ -2,7 +2,7 @@
 
 The second derivative of the rise is piecewise linear on 8 to 64 equal intervals, its peak no higher than the
 cycloid's, the return mirrored; free, and with s(u) + s(1 − u) = 1. Beside loomopt the same springs by linear programmes
-(`plain_shedding.least_law`), which share nothing with it. "softer" compares with the softest fixed law of continuous
+(tests/reference/shedding.py), which share nothing with it. "softer" compares with the softest fixed law of continuous
 s'' within the same bound, "contact lost" is what loomopt's law lacks of its own spring anywhere in the turn, judged in
 30 digits. Then, by the linear programmes alone, the bound on s'' is raised: the spring falls towards that of a blow
 followed by free flight, which no law reaches.
@@ -25,15 +25,12 @@ from typing import Any
 import casadi as ca
 import harness
 import numpy as np
-import plain_shedding as plain
-from mpmath import mp
+from reference import shedding as plain
 
 import loomopt as lo
 from loomopt.solving.nlp import transcribe
 
 SCENES = {"shedding": plain.PAPER, "shedding-printed-travel": plain.PRINTED}
-SMOOTH = ("cycloidal", "modified_sine", "modified_trapezoid", "polynomial_345")
-"""Fixed laws with a continuous s'' and a peak no higher than the cycloid's."""
 BOUND = 2 * np.pi
 RAISED = (2, 4, 8)
 BESIDE = (16, 64, 256)
@@ -53,28 +50,7 @@ IPOPT: dict[str, Any] = {
 
 def fixed(case):
     """Return the least K1 with the softest of the fixed laws, and its name."""
-    return min((float(plain.least_stiffness(replace(case, law=law))[0]), law) for law in SMOOTH)
-
-
-def unbounded(case):
-    """Return the K1 that no law reaches when s'' has no bound: the rise is a blow at the top and free flight to rest.
-
-    The flight takes the time of the rise; by energy, with X = travel (1 − q²), for C = F = N_min = 0.
-    """
-    h, M, G, X0, T1, T2 = (plain.number(mp, getattr(case, of)) for of in ("travel", "M", "G", "X0", "T1", "T2"))
-    rise = mp.mpf(case.angles[0]) / 360 * 60 / case.rpm
-
-    def mean_pull(K1, d):
-        """Return what pulls the frame up, on average from d above the bottom; the tension's corner is at the middle."""
-        warp = T2 * (1 - d / h) if d < h / 2 else (T2 * h / 4 - T1 / h * (d - h / 2) ** 2) / d
-        return K1 * (h + X0 - d / 2) - G + warp
-
-    def late(K1):
-        return mp.quad(lambda q: mp.sqrt(2 * h * M / mean_pull(K1, h * q * q)), [0, mp.sqrt(0.5), 1]) - rise
-
-    start = plain.least_stiffness(case)[0]
-    with mp.workdps(plain.DIGITS):
-        return float(mp.findroot(late, (start / 4, start / 2), solver="secant", tol=1e-20))
+    return min((float(plain.least_stiffness(replace(case, law=law))[0]), law) for law in plain.SMOOTH)
 
 
 def called(name, n, symmetric):
@@ -134,7 +110,7 @@ def raised(name, n):
     """Return the least K1 with the bound on s'' raised, by the linear programme alone, and what no law reaches."""
     case = SCENES[name]
     found = {f"{factor} x 2 pi": float(plain.least_law(case, n, amax=factor * BOUND)[0]) for factor in RAISED}
-    return found | {"no law reaches": unbounded(case)}
+    return found | {"no law reaches": plain.unbounded_law(case)}
 
 
 def by_hand(case, n):

@@ -2,7 +2,7 @@
 
 The least spring K1, with its preload X0 of at most 80 mm, that keeps the roller on the cam over the whole turn, for
 cases that differ in travel, law, damping, tension and cam angles. Every answer is judged by a referee that shares
-nothing with loomopt (`plain_shedding`, 30 digits): how far K1 is off, and how far the cam force falls below N_min
+nothing with loomopt (tests/reference, 30 digits): how far K1 is off, and how far the cam force falls below N_min
 somewhere in the turn, as a share of the largest spring force. Times are for all cases; loomopt's whole call = 1.
 
     python benchmarks/shedding_peers.py [--quick] [--json]
@@ -19,8 +19,8 @@ from dataclasses import replace
 
 import harness
 import numpy as np
-import plain_shedding as plain
 from mpmath import mp
+from reference import shedding as plain
 from scipy.optimize import minimize
 
 import loomopt as lo

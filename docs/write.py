@@ -1,8 +1,8 @@
-"""Write what the documents take from the program: glossary, sketches, and the README's outputs and words.
+"""Write what the documents take from the program: glossary, sketches, and the outputs and words of all pages.
 
     python docs/write.py            (or: make docs)
 
-The suite compares all of it with what stands there (tests/test_documents.py).
+The suite compares all of it with what stands there (tests/end_to_end/test_documents.py).
 """
 
 import contextlib
@@ -24,11 +24,13 @@ from loomopt.jobs import registry
 from loomopt.solving.answer.words import Words
 
 DOCS = Path(__file__).parent
-README = DOCS.parent / "README.md"
+GLOSSARY = DOCS / "glossary.md"
+PAGES = (DOCS.parent / "README.md", *sorted(set(DOCS.glob("*.md")) - {GLOSSARY}))
+"""What is written by hand, but for outputs and tables."""
 WIDTH = "100"
-"""Columns of the outputs that the README shows."""
+"""Columns of the outputs that pages show."""
 BLOCK = re.compile(r"^```console\n\$ loomopt (.*)\n((?:.*\n)*?)```$", re.MULTILINE)
-TABLE = re.compile(r"(<!-- symbols of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
+TABLE = re.compile(r"(<!-- (symbols|effects) of (\S+) -->\n)(?:.*\n)*?(<!-- end -->)")
 LEFT_OUT = "..."
 CHANGES = re.compile(
     r"(?<=limits )\S+(?=, stat)|(?<=stationarity )[^,]+|(?<=cycle )[^;]+|\(\d+$|\b\d+\.\d+ s\b|Time: .*"
@@ -83,13 +85,13 @@ def masked(line: str) -> str:
 
 
 def holds(told: list[str], printed: list[str]) -> bool:
-    """Say whether lines of the README are those that a command prints; "..." stands for any."""
+    """Say whether lines of a page are those that a command prints; "..." stands for any."""
     words = [r"(?:.*\n)*?" if line.strip() == LEFT_OUT else re.escape(masked(line)) + r"\n" for line in told]
     return re.fullmatch("".join(words), "".join(f"{masked(line)}\n" for line in printed)) is not None
 
 
 def updated(told: list[str], printed: list[str]) -> list[str]:
-    """Return lines of the README as a command prints them now: each by the word that it begins with."""
+    """Return lines of a page as a command prints them now: each by the word that it begins with."""
     if holds(told, printed) or not told:
         return told or printed
     found, rest = [], iter(printed)
@@ -111,23 +113,36 @@ def symbols(name: str) -> str:
     return table(Grid("", ("symbol", "unit", "what it is"), lines))
 
 
-def readme_text(text: str, run: Callable[[str], list[str]] = output) -> str:
-    """Return the README with its outputs and words as they are now."""
+def effects(name: str) -> str:
+    """Return the effects that scenes of a job may call for, as Markdown."""
+    known = registry.load(name).schema.effects.values()
+    lines = tuple((f"`{each.name}`", type(each).__name__.lower(), each.summary) for each in known)
+    return table(Grid("", ("effect", "kind", "what it is"), lines))
+
+
+def rewritten(match: re.Match[str]) -> str:
+    """Return a table between its marks as it is now."""
+    made = {"symbols": symbols, "effects": effects}[match[2]]
+    return f"{match[1]}{made(match[3])}{match[4]}"
+
+
+def page_text(text: str, run: Callable[[str], list[str]] = output) -> str:
+    """Return a page with its outputs and tables as they are now."""
 
     def block(match: re.Match[str]) -> str:
         lines = updated(match[2].rstrip("\n").split("\n") if match[2] else [], run(match[1]))
         return "```console\n$ loomopt " + match[1] + "\n" + "\n".join(lines) + "\n```"
 
-    text = BLOCK.sub(block, text)
-    return TABLE.sub(lambda match: f"{match[1]}{symbols(match[2])}{match[3]}", text)
+    return TABLE.sub(rewritten, BLOCK.sub(block, text))
 
 
 def documents() -> Iterator[tuple[Path, str]]:
     """Yield each file with what should stand in it."""
-    yield DOCS / "glossary.md", glossary_text()
+    yield GLOSSARY, glossary_text()
     for name, drawing in sketches().items():
         yield DOCS / name, drawing
-    yield README, readme_text(README.read_text(encoding="utf-8"))
+    for page in PAGES:
+        yield page, page_text(page.read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python notebooks/run.py [NAME]...            (or: make notebooks)
 
 What differs from run to run is left out: times, addresses, versions. The suite runs them too and compares what they say
-with what stands there (tests/test_notebooks.py).
+with what stands there (tests/end_to_end/test_notebooks.py).
 """
 
 import base64

@@ -3,9 +3,8 @@
 Text from outside is shortened, and stripped of whatever a terminal would obey.
 """
 
-LONGEST_MESSAGE = 2000
-"""Characters, so that a message is read; what it quotes is shortened part by part."""
 _LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 480, "remedy": 240}
+"""Characters of each part, so that a message is read."""
 
 
 def clean(text: str, longest: int = 1000) -> str:

@@ -334,14 +334,6 @@ def _find_quantity(*parts: object) -> Quantity | None:
     return None
 
 
-def kind_of(model: type[BaseModel], field: str) -> str:
-    """Return the kind of quantity a model's field holds. Raises LookupError where it holds none."""
-    quantity = quantity_of(model, field)
-    if quantity is None:
-        raise LookupError(f"{model.__name__}.{field} is no quantity")
-    return quantity.kind
-
-
 Length = Annotated[float, Quantity("length", least=0)]
 Coordinate = Annotated[float, Quantity("length")]
 PositiveLength = Annotated[float, Quantity("length", above=0)]
@@ -351,7 +343,6 @@ SegmentAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", above=0, below=math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]
 PositiveMass = Annotated[float, Quantity("mass", above=0)]
-Inertia = Annotated[float, Quantity("inertia", least=0)]
 PositiveInertia = Annotated[float, Quantity("inertia", above=0)]
 Torque = Annotated[float, Quantity("torque", least=0)]
 PositiveTorque = Annotated[float, Quantity("torque", above=0)]

@@ -98,7 +98,7 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
     """Return one line per row; si: in SI, so that studies of machines in different units can be compared."""
     import pandas as pd
 
-    from loomopt.interface.tables import TableFrame
+    from loomopt.interface.table_frame import TableFrame
 
     made = columns(study, rows, si)
     cells: dict[str, object] = {c.heading: _floats(c) for c in (*made["place"], *made["sought"])}

@@ -5,8 +5,6 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor
 from loomopt.jobs import registry
@@ -31,6 +29,8 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     design's limit binds; reached: yes or no where the target asks what may be out of reach. Of an evaluated design,
     today's machine is not among them.
     """
+
+    from loomopt.interface.table_frame import TableFrame
 
     found = rows(solution, scene)
     left_out = {"reached"} if not solution.reached else set[str]()
@@ -115,6 +115,8 @@ def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bo
     A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.
     """
 
+    from loomopt.interface.table_frame import TableFrame
+
     words, shown = Words(scene), {} if si else {each["name"]: each["design"] for each in rows(solution, scene)}
     cells: dict[str, object] = {"problem": solution.problem, "target": target, "outcome": outcome}
     for name, value in {**solution.design, **solution.figures}.items():
@@ -169,19 +171,3 @@ def curves(
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame
-
-
-class TableFrame(pd.DataFrame):
-    """A pandas table as any other; shown cell by cell, so that one tiny or huge number leaves its column readable."""
-
-    @property
-    def _constructor(self) -> "type[TableFrame]":
-        return TableFrame
-
-    def __repr__(self) -> str:
-        with pd.option_context("display.float_format", "{:.6g}".format):
-            return super().__repr__()
-
-    def _repr_html_(self) -> str | None:
-        with pd.option_context("display.float_format", "{:.6g}".format):
-            return super()._repr_html_()  # type: ignore[misc,no-any-return]

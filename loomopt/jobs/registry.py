@@ -19,20 +19,12 @@ from loomopt.jobs.base import Job
 from loomopt.physics.effects.kinds import Effect, ranked
 from loomopt.scenes import packaged
 from loomopt.scenes.document import Paths, read_document
+from loomopt.scenes.packaged import entry_points
 from loomopt.scenes.scene import Scene, build
 from loomopt.scenes.schema import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-
-
-@functools.cache
-def entry_points(group: str) -> "tuple[EntryPoint, ...]":
-    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
-    from importlib.metadata import entry_points
-
-    return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
-
 
 JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
 """Groups of entry points."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 CONE_STEPS = 30
 """Projected gradient steps from each eigenvector by which the least curvature on the critical cone is sought. A
 heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
-missed; with one step some are (tests/solving/test_cone.py)."""
+missed; with one step some are (tests/maths/test_cone.py)."""
 
 
 CONE_OPEN, CONE_TIP = 1e-9, 1e-9

@@ -158,19 +158,18 @@ class Cornered(NamedTuple):
 
 
 def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
-    """Return each switch of a model, those of further cases after the first's."""
+    """Return each switch of a model."""
     found: list[Cornered] = []
-    for case in (given, *given.cases):
-        for arc in (*model.kinematics.arcs, *model.arcs):
-            angles = arc.corners(maths, case)
-            found.append(Cornered(angles, arc.switch, angles))
-        for load in model.loads:
-            if isinstance(load, Load) and load.corners:
-                angles = load.corners(maths, case.values, case.own[load.name])
-                # An event on a corner of the motion's own arcs would be that corner twice.
-                events = model.kinematics.breaks.intersection(load.reads)
-                there = {id(angle) for event in events for angle in case.values[event]}
-                found.append(Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
+    for arc in (*model.kinematics.arcs, *model.arcs):
+        angles = arc.corners(maths, given)
+        found.append(Cornered(angles, arc.switch, angles))
+    for load in model.loads:
+        if isinstance(load, Load) and load.corners:
+            angles = load.corners(maths, given.values, given.own[load.name])
+            # An event on a corner of the motion's own arcs would be that corner twice.
+            events = model.kinematics.breaks.intersection(load.reads)
+            there = {id(angle) for event in events for angle in given.values[event]}
+            found.append(Cornered(angles, load.switch, tuple(a for a in angles if id(a) not in there)))
     return found
 
 
@@ -242,7 +241,7 @@ def uncovered(effects: Sequence[Effect], own: Mapping[str, Values]) -> tuple[str
     return tuple(each.rests(own[each.name]) for each in effects if isinstance(each, State | Event))
 
 
-__all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills", "cased"]
+__all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills"]
 
 Stills = Mapping[str, Values]
 """Event → the switches just before it, by name."""
@@ -255,8 +254,7 @@ class JobModel:
     effects: loads, states and checks, in the order of the job. words: (effect, key, word) for values that choose a
     formula. quantities, rows: the job's own; those of checks come with them. assembly: what says that the mechanism
     assembles at an angle beside its kinematics' groups: phrase → (quantity, the largest |value| it may have).
-    known: names of scene numbers that are given. cases: for each further case, the names of the scene numbers that
-    it has values of its own for (under `cased`).
+    known: names of scene numbers that are given.
     """
 
     kinematics: Kinematics
@@ -268,7 +266,6 @@ class JobModel:
     integrals: tuple[Integral, ...] = ()
     assembled: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
-    cases: tuple[tuple[str, ...], ...] = ()
 
     @lazy
     def key(self) -> Hashable:
@@ -276,7 +273,7 @@ class JobModel:
         means = tuple((mean.name, len(mean.angles), mean.parts) for mean in self.integrals)
         arcs = tuple((arc.name, arc.structure) for arc in self.arcs)
         own = self.kinematics.structure, arcs, means, tuple(self.own_quantities), tuple(self.own_rows)
-        return own, self.effects, self.words, self.known, self.cases
+        return own, self.effects, self.words, self.known
 
     @lazy
     def loads(self) -> tuple[Acting, ...]:
@@ -320,7 +317,7 @@ class JobModel:
 
     def known_of(self, name: str) -> tuple[Where, ...]:
         """Return the pieces where a whole-cycle quantity is known; empty for all of the cycle."""
-        return self.known_in if self._quantities[self._cased.get(name, (name, 0))[0]].loaded else ()
+        return self.known_in if self._quantities[name].loaded else ()
 
     # Quantities and rows.
 
@@ -354,19 +351,8 @@ class JobModel:
 
     @lazy
     def events_read(self) -> tuple[str, ...]:
-        """Events at which rows stand; then those of further cases."""
-        return self._events + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._events)
-
-    @lazy
-    def _events(self) -> tuple[str, ...]:
-        """Events at which rows of one case stand."""
+        """Events at which rows stand."""
         return tuple(dict.fromkeys(row.event for row in self._rows.values() if row.event))
-
-    @lazy
-    def _cased(self) -> dict[str, tuple[str, int]]:
-        """Name of a quantity, row, switch or event at a further case → (its own name, the case's place)."""
-        names = (*self._quantities, *self._rows, *self._single, *self._events)
-        return {cased(name, k + 1): (name, k) for k in range(len(self.cases)) for name in names}
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -381,26 +367,22 @@ class JobModel:
     @lazy
     def signed(self) -> frozenset[str]:
         """Whole-cycle quantities of which the largest value counts, not the largest |value|."""
-        return self._of_kind("signed")
+        return frozenset(name for name, quantity in self._quantities.items() if quantity.signed)
 
     @lazy
     def bounded(self) -> frozenset[str]:
         """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
-        return self._of_kind("bounded")
-
-    def _of_kind(self, kind: str) -> frozenset[str]:
-        own = {name for name, quantity in self._quantities.items() if getattr(quantity, kind)}
-        return frozenset(own | {name for name, (plain, _) in self._cased.items() if plain in own})
+        return frozenset(name for name, quantity in self._quantities.items() if quantity.bounded)
 
     def has_quantity(self, name: str) -> bool:
         """Say whether a name is that of a whole-cycle quantity."""
-        return self._cased.get(name, (name, 0))[0] in self._quantities
+        return name in self._quantities
 
     def has_row(self, name: str) -> bool:
         """Say whether a name is that of a row this model has the numbers for."""
         means = {each for mean in self.integrals for each in (mean.name, mean.root)}
         turned = {row for effect in self.effects if isinstance(effect, Speed) for row in effect.rows}
-        return self._cased.get(name, (name, 0))[0] in {*self._rows, *means, *turned}
+        return name in {*self._rows, *means, *turned}
 
     @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
@@ -418,51 +400,33 @@ class JobModel:
 
     def given(self, maths: Maths, values: Values) -> Given:
         """Return the scene's numbers and what follows from them at once, SI."""
-        known = frozenset(values)
-        first = self._given(maths, values, known)
-        others = tuple(
-            self._given(maths, {**values, **{name: values[cased(name, k + 1)] for name in names}}, known)
-            for k, names in enumerate(self.cases)
-        )
-        return first._replace(cases=others)
-
-    def _given(self, maths: Maths, values: Values, known: frozenset[str]) -> Given:
-        found = self.plain(maths, values, known)
-        if not self.states:
-            return found
-
-        return with_states_eliminated(maths, self.kinematics, self.loads, found)
+        return with_states_eliminated(maths, self.kinematics, self.loads, self.plain(maths, values))
 
     def samples(self, given: Given) -> int:
         """Return how many samples of one turn the states of a design need; 0 without any."""
         return max((math.ceil(each.samples(given.values, given.own[each.name])) for each in self.states), default=0)
 
-    def plain(self, maths: Maths, values: Values, known: frozenset[str]) -> Given:
-        """Return the numbers of one case with what follows from the mechanism alone; known: names of the scene's."""
+    def plain(self, maths: Maths, values: Values) -> Given:
+        """Return the scene's numbers with what follows from the mechanism alone, SI."""
         own: dict[str, dict[str, Any]] = {}
         for effect, full in self._full.items():
             own[effect] = {key: values[name] for key, name in full.items() if name in values}
             own[effect] |= self.words_of(effect)
-        values = {**values, **self.kinematics.derived(maths, values, self.called)}
-        return Given(values, own, known=known)
+        derived = self.kinematics.derived(maths, values, self.called)
+        return Given({**values, **derived}, own, frozenset(values))
 
     @lazy
-    def _single(self) -> tuple[str, ...]:
-        """Names of the switches of one case."""
+    def switches(self) -> tuple[str, ...]:
+        """Names of what has corners in the cycle: the motion's arcs, the job's, then loads'."""
         arcs = (*self.kinematics.arcs, *self.arcs)
         cornered = [load.name for load in self.loads if isinstance(load, Load) and load.corners]
         return (*(arc.name for arc in arcs), *cornered)
 
     @lazy
-    def switches(self) -> tuple[str, ...]:
-        """Names of what has corners in the cycle: the motion's arcs, the job's, then loads'; then of further cases."""
-        return self._single + tuple(cased(name, k + 1) for k in range(len(self.cases)) for name in self._single)
-
-    @lazy
     def formula_switches(self) -> frozenset[str]:
         """Switches whose change changes a formula, not only what limits speak of."""
         arcs = {arc.name for arc in self.arcs}
-        return frozenset(name for name in self.switches if self._cased.get(name, (name, 0))[0] not in arcs)
+        return frozenset(name for name in self.switches if name not in arcs)
 
     def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
         """Return the corner angles of the cycle, rad, as declared one after the other."""
@@ -476,10 +440,7 @@ class JobModel:
 
     def hints(self, given: Given) -> dict[str, float]:
         """Return where corners that no formula gives lie, by name of value: what `given` starts from."""
-        found = dict(self.kinematics.hints(given, self.called))
-        for k, case in enumerate(given.cases):
-            found |= {cased(n, k + 1): v for n, v in self.kinematics.hints(case, self.called).items()}
-        return found
+        return dict(self.kinematics.hints(given, self.called))
 
     def singular(self, squares: Squares) -> tuple[float, ...]:
         """Return the crank angles, rad, where the mechanism nearly reaches a singular position."""
@@ -502,60 +463,29 @@ class JobModel:
 
     def together(self, maths: Maths, given: Given, node: Node) -> Callable[[str], Number]:
         """Return what reads whole-cycle quantities by name, SI, at a node whose pose is computed once for all."""
-        instants: dict[int, Instant] = {}
-
-        def quantity(name: str) -> Number:
-            plain, case = self._cased.get(name, (name, -1))
-            if case not in instants:
-                instants[case] = self._instant(maths, given, node, case)
-            return self._quantities[plain].formula(instants[case])
-
-        return quantity
-
-    def _instant(self, maths: Maths, given: Given, node: Node, case: int) -> Instant:
-        """Return the mechanism at a node; case: -1 for the first."""
-        if case < 0:
-            return Instant(self, maths, given, node)
-        return Instant(self, maths, given.cases[case], Node(node.phi, self._switch_of(node.switch, case)))
-
-    def _switch_of(self, switch: Values, case: int) -> Values:
-        own = {name: switch[cased(name, case + 1)] for name in self._single if cased(name, case + 1) in switch}
-        return {**switch, **own}
+        instant = Instant(self, maths, given, node)
+        return lambda name: self._quantities[name].formula(instant)
 
     def static(
         self, maths: Maths, given: Given, stills: Stills, names: Collection[str] | None = None
     ) -> dict[str, Number]:
-        """Return figures and rows that need one position only; all it has of the first case without names."""
+        """Return figures and rows that need one position only; all it has without names."""
         if names is None:
             known = given.values
             names = [name for name, row in self._rows.items() if all(need in known for need in row.needs)]
-        instants: dict[tuple[str, int], Instant] = {}
+        instants: dict[str, Instant] = {}
         found = {}
         for name in names:
-            plain, k = self._cased.get(name, (name, -1))
-            if plain in self._rows:
-                event = self._rows[plain].event
-                if (event, k) not in instants:
-                    instants[event, k] = self._still(maths, given, stills, event, k)
-                found[name] = self._rows[plain].formula(instants[event, k])
+            if name in self._rows:
+                event = self._rows[name].event
+                if event not in instants:
+                    instants[event] = Instant(self, maths, given, Node(None, stills.get(event, {})), event)
+                found[name] = self._rows[name].formula(instants[event])
         return found
-
-    def _still(self, maths: Maths, given: Given, stills: Stills, event: str, case: int) -> Instant:
-        """Return the mechanism at an event, or nowhere without one; case: -1 for the first."""
-        if case < 0:
-            return Instant(self, maths, given, Node(None, stills.get(event, {})), event)
-        switch = self._switch_of(stills.get(cased(event, case + 1), {}), case)
-        return Instant(self, maths, given.cases[case], Node(None, switch), event)
 
     def event(self, maths: Maths, given: Given, name: str) -> Number:
         """Return the crank angle of an event, rad."""
-        plain, k = self._cased.get(name, (name, -1))
-        return self.kinematics.events(maths, given if k < 0 else given.cases[k])[plain]
-
-
-def cased(name: str, case: int) -> str:
-    """Return the name of a number, quantity, row, switch or event at a further case, counted from 1."""
-    return f"{name} [case {case}]"
+        return self.kinematics.events(maths, given)[name]
 
 
 RESOLVED = 95
@@ -570,7 +500,7 @@ def with_words_fixed(model: JobModel, values: Mapping[str, float]) -> JobModel:
     """
     if not model.states:
         return model
-    given = model.plain(FLOAT, values, frozenset(values))
+    given = model.plain(FLOAT, values)
     words = {(effect, key): word for effect, key, word in model.words}
     for state in model.states:
         carried = carried_by(FLOAT, model.kinematics, model.loads, given, state)

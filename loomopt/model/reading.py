@@ -33,11 +33,11 @@ AtNode = Callable[[Node], tuple[Number, ...]]
 class Recording:
     """Quantities written down.
 
-    known: what they read of a design, by case (0: the first) and name; switches: what they read of a node beside φ.
+    known: names of what they read of a design; switches: of what they read of a node beside φ.
     """
 
     program: Program
-    known: tuple[tuple[int, str], ...]
+    known: tuple[str, ...]
     switches: tuple[str, ...]
     _bind: dict[tuple[Maths, Maths], Bind] = field(default_factory=dict)
 
@@ -45,8 +45,8 @@ class Recording:
         """Return the quantities of one design as a function of the node."""
         if systems not in self._bind:
             self._bind[systems] = self.program(systems)
-        cases, names = (given, *given.cases), self.switches
-        function = self._bind[systems]([cases[case].values[name] for case, name in self.known])
+        values, names = given.values, self.switches
+        function = self._bind[systems]([values[name] for name in self.known])
 
         def at(node: Node) -> tuple[Number, ...]:
             switch = node.switch
@@ -115,18 +115,14 @@ def recorded_quantities(
     first, there = (recording.recorded(tape, system) for system in range(2))
     phi, switch = tape.input(), {name: tape.input() for name in switches}
     raw = model.given(first, {name: tape.input() for name in sorted(known)})
-    inputs: dict[int, tuple[int, str]] = {}
-    cases = []
-    for k, case in enumerate((raw, *raw.cases)):
-        values = {of: tape.known(value) if isinstance(value, Recorded) else value for of, value in case.values.items()}
-        inputs |= {value.place: (k, of) for of, value in values.items() if isinstance(value, Recorded)}
-        cases.append(Given(values, case.own))
+    values = {of: tape.known(value) if isinstance(value, Recorded) else value for of, value in raw.values.items()}
+    inputs = {value.place: of for of, value in values.items() if isinstance(value, Recorded)}
     since = len(tape.operations)
-    given = Given(cases[0].values, cases[0].own, tuple(cases[1:]))
+    given = Given(values, raw.own)
     read = model.together(there, given, Node(phi, switch))
     outputs = tuple([read(name) for name in names])
     needed = tape.needed(outputs, since)
-    used = {place: spot for place, spot in inputs.items() if place in needed}
+    used = {place: of for place, of in inputs.items() if place in needed}
     called = {name: each for name, each in switch.items() if each.place in needed}
     program = tape.program(outputs, (phi, *called.values()), [Recorded(tape, place) for place in used], since)
     return Recording(program, tuple(used.values()), tuple(called))

@@ -37,13 +37,11 @@ class Pose(Motion):
 class Given(NamedTuple):
     """All numbers of a scene in one number system: `values` by name, `own` values of each effect.
 
-    cases: the same of every further set of scene numbers (several fabrics on one machine). known: names of the scene's
-    numbers, from which all else follows.
+    known: names of the scene's numbers, from which all else follows.
     """
 
     values: Values
     own: Mapping[str, Values]
-    cases: tuple["Given", ...] = ()
     known: frozenset[str] = frozenset()
 
 

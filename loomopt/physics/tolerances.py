@@ -99,8 +99,9 @@ FLAT = 1e-7
 
 JET_ERROR, DOUBT = 1e-10, 10.0
 """Error of jets, relative to the largest derivative of a row where that exceeds 1: a hundred times what is seen. 1500
-certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 6e-13 (test_forward.py). And
-the factor from its threshold within which a figure that decides is looked at again in 40 digits."""
+certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 6e-13 (see
+test_derivatives_jets.py). And the factor from its threshold within which a figure that decides is looked at again in
+40 digits."""
 
 
 CORRECTIONS, PRECISE = 4, 1e-9

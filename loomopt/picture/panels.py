@@ -13,10 +13,7 @@ from loomopt.model.drive import MOTOR, SPEED
 from loomopt.model.drive import POWER as PEAK_POWER
 from loomopt.model.model import read_at
 from loomopt.model.sampling import Sampler
-from loomopt.model.separation import Parted
-from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import Check, Load, Speed, State
-from loomopt.physics.motion.flight import Landing
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import Limit
 
@@ -154,73 +151,6 @@ def _levels(curve: Curve, limits: Mapping[str, Limit], scale: float) -> Iterator
 def each(columns: Sequence[str]) -> tuple[Panel, ...]:
     """Return a panel for every column that has a unit."""
     return tuple(Panel((name,)) for name in columns if COLUMN.fullmatch(name) and name != ANGLE)
-
-
-WIDE_FLIGHT = 0.1
-"""rad; a flight less wide has no mark of its own: hops after a landing."""
-
-
-def parted_remarks(scene: Scene, parted: Parted) -> Iterator[str]:
-    """Yield where contact is lost and how hard it is found again, and whether that repeats."""
-    name, course = parted.event.name, parted.course
-    if not course.parted:
-        yield f"{name}: contact is never lost"
-        return
-    (begin, end), first = course.first, course.first_landing
-    told = f"{name}: contact is lost at {scene.show(begin, 'angle')}"
-    if first is None or end is None:
-        told += " and never found again"
-    else:
-        told += f" and found again at {scene.show(end, 'angle')}, at {_landing_speed(scene, first)} against the cam"
-    yield f"{told}; figures of forces and torque are those of an output held on its cam, and no solve reads {name}"
-    if course.period is None:
-        turns = len(course.turns)
-        yield f"{name}: not periodic in {turns} turns; curves are those of the last one"
-        return
-    landings = [landing for turn in course.periodic for landing in turn.landings]
-    hardest = max(landings, key=lambda landing: -landing.speed, default=None)
-    often = "every turn" if course.period == 1 else f"every {course.period} turns"
-    count = "1 landing" if len(landings) == 1 else f"{len(landings)} landings"
-    worst = f", the hardest at {_landing_speed(scene, hardest)}" if hardest else ""
-    yield f"{name}: in the end the motion repeats {often}, with {count}{worst}"
-
-
-def _landing_speed(scene: Scene, landing: Landing) -> str:
-    return scene.show(abs(landing.speed), "velocity", 5)
-
-
-def parted_marks(parted: Parted, every: Mapping[str, float]) -> dict[str, float]:
-    """Return marks over the period, rad: those of every turn, where contact is lost, and where wide flights end."""
-    found, lifts, landings = dict[str, float](), list[float](), list[float]()
-    turns = parted.course.periodic
-    begins = {name: every.get(f"{name.removesuffix(' ends')} begins", 0.0) for name in every}
-    for k, turn in enumerate(turns):
-        for name, angle in every.items():
-            ahead = TURN if len(turns) > 1 and angle < begins[name] else 0.0
-            found[_of_turn(name, k + 1) if k else name] = k * TURN + angle + ahead
-        lifts += [k * TURN + angle for angle in turn.lifts]
-        landings += [k * TURN + landing.angle for landing in turn.landings]
-    whole, events = len(turns) * TURN, sorted([*lifts, *landings])
-    wide = [
-        each for each in landings if (each - events[events.index(each) - 1]) % whole >= WIDE_FLIGHT or len(events) == 1
-    ]
-    for word, angles in (("lift-off", lifts), ("landing", wide)):
-        found |= {f"{word} {k + 1}" if k else word: angle for k, angle in enumerate(angles)}
-    return found
-
-
-def _of_turn(name: str, turn: int) -> str:
-    """Return a mark's name in a later turn; what begins and ends stays a pair."""
-    what, _, last = name.rpartition(" ")
-    return f"{what} of turn {turn} {last}" if last in ("begins", "ends") else f"{name} of turn {turn}"
-
-
-def together(panels: Sequence[Panel], columns: tuple[str, str], name: str) -> tuple[Panel, ...]:
-    """Return panels with two columns in the panel of the first, across the figure."""
-    first, second = (next(panel for panel in panels if panel.columns[0] == column) for column in columns)
-    names = (*first.labels, *second.labels)
-    joined = first._replace(columns=columns, name=name, names=names, wide=True)
-    return tuple(joined if panel is first else panel for panel in panels if panel is not second)
 
 
 MOST_TWIST = 0.1

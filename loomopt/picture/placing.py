@@ -34,11 +34,6 @@ class Box(NamedTuple):
     right: float
     top: float
 
-    def meets(self, other: "Box") -> bool:
-        """Say whether the insides of two boxes have a point in common."""
-        across = self.left < other.right and other.left < self.right
-        return across and self.bottom < other.top and other.bottom < self.top
-
     def nearest(self, x: float, y: float) -> tuple[float, float]:
         """Return the point of the box that lies nearest to another."""
         return min(max(x, self.left), self.right), min(max(y, self.bottom), self.top)

@@ -1,14 +1,26 @@
 """Where packaged scenes and reference results stand: in the installed package, else at the checkout's top."""
 
 import difflib
+import functools
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.errors import BadInput, clean
 from loomopt.base.refusals import shown
 from loomopt.scenes.document import looked_up, read_document
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+
+@functools.cache
+def entry_points(group: str) -> "tuple[EntryPoint, ...]":
+    """Return the entry points of a group, by name; the same one found twice on the path counts once."""
+    from importlib.metadata import entry_points
+
+    return tuple(sorted(set(entry_points(group=group)), key=lambda point: (point.name, point.value)))
 
 
 def _folder(name: str) -> Path:
@@ -44,11 +56,6 @@ def head(path: Path) -> Head:
     return Head(path.stem, title, job, tuple(targets) if isinstance(targets, dict) else (), source)
 
 
-def problem_names() -> list[str]:
-    """Return the names of the packaged scenes, in alphabetical order."""
-    return list(problems())
-
-
 def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadInput] = ()) -> BadInput:
     """Return the error, with the nearest name, for a scene that is not packaged.
 
@@ -63,11 +70,6 @@ def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadIn
         allowed=", ".join(known),
         remedy=f"Correct the name ({hint}), or give a path that ends in .toml",
     )
-
-
-def problems_path() -> Path:
-    """Return the folder of the packaged scenes."""
-    return _folder("problems")
 
 
 def results_path() -> Path:

@@ -227,7 +227,7 @@ def test_a_law_of_more_intervals_or_less_bound_needs_a_softer_spring(plain):
 def test_the_spring_no_law_reaches_is_that_of_a_flight_as_long_as_the_rise(plain, study):
     """From rest at the bottom the frame flies back up in the time of the rise: 120 of 360 deg at 600 rpm."""
     scene = plain.PAPER
-    K1 = study.unbounded(scene)
+    K1 = plain.unbounded_law(scene)
 
     def pull(t, state):
         s = state[0] / scene.travel

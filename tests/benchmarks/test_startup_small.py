@@ -3,7 +3,7 @@
 How long `import casadi, numpy` takes says how fast a machine loads shared libraries; a command is mostly Python, and
 how fast that is differs by machine in its own way. So a solve is judged beside the same libraries with Typer and
 pydantic at work, which is work of both kinds. What does not depend on the machine at all is counted in
-tests/test_startup.py.
+tests/end_to_end/test_startup.py.
 """
 
 import functools

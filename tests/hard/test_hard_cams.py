@@ -4,19 +4,15 @@ Told one by one in docs/hard-cases.md.
 """
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from reference import shedding as plain
 
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms.cam_laws import LAWS
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import plain_shedding as plain
 
 PAPER = plain.PAPER
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")

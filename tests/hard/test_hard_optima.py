@@ -3,20 +3,15 @@
 Told one by one in docs/hard-cases.md.
 """
 
-import sys
-from pathlib import Path
-
 import pytest
+from support import toy
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import certify
 
-sys.path.append(str(Path(__file__).parents[1] / "solving"))
-import toy
-
 K1 = 102602.60942535726
-"""Least stiffness of the packaged heald frame, N/m, in 30 digits; benchmarks/plain_shedding.py."""
+"""Least stiffness of the packaged heald frame, N/m, in 30 digits; tests/reference/shedding.py."""
 M3_LIGHT = 76.98110208119851
 """Nearest to zero that the light cloth's reed torque comes, N·m."""
 

@@ -21,14 +21,14 @@ def scans(monkeypatch):
         return really(**wanted)
 
     monkeypatch.setattr(importlib.metadata, "entry_points", counted)
-    registry.entry_points.cache_clear()
+    packaged.entry_points.cache_clear()
     registry.find.cache_clear()
     yield found
-    registry.entry_points.cache_clear()
+    packaged.entry_points.cache_clear()
     registry.find.cache_clear()
 
 
-@pytest.mark.parametrize("name", packaged.problem_names())
+@pytest.mark.parametrize("name", packaged.problems())
 def test_own_scenes_are_read_without_a_scan(name, scans):
     scene = registry.load(name)
     registry.of(scene)
@@ -63,7 +63,7 @@ def test_an_unknown_scene_is_sought_and_the_nearest_is_named(scans):
 
 
 def test_all_are_listed_with_a_scan(scans):
-    assert set(packaged.problem_names()) <= set(registry.problems())
+    assert set(packaged.problems()) <= set(registry.problems())
     assert scans == ["loomopt.jobs"]
     assert set(registry.own_names()) <= set(registry.names())
     assert scans == ["loomopt.jobs"]
@@ -86,7 +86,7 @@ def test_what_scenes_look_jobs_up_in_pickles_as_itself():
 
 
 def test_every_own_scene_is_kept_in_results_of_its_own():
-    for name in packaged.problem_names():
+    for name in packaged.problems():
         scene = registry.load(name)
         assert (registry.results(scene) / f"{name}.{check.served(scene)[0]}.csv").is_file()
 

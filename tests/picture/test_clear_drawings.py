@@ -4,11 +4,10 @@ import dataclasses
 import itertools
 import math
 
-import clear
-import inch
 import numpy as np
 import pytest
 from reference import crank_rocker_synthesis
+from support import clear, inch
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -17,7 +16,7 @@ from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
 from loomopt.scenes import packaged
 
-NAMES = packaged.problem_names()
+NAMES = packaged.problems()
 MACHINES = 12
 """Random machines of each job."""
 

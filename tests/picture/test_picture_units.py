@@ -1,5 +1,5 @@
-import inch
 import pytest
+from support import inch
 
 import loomopt as lo
 from loomopt.picture.shapes import Units, drawn_units

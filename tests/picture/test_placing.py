@@ -1,9 +1,9 @@
 import itertools
 import math
 
-import clear
 import numpy as np
 import pytest
+from support import clear
 
 from loomopt.picture import placing, shapes
 from loomopt.picture.drawing import LEADER, Label, along, around, dimension, ground, mass, place, spring
@@ -47,7 +47,7 @@ def test_any_number_of_labels_of_one_point_find_room():
     found = place(labels, [POST], 1.0)
     boxes = [shapes.text_box(p, 1.0) for p in found if isinstance(p, Text)]
     assert len(boxes) == 24
-    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].meets(pair[1])]
+    assert not [pair for pair in itertools.combinations(boxes, 2) if clear.overlap(*pair)]
 
 
 def test_strokes_are_sampled_so_closely_that_no_label_slips_between():

@@ -43,13 +43,10 @@ OF_POSE = (
     *("psi", "psi_1", "psi_2", "psi_3", "rod_1", "rod_2"),
     *("obliquity", "cos_crank_rod", "sin_crank_rod"),
 )
-OF_CENTRES = (
-    *("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear"),
-    *("psi_2_front", "psi_2_rear"),
-)
+OF_CENTRES = (*("beta", "beta_r", "theta", "swing", "psi_front", "psi_rear", "psi_2_front"),)
 OF_DRIVE = ("phi3", "phi3_1", "phi3_2", "phi3_3", "phi63_1", "phi63_2", "phi63_3", "obliquity")
 OF_CONTACT = ("angle", "speed", "pressure_angle", "curvature", "profile_curvature")
-POINTS = ("centre", "tangent", "normal", "profile")
+POINTS = ("centre", "normal", "profile")
 
 
 def named(thing, names):

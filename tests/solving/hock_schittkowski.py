@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
 
-import toy
+from support import toy
 
 INF = math.inf
 

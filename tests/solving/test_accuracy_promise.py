@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from plain_beatup import Machine
-from rapier_by_hand import Drive
-from shedding_cases import plain, programmed
+from reference.beatup import Machine
+from reference.rapier import Drive
+from support.shedding_cases import plain, programmed
 
 import loomopt as lo
 from loomopt.base.errors import BadInput

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-import toy
+from support import toy
 
 from loomopt.solving import engine
 from loomopt.solving.answer import report

@@ -3,7 +3,7 @@
 from unittest import mock
 
 import pytest
-import toy
+from support import toy
 
 from loomopt.jobs import registry
 from loomopt.solving import engine

@@ -7,7 +7,7 @@ import hock_schittkowski
 import hock_schittkowski_larger
 import numpy as np
 import pytest
-import toy
+from support import toy
 
 from loomopt.maths import systems
 from loomopt.physics.balance import Given

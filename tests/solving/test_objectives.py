@@ -3,7 +3,7 @@
 import math
 
 import pytest
-import toy
+from support import toy
 
 from loomopt.solving.certificate.certificate import certify
 

@@ -75,7 +75,7 @@ def test_all_packaged_results_are_reproduced(capsys, monkeypatch):
     assert run(["check"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
-    for name in packaged.problem_names():
+    for name in packaged.problems():
         for target in study.served(load(name)):
             line = next(line for line in out.splitlines() if line.split()[:2] == [name, target])
             assert line.endswith("reproduces")
@@ -89,7 +89,7 @@ def test_targets_that_need_what_a_scene_lacks_are_left_out():
 
 
 def test_every_packaged_scene_and_target_has_a_reference_with_provenance():
-    wanted = {f"{name}.{target}.csv" for name in packaged.problem_names() for target in study.served(load(name))}
+    wanted = {f"{name}.{target}.csv" for name in packaged.problems() for target in study.served(load(name))}
     wanted |= {f"{name}.{first}-against-{second}.csv" for name, first, second in FRONTS}
     assert {path.name for path in packaged.results_path().iterdir()} == wanted
     for path in packaged.results_path().iterdir():

@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import inch
 import pandas as pd
 import pytest
+from support import inch
 
 import loomopt as lo
 from loomopt.base.errors import BadInput

@@ -47,19 +47,27 @@ def printed(found: "Evaluation") -> None:
 
 def list_problems() -> None:
     """List the packaged problems and their targets."""
-    from loomopt.interface.text import layout, scenes
-    from loomopt.jobs import registry
+    from loomopt.interface.text import layout
     from loomopt.scenes import packaged
 
     heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
     silent = [head.name for head in heads if not head.targets]
-    if silent or registry.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
+    if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
         from loomopt.jobs import registry
 
         others, wrong = registry.brought()
         read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
         heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
-    layout.show(scenes.grid(sorted(heads)))
+    lines = [
+        row
+        for head in sorted(heads)
+        for row in (
+            (head.name, head.title),
+            ("", f"job {head.job}; targets {', '.join(head.targets)}"),
+            ("", f"source: {head.source or 'not given'}"),
+        )
+    ]
+    layout.show(layout.Grid("", ("problem", "what it is"), tuple(lines)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 

@@ -5,11 +5,8 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
 from typing import Any
-
-from matplotlib.figure import Figure
 
 from loomopt.base import files
 from loomopt.interface.files import svg
@@ -114,6 +111,8 @@ def blank(width: float, height: float) -> Any:
     """Return an empty figure, inches, that belongs to no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+    from loomopt.interface.figures.shown_figure import ShownFigure
+
     figure = ShownFigure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -156,16 +155,3 @@ def _characters(path: str) -> frozenset[str]:
         return frozenset(map(chr, font.get_charmap())) if font.scalable else frozenset()
     except (OSError, RuntimeError):
         return frozenset()
-
-
-DOTS = 110
-"""Per inch of a figure on a page of a notebook."""
-
-
-class ShownFigure(Figure):
-    """A figure as any other of matplotlib's."""
-
-    def _repr_png_(self) -> bytes:
-        picture = BytesIO()
-        self.savefig(picture, format="png", dpi=DOTS)
-        return picture.getvalue()

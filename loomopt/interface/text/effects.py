@@ -140,7 +140,7 @@ def frame(found: Found, si: bool = False) -> "pd.DataFrame":
     """Return one line per effect; si: in SI, so that studies of machines in different units can be compared."""
     import pandas as pd
 
-    from loomopt.interface.tables import TableFrame
+    from loomopt.interface.table_frame import TableFrame
 
     words, rows = Words(found.scene), found.rows
     cells: dict[str, object] = {}

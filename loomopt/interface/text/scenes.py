@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
-from loomopt.scenes.packaged import Head
 from loomopt.scenes.scene import Scene, given
 from loomopt.solving.answer.words import Words
 
@@ -154,15 +153,3 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
     texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
     return f"{symbol}\n[{unit}]", texts
-
-
-def grid(heads: Iterable[Head]) -> Grid:
-    """Return title, targets and source of each scene."""
-    lines: list[tuple[str, str]] = []
-    for head in heads:
-        lines += [
-            (head.name, head.title),
-            ("", f"job {head.job}; targets {', '.join(head.targets)}"),
-            ("", f"source: {head.source or 'not given'}"),
-        ]
-    return Grid("", ("problem", "what it is"), tuple(lines))

@@ -72,9 +72,10 @@ class SheddingViews(JobViews):
             found |= {"least cam force": math.nan if angle is None else angle}
         if parted is None:
             return found
-        from loomopt.picture import panels
 
-        return panels.parted_marks(parted, found)
+        from loomopt.picture.parted import marks
+
+        return marks(parted, found)
 
     def words(self) -> Mapping[str, Curve]:
         """Return what the curves are called."""
@@ -109,7 +110,7 @@ class SheddingViews(JobViews):
         shown = [panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown]
         if "X_cam [m]" not in columns:
             return tuple(shown)
-        from loomopt.picture.panels import together
+        from loomopt.picture.parted import together
 
         return together(shown, ("X [m]", "X_cam [m]"), "travel of frame and cam")
 
@@ -125,9 +126,9 @@ class SheddingViews(JobViews):
 def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
     """Say where the roller leaves the cam, where an effect says what then becomes of the frame."""
     if parted:
-        from loomopt.picture.panels import parted_remarks
+        from loomopt.picture.parted import remarks
 
-        yield from parted_remarks(scene, parted)
+        yield from remarks(scene, parted)
 
 
 def _floating(scene: Scene, sampler: Sampler) -> Iterator[str]:

@@ -90,10 +90,6 @@ class Contact:
         sin, cos, direction = self.maths.sin, self.maths.cos, theta + self._angle
         return Vector(a * sin(theta) - arm * sin(direction), a * cos(theta) - arm * cos(direction))
 
-    def tangent(self, theta: Number) -> Vector:
-        """Return d(centre)/dθ in the cam's frame, m."""
-        return self._turned(theta, *self._local)
-
     def normal(self, theta: Number) -> Vector:
         """Return the unit normal of the curve in the cam's frame, towards the cam."""
         along, across = self._local

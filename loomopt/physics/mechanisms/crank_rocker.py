@@ -215,12 +215,6 @@ class DeadCentres:
         l1, l2 = self.lengths.l1, self.lengths.l2
         return self.lengths.side * 2 * l1 * (l2 + l1) ** 2 / (l2 * self._areas[0])
 
-    @lazy
-    def psi_2_rear(self) -> Number:
-        """ψ'' at rear dead centre."""
-        l1, l2 = self.lengths.l1, self.lengths.l2
-        return -self.lengths.side * 2 * l1 * (l2 - l1) ** 2 / (l2 * self._areas[1])
-
 
 @dataclass(frozen=True)
 class Still(Pose):

@@ -64,21 +64,14 @@ def rates(dyad: Dyad, base_1: Vector) -> tuple[Number, Number]:
     return scale * dot(dyad.link2, base_1), scale * dot(dyad.link1, base_1)
 
 
-def second_rates(
-    dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r1: Number, r2: Number
-) -> tuple[Number, Number]:
-    """Return d²φ₁/dφ² and d²φ₂/dφ² of both links; base_2: d²(base)/dφ², rates as from `rates`."""
-    return second_rate_1(dyad, base_2, rate1, rate2, r2), second_rate_2(dyad, base_2, rate1, rate2, r1)
-
-
 def second_rate_1(dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r2: Number) -> Number:
-    """Return d²φ₁/dφ² of link 1 alone, as `second_rates`."""
+    """Return d²φ₁/dφ² of link 1; base_2: d²(base)/dφ², rates as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     return 2 / dyad.area4 * (dot(dyad.link2, base_2) + rate1 * rate1 * mutual - rate2 * rate2 * (r2 * r2))
 
 
 def second_rate_2(dyad: Dyad, base_2: Vector, rate1: Number, rate2: Number, r1: Number) -> Number:
-    """Return d²φ₂/dφ² of link 2 alone, as `second_rates`."""
+    """Return d²φ₂/dφ² of link 2; base_2: d²(base)/dφ², rates as from `rates`."""
     mutual = dot(dyad.link1, dyad.link2)
     return 2 / dyad.area4 * (dot(dyad.link1, base_2) + rate1 * rate1 * (r1 * r1) - rate2 * rate2 * mutual)
 

@@ -54,7 +54,7 @@ class Coil:
     @property
     def wahl(self) -> Number:
         """Wahl's factor K_W = (4C − 1)/(4C − 4) + 0.615/C: curvature and direct shear [Shigley, eq 10-4]."""
-        return _inner_torsion(self.index) + 123 / (200 * self.index)
+        return (4 * self.index - 1) / (4 * self.index - 4) + 123 / (200 * self.index)
 
     @property
     def body_turns(self) -> Number:
@@ -120,18 +120,6 @@ class Coil:
         """Return the tensile stress inside the hook's bend F (16 D K_A/(π d³) + 4/(π d²)), Pa [Shigley, eq 10-34]."""
         bending = 16 * self.diameter * self.hook_curvature / (maths.pi * self.wire**3)
         return force * (bending + 4 / (maths.pi * self.wire**2))
-
-    def hook_shear(self, maths: Maths, force: Number, bend_radius: Number) -> Number:
-        """Return the shear stress where the hook leaves the body, K_B 8 F D/(π d³), Pa [Shigley, eq 10-36].
-
-        bend_radius: r_2 of that bend, at a right angle to the last coil, m; C2 = 2 r_2/d above 1.
-        """
-        return _inner_torsion(2 * bend_radius / self.wire) * self.torsion(maths, force)
-
-
-def _inner_torsion(bend: Number) -> Number:
-    """Return (4C − 1)/(4C − 4), by which a bend of index C raises torsion on its inside [Shigley, eq 10-37]."""
-    return (4 * bend - 1) / (4 * bend - 4)
 
 
 def strength(maths: Maths, d: Number, A: Number, m: Number) -> Number:

@@ -35,7 +35,7 @@ FALLEN, FALL_MARGIN = 1e-12, 10.0
 
 FALL_GROWTH = 18.0
 """How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
-to be doubted: of third order it grows 37 times, of higher more, an error by chance (tests/solving/test_valley.py)."""
+to be doubted: of third order it grows 37 times, of higher more, an error by chance (test_valley.py)."""
 
 
 @dataclass(frozen=True)

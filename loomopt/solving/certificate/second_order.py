@@ -34,7 +34,7 @@ from loomopt.solving.search import settle
 
 FAINT = 1e-4
 """Curvature up to which a direction is looked along at PROBES, for what higher orders do there: at a step of 1e-2 a
-cubic term of size 1 outweighs it (toys of tests/solving/test_adversary.py)."""
+cubic term of size 1 outweighs it (toys of tests/solving/certificate/test_certificate_adversary.py)."""
 
 
 NEWTON_CURVED, NEWTON_DONE = 1e-5, 1e-13

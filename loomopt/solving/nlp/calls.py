@@ -92,17 +92,18 @@ class Calls:
         nodes: Sequence[Sequence[Extreme]],
     ) -> dict[str, Any]:
         """Return what the NLP is called with: start, parameters and bounds, all scaled."""
-        lower, upper = self._bounds()
-        static = [self.program.limits[k].sign == 0 for k in nlp.structure.static]
-        equal = static + [False] * (nlp.rows - len(static))
+        rows, (lower, upper) = nlp.rows, self._bounds()
         scaled = np.array([x[v.name] / v.scale for v in self.program.variables])
+        lbg, ubg = np.full(rows.size, -np.inf), np.zeros(rows.size)
+        rows.of_limits(lbg)[[self.program.limits[k].sign == 0 for k in rows.limits]] = 0.0
+        rows.at_nodes(ubg)[~rows.used(list(map(len, nodes)))] = 1.0
         return {
-            "x0": np.concatenate([np.clip(scaled, lower, upper), extra]),
+            "x0": rows.joined(np.clip(scaled, lower, upper), extra),
             "p": nlp.structure.vector(self.program, sampler, self.weights, nodes, self._costs(nlp)),
-            "lbx": np.concatenate([lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)]),
-            "ubx": np.concatenate([upper, self._most(nlp)]),
-            "lbg": np.where(equal, 0.0, -np.inf),
-            "ubg": np.where(self.idle_rows(nlp, nodes), 1.0, 0.0),
+            "lbx": rows.joined(lower, np.full(len(extra), 0.0 if self.elastic else -np.inf)),
+            "ubx": rows.joined(upper, self._most(nlp)),
+            "lbg": lbg,
+            "ubg": ubg,
         }
 
     def _bounds(self) -> tuple[Floats, Floats]:
@@ -124,7 +125,7 @@ class Calls:
         """Return the cost of each excess, infinite where a limit is firm; nothing for a program that is not elastic."""
         if self.ways is None:
             return np.zeros(0)
-        return np.array(self.ways.costs or np.ones(nlp.structure.extras))
+        return np.array(self.ways.costs or np.ones(nlp.rows.extras))
 
     def _costs(self, nlp: Transcription) -> Floats:
         costs = self._ways(nlp)
@@ -133,16 +134,16 @@ class Calls:
     def _most(self, nlp: Transcription) -> Floats:
         """Return upper bounds of the epigraph variables, or of the excesses: none where a limit is firm."""
         if self.ways is None:
-            return np.full(nlp.structure.extras, np.inf)
+            return np.full(nlp.rows.extras, np.inf)
         return np.where(np.isinf(self._ways(nlp)), 0.0, np.inf)
 
     def overdetermined(self, arguments: Mapping[str, Any]) -> bool:
         """Say whether more equalities than free variables leave nothing to solve for."""
         return bool(np.sum(arguments["lbg"] == 0.0) > np.sum(arguments["lbx"] < arguments["ubx"]))
 
-    def design(self, flat: Floats) -> dict[str, float]:
-        """Return the variables, SI, of the NLP's scaled vector."""
-        x = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, flat, strict=False)}
+    def design(self, scaled: Floats) -> dict[str, float]:
+        """Return the design's variables, SI, of the NLP's."""
+        x = {v.name: float(value * v.scale) for v, value in zip(self.program.variables, scaled, strict=True)}
         if self.elastic:
             return x
         return {v.name: min(max(x[v.name], v.lower), v.upper) for v in self.program.variables}
@@ -151,18 +152,11 @@ class Calls:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.ways:
             beside = self.ways.beside
-            return np.array(beside.excesses) if beside else np.ones(nlp.structure.extras)
+            return np.array(beside.excesses) if beside else np.ones(nlp.rows.extras)
         levels = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
         first = np.array([level.merit(sampler) / level.scale for level in levels])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
-
-    def idle_rows(self, nlp: Transcription, nodes: Sequence[Sequence[Extreme]]) -> list[bool]:
-        """Say which rows belong to unused slots."""
-        rows = [False] * (nlp.rows - len(self.families) * nlp.slots)
-        for chosen in nodes:
-            rows += [k >= len(chosen) for k in range(nlp.slots)]
-        return rows
 
     def excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
         """Return by how much an extreme exceeds its bound, relative to the row's size."""

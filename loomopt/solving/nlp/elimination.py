@@ -7,7 +7,7 @@ Numerical Optimization, 2nd ed., section 15.3].
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.expressions import Expressions
 from loomopt.solving.nlp.lifted import Lifted
+from loomopt.solving.nlp.rows import RowMap
 
 
 class Entries:
@@ -74,35 +75,36 @@ def _of(picked: Sequence[Lifted], x: Any) -> Any:
 class Elimination:
     """An NLP's functions of its own variables and rows, from those with lifted variables, which IPOPT is given."""
 
-    def __init__(self, written: Expressions) -> None:
+    def __init__(self, written: Expressions, own: RowMap) -> None:
         import casadi as ca
 
         lifted = written.lifts.defined
         z, worth = ca.vertcat(*(each.symbol for each in lifted)), ca.vertcat(*(each.worth for each in lifted))
-        self.own, self.rows, self.count = written.x.numel(), written.g.numel(), len(lifted)
-        x, lam_f, lam_g = ca.vertcat(written.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.rows + self.count)
+        self.full = replace(own, lifted=len(lifted))
+        x, lam_f, lam_g = ca.vertcat(written.x, z), ca.SX.sym("f"), ca.SX.sym("g", self.full.size)
         g = ca.vertcat(written.g, z - worth)
         self.nlp = {"x": x, "p": written.p, "f": written.f, "g": g}
         explicit, _ = ca.substitute_inplace(
             [each.symbol for each in lifted], [each.worth for each in lifted], [], False
         )
         self._start = ca.Function("start", [written.x, written.p], [ca.vertcat(*explicit)])
-        first = self.rows + len(written.lifts.named)
-        parts = [ca.jacobian(g[: self.rows], x), ca.jacobian(g[self.rows : first], x), _of(written.lifts.picked, x)]
-        slopes = ca.vertcat(*parts)
-        curved = self.rows if not ca.depends_on(slopes[self.rows :, :], x) else self.rows + self.count
-        bend: Any = ca.triu(ca.hessian(lam_f * written.f + ca.dot(lam_g[:curved], g[:curved]), x)[0])
+        named = ca.vertcat(*(each.symbol - each.worth for each in written.lifts.named))
+        defining = ca.vertcat(ca.jacobian(named, x), _of(written.lifts.picked, x))
+        slopes = ca.vertcat(ca.jacobian(written.g, x), defining)
+        priced = ca.dot(lam_g, g) if ca.depends_on(defining, x) else ca.dot(self.full.own_rows(lam_g), written.g)
+        bend: Any = ca.triu(ca.hessian(lam_f * written.f + priced, x)[0])
         self.functions = {
             "grad_f": ca.Function("nlp_grad_f", [x, written.p], [written.f, ca.gradient(written.f, x)]),
             "jac_g": ca.Function("nlp_jac_g", [x, written.p], [g, slopes]),
             "hess_lag": ca.Function("nlp_hess_l", [x, written.p, lam_f, lam_g], [bend]),
         }
-        own, more = range(self.own), range(self.own, self.own + self.count)
-        rows, definitions = range(self.rows), range(self.rows, self.rows + self.count)
-        pattern = slopes.sparsity()
-        self._g_x, self._g_z = Entries(pattern, rows, own), Entries(pattern, rows, more)
-        self._d_x, self._d_z = Entries(pattern, definitions, own), Entries(pattern, definitions, more)
-        self._bends = Entries(bend.sparsity(), range(x.numel()), range(x.numel()))
+        all_rows, columns, pattern = range(g.numel()), range(x.numel()), slopes.sparsity()
+        rows, definitions = self.full.own_rows(all_rows), self.full.definitions(all_rows)
+        self._g_x = Entries(pattern, rows, self.full.own_variables(columns))
+        self._g_z = Entries(pattern, rows, self.full.lifted_variables(columns))
+        self._d_x = Entries(pattern, definitions, self.full.own_variables(columns))
+        self._d_z = Entries(pattern, definitions, self.full.lifted_variables(columns))
+        self._bends = Entries(bend.sparsity(), columns, columns)
         self._last: tuple[Any, Any, _Local] | None = None
 
     def start(self, x: Floats, p: Floats) -> Floats:
@@ -112,13 +114,13 @@ class Elimination:
     def jacobian(self, x: Floats, p: Floats) -> tuple[Floats, Floats]:
         """Return the rows and their first derivatives."""
         at = self._at(x, p)
-        return at.rows[: self.rows], self._g_x.dense(at.entries) + self._g_z.times(at.entries, at.follow)
+        return self.full.own_rows(at.rows), self._g_x.dense(at.entries) + self._g_z.times(at.entries, at.follow)
 
     def gradient(self, x: Floats, p: Floats) -> tuple[float, Floats]:
         """Return the objective and its first derivatives."""
         at = self._at(x, p)
         value, slope = self._slope(at, p)
-        return value, slope[: self.own] + slope[self.own :] @ at.follow
+        return value, self.full.own_variables(slope) + self.full.lifted_variables(slope) @ at.follow
 
     def curvature(self, x: Floats, p: Floats, weight: float, multipliers: Floats) -> Floats:
         """Return the second derivatives of the Lagrangian, their upper triangle."""
@@ -126,7 +128,7 @@ class Elimination:
         more = self.prices(x, p, weight, multipliers)
         said = self.functions["hess_lag"](at.full, p, weight, np.concatenate([multipliers, more]))
         values = np.array(said.nonzeros())
-        along = np.concatenate([np.eye(self.own), at.follow])
+        along = np.concatenate([np.eye(at.follow.shape[1]), at.follow])
         half = along.T @ self._bends.times(values, along)
         diagonal = self._bends.row == self._bends.column
         on = np.zeros(len(along))
@@ -137,10 +139,11 @@ class Elimination:
     def prices(self, x: Floats, p: Floats, weight: float, multipliers: Floats) -> Floats:
         """Return the definitions' multipliers, from those of the rows: nothing is to be gained by a lifted variable."""
         at = self._at(x, p)
-        left = -weight * self._slope(at, p)[1][self.own :] - self._g_z.transposed_times(at.entries, multipliers)
+        slope: Floats = self.full.lifted_variables(self._slope(at, p)[1])
+        left: Floats = -weight * slope - self._g_z.transposed_times(at.entries, multipliers)
         entries, ends = self._d_z, self._d_z.ends
         values = at.entries[entries.place]
-        for k in range(self.count - 1, -1, -1):
+        for k in range(self.full.lifted - 1, -1, -1):
             part = slice(ends[k], ends[k + 1] - 1)
             left[entries.column[part]] -= values[part] * left[k]
         return left
@@ -162,7 +165,7 @@ class Elimination:
         """Return dz/dx: each row from those before it."""
         found = -self._d_x.dense(entries)
         column, ends, values = self._d_z.column, self._d_z.ends, entries[self._d_z.place]
-        for k in range(self.count):
+        for k in range(self.full.lifted):
             # The last entry of a row is its own, which is 1.
             part = slice(ends[k], ends[k + 1] - 1)
             found[k] -= values[part] @ found[column[part]]
@@ -183,11 +186,11 @@ class Solver:
     def __call__(self, **arguments: Any) -> dict[str, Floats]:
         """Return IPOPT's answer: f, and x, lam_x, lam_g of the NLP's own variables and rows."""
         of, x, p = self.eliminated, arguments["x0"], arguments["p"]
-        free, none = np.full(of.count, np.inf), np.zeros(of.count)
+        free, none = np.full(of.full.lifted, np.inf), np.zeros(of.full.lifted)
         more = {"x0": of.start(x, p), "lbx": -free, "ubx": free, "lbg": none, "ubg": none}
         if "lam_g0" in arguments:
             more |= {"lam_x0": none, "lam_g0": of.prices(x, p, 1.0, arguments["lam_g0"])}
         said = self.made(**arguments | {name: np.concatenate([arguments[name], part]) for name, part in more.items()})
         found = {name: np.asarray(said[name], dtype=np.float64).ravel() for name in ("x", "lam_x", "lam_g")}
-        own = {name: values[: of.rows if name == "lam_g" else of.own] for name, values in found.items()}
-        return {**own, "f": np.asarray(said["f"], dtype=np.float64)}
+        own = {name: of.full.own_variables(found[name]) for name in ("x", "lam_x")}
+        return {**own, "lam_g": of.full.own_rows(found["lam_g"]), "f": np.asarray(said["f"], dtype=np.float64)}

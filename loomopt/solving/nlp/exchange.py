@@ -20,12 +20,13 @@ from loomopt.solving.nlp.follow import follow
 from loomopt.solving.nlp.ipopt import Answer, run
 from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.polish import polish
+from loomopt.solving.nlp.rows import Multipliers
 from loomopt.solving.nlp.stations import Family
 from loomopt.solving.nlp.transcribe import Transcription
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
 """Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
-creep (tests/solving/test_infeasible.py)."""
+creep (tests/solving/search/test_infeasible.py)."""
 
 
 STANDS = 1e-7
@@ -43,14 +44,15 @@ Nodes = tuple[tuple[Extreme, ...], ...]
 class _Place(NamedTuple):
     """Where a round begins: variables, SI, with the extremes there; nodes to solve at.
 
-    raw: multipliers to start warm from, if any; extra: the epigraph or elastic variables, None where nothing is known.
+    multipliers: to start warm from, if there are any; extra: the epigraph or elastic variables, None where nothing is
+    known.
     """
 
     x: dict[str, float]
     sampler: Sampler
     peaks: Nodes
     nodes: Nodes
-    raw: Mapping[str, Floats]
+    multipliers: Multipliers
     extra: Floats | None
 
 
@@ -114,12 +116,13 @@ def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | No
     peaks = _frozen(calls.peaks(sampler))
     beside = calls.ways.beside if calls.ways else None
     if beside:
-        return _Place(x, sampler, peaks, beside.nodes, {}, None)
+        return _Place(x, sampler, peaks, beside.nodes, Multipliers(), None)
     nodes = warm.nodes if warm else calls.first_nodes(calls.loose(sampler, peaks))
     if calls.settings.uniform:
         nodes = tuple(_uniform(sampler, family, calls.settings.uniform) for family in calls.families)
-    raw = warm.raw if warm else {}
-    return _Place(x, sampler, peaks, nodes, raw, raw.get("extra"))
+    if warm and warm.multipliers:
+        return _Place(x, sampler, peaks, nodes, warm.multipliers, warm.extra)
+    return _Place(x, sampler, peaks, nodes, Multipliers(), None)
 
 
 def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
@@ -128,13 +131,13 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     A point of failure where what the solver reached has no real cycle, or is no better than what is known; iterations:
     of the rounds before.
     """
-    nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.raw))
+    nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.multipliers))
     extra = calls.first_extra(nlp, here.sampler) if here.extra is None else here.extra
-    answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.raw)
+    answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.multipliers)
     iterations += answer.iterations
-    if answer.status not in SUCCESS and here.raw:
+    if answer.status not in SUCCESS and here.multipliers:
         extra = calls.first_extra(nlp, here.sampler)
-        answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, {})
+        answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
         iterations += answer.iterations
     if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):
         return Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
@@ -151,7 +154,7 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
             (*of, *(e for e in top if calls.excess(family, e, answer.extra) > calls.settings.excess))
             for of, top, family in zip(nodes, calls.loose(sampler, peaks), calls.families, strict=True)
         )
-    after = _Place(answer.x, sampler, peaks, nodes, answer.raw, answer.extra)
+    after = _Place(answer.x, sampler, peaks, nodes, answer.multipliers, answer.extra)
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
     steady = sampler.stills == here.sampler.stills
     return _Round(after, nlp, answer, reached, violation, steady, iterations)
@@ -161,9 +164,17 @@ def _ended(calls: Calls, result: _Round) -> Point:
     """Return the point that the exchange ends in, put exactly on what binds."""
     here, answer, program = result.after, result.answer, calls.program
     point = Point(
-        here.x, answer.status, result.reached, result.iterations, here.nodes, result.violation, answer.raw, calls.built
+        here.x,
+        answer.status,
+        result.reached,
+        result.iterations,
+        here.nodes,
+        result.violation,
+        extra=answer.extra,
+        multipliers=answer.multipliers,
+        built=calls.built,
+        value=answer.value,
     )
-    point = replace(point, value=answer.value)
     if not result.reached or not calls.settings.polished:
         return point
     if calls.elastic:
@@ -172,9 +183,9 @@ def _ended(calls: Calls, result: _Round) -> Point:
             reached=result.violation <= STANDS,
             relaxed=_relaxed(program, answer.extra),
             excesses=tuple(answer.extra.tolist()),
-            binding=_binding(here, result.nlp.slots),
+            binding=_binding(here),
         )
-    x, touching = polish(calls, here.x, answer.extra, point, here.peaks)
+    x, touching = polish(calls, here.x, answer.extra, answer.multipliers, here.peaks)
     rough, structure = x is here.x, program.structure
     return replace(point, x=x, rough=rough, binding=_frozen(touching), built=calls.built, structure=structure)
 
@@ -185,28 +196,24 @@ def _followed(calls: Calls, result: _Round) -> Point | None:
     They move the nodes with the extremes, where the exchange can only add: along a flat direction that shifts the
     extremes it creeps.
     """
-    here, status, slots = result.after, result.answer.status, result.nlp.slots
-    if calls.elastic or status not in SUCCESS or not here.raw or not calls.settings.polished:
+    here, status = result.after, result.answer.status
+    if calls.elastic or status not in SUCCESS or not here.multipliers or not calls.settings.polished:
         return None
-    binding = _binding(here, slots)
-    loose = _frozen(calls.loose(here.sampler, here.peaks))
-    point = Point(here.x, status, True, nodes=loose, raw=here.raw, binding=binding)
-    followed = follow(calls, replace(point, structure=calls.program.structure))
+    loose, binding = _frozen(calls.loose(here.sampler, here.peaks)), _binding(here)
+    point = Point(here.x, status, True, nodes=loose, binding=binding, structure=calls.program.structure)
+    followed = follow(calls, replace(point, extra=result.answer.extra, multipliers=here.multipliers))
     return replace(followed, iterations=result.iterations, value=result.answer.value) if followed else None
 
 
-def _binding(here: _Place, slots: int) -> Nodes:
+def _binding(here: _Place) -> Nodes:
     """Return of each family the nodes that carry a multiplier where the solver stopped."""
-    if not here.nodes:
-        return ()
-    prices = here.raw["lam_g"][-len(here.nodes) * slots :].reshape(len(here.nodes), slots)
-    pairs = zip(here.nodes, prices, strict=True)
+    pairs = zip(here.nodes, here.multipliers.at_nodes, strict=True)
     return tuple(tuple(e for e, price in zip(of, own, strict=False) if price > BINDING) for of, own in pairs)
 
 
 def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bool:
     """Say whether all rows hold where IPOPT gave up: then the certificate judges, not the solver's word."""
-    grown = any(len(of) > nlp.slots for of in here.nodes)
+    grown = any(len(of) > nlp.rows.slots for of in here.nodes)
     if calls.elastic or grown or here.sampler.corner_count != nlp.structure.corners:
         return False
     arguments = calls.arguments(nlp, here.sampler, here.x, extra, here.nodes)

@@ -52,14 +52,12 @@ class Quantities:
         """Kept: what identifies a symbol is another's once it is gone."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
         found = model.given(replace(systems.casadi(), choose=chosen), symbols)
-        pairs = zip((found, *found.cases), (given, *given.cases), strict=True)
-        first, *others = [Given(self._shared(one.values, worth.values), one.own) for one, worth in pairs]
-        self.given, self._in_symbols = given, first._replace(cases=tuple(others))
+        self.given, self._in_symbols = given, Given(self._shared(found.values, given.values), found.own)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 
     def _shared(self, values: Values, worth: Values) -> dict[str, Number]:
-        """Return a case's numbers with a symbol for each that follows from others."""
+        """Return numbers with a symbol for each that follows from others."""
         import casadi as ca
 
         found = dict(values)
@@ -142,10 +140,10 @@ def expressions(structure: Structure) -> Expressions:
     import casadi as ca
 
     scaled = ca.SX.sym("x", len(structure.program.variables))
-    extra = ca.SX.sym("t", structure.extras)
+    extra = ca.SX.sym("t", structure.rows.extras)
     p = ca.SX.sym("p", structure.layout.size)
     built = _Built(structure, scaled, extra, p)
-    rows = [built.limits(), *built.pieces(), *built.held(), *built.cycle()]
+    rows = structure.rows.stacked(built.limits(), built.pieces(), built.held(), built.cycle())
     return Expressions(ca.vertcat(scaled, extra), p, built.objective(), ca.vertcat(*rows), built.lifts)
 
 
@@ -197,7 +195,8 @@ class _Built:
     def __init__(self, structure: Structure, scaled: Any, extra: Any, column: Any) -> None:
         import casadi as ca
 
-        program, layout, vector = structure.program, structure.layout, ca.vertsplit(column[: structure.layout.nodes])
+        program, layout = structure.program, structure.layout
+        vector = ca.vertsplit(layout.before(column, "nodes"))
         self.structure, self.program, self.extra = structure, program, ca.vertsplit(extra)
         self.vector, self.column = vector, column
         self.lifts = Lifts(ca.vertcat(scaled, extra))
@@ -238,7 +237,7 @@ class _Built:
         """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
         import casadi as ca
 
-        limits, static = self.program.single_limits, self.structure.static
+        limits, static = self.program.single_limits, self.structure.rows.limits
         self.rows.read([limits[k].row for k in static])
         columns = [
             (limits[k].residual(self.rows, self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static

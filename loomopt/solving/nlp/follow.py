@@ -13,10 +13,11 @@ import numpy as np
 
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.physics.tolerances import BINDING, SAME_NODE, SETTLED
+from loomopt.physics.tolerances import SAME_NODE, SETTLED
 from loomopt.solving.nlp.calls import Calls
-from loomopt.solving.nlp.pivot import active_by, reach
+from loomopt.solving.nlp.pivot import reach
 from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.rows import Multipliers
 
 FOLLOW_FARTHEST, FOLLOW_ROUNDS = 0.2, 24
 """Farthest that a neighbour's answer is followed, in natural sizes, and the rounds it may take.
@@ -60,7 +61,7 @@ def follow(calls: Calls, warm: Point) -> Point | None:
         if pivoted is None or sampler is None or sampler.cycle.order != order:
             return None
         point, extremes = pivoted, calls.peaks(sampler)
-        violation = calls.violation(extremes, point.raw["extra"])
+        violation = calls.violation(extremes, point.extra)
         become = [(old, _nearest(of, old)) for of, own in zip(extremes, point.binding, strict=True) for old in own]
         change = _Change(np.array([old.u for old, _ in become]), np.array([now.u - old.u for old, now in become]))
         if violation <= calls.settings.excess and change.largest <= SETTLED:
@@ -92,24 +93,24 @@ def _aimed(
 
 def _pivoted(calls: Calls, sampler: Sampler, point: Point, extremes: Nodes) -> Point | None:
     """Return the point that pivots lead to from another, with nodes on the extremes; None without one."""
-    variables = len(calls.program.variables)
     nodes = [_chosen(of, old, calls.slots) for of, old in zip(extremes, point.binding, strict=True)]
     nlp = calls.transcribed(sampler, nodes, warm=False)
-    arguments = calls.arguments(nlp, sampler, point.x, np.asarray(point.raw["extra"]), nodes)
-    first = nlp.rows - len(calls.families) * nlp.slots
+    arguments = calls.arguments(nlp, sampler, point.x, point.extra, nodes)
     # Binding nodes come first in their family.
-    binds = [k < len(old) for old in point.binding for k in range(nlp.slots)]
-    prices = np.concatenate([point.raw["lam_g"][:first], np.array(binds, dtype=float)])
-    reached = reach(nlp, arguments, active_by(point.raw["lam_x"], prices, BINDING), FOLLOW_FARTHEST)
+    active = point.multipliers.binding(nlp.rows, list(map(len, point.binding)))
+    reached = reach(nlp, arguments, active, FOLLOW_FARTHEST)
     if reached is None:
         return None
-    rows, above, below = np.split(reached.multipliers, [nlp.rows, nlp.rows + len(reached.x)])
-    raw = {"lam_x": above - below, "lam_g": rows, "extra": reached.x[variables:]}
-    active = reached.active[first : nlp.rows].reshape(len(nodes), nlp.slots)
-    binding = tuple(
-        tuple(e for e, on in zip(of, flags, strict=False) if on) for of, flags in zip(nodes, active, strict=True)
+    pairs = zip(nodes, nlp.rows.at_nodes(reached.active.rows), strict=True)
+    design, extra = nlp.rows.parted(reached.x)
+    return replace(
+        point,
+        x=calls.design(design),
+        nodes=tuple(map(tuple, nodes)),
+        extra=extra,
+        multipliers=Multipliers(nlp.rows, reached.lam_x, reached.lam_g),
+        binding=tuple(tuple(e for e, on in zip(of, flags, strict=False) if on) for of, flags in pairs),
     )
-    return replace(point, x=calls.design(reached.x), nodes=tuple(map(tuple, nodes)), raw=raw, binding=binding)
 
 
 def _chosen(extremes: Sequence[Extreme], binding: Sequence[Extreme], slots: int) -> list[Extreme]:

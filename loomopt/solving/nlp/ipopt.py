@@ -9,6 +9,7 @@ import numpy as np
 from loomopt.model.sampling import Extreme, Sampler, Tally
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.rows import Multipliers
 from loomopt.solving.nlp.transcribe import Transcription
 
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
@@ -18,14 +19,13 @@ STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 class Answer(NamedTuple):
     """What IPOPT said.
 
-    extra: the epigraph or elastic variables; raw: its multipliers and `extra` again, nothing where it did not run;
-    value: of the objective.
+    extra: the epigraph or elastic variables; multipliers: 0 where it did not run; value: of the objective.
     """
 
     status: str
     x: dict[str, float]
     extra: Floats
-    raw: Mapping[str, Floats]
+    multipliers: Multipliers
     iterations: int
     value: float = math.inf
 
@@ -37,18 +37,19 @@ def run(
     x: Mapping[str, float],
     extra: Floats,
     nodes: Sequence[Sequence[Extreme]],
-    raw: Mapping[str, Floats],
+    warm: Multipliers,
 ) -> Answer:
-    """Return IPOPT's answer from variables x (SI) and extra; raw: multipliers to start warm from, if any.
+    """Return IPOPT's answer from variables x (SI) and extra; warm: multipliers to start from, if there are any.
 
     Raises KeyboardInterrupt on Ctrl-C.
     """
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
     if calls.overdetermined(arguments):
-        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, {}, 0)
-    if raw:
-        arguments |= {"lam_x0": raw["lam_x"], "lam_g0": _padded(raw["lam_g"], nlp.rows)}
-    solver = nlp.solver(bool(raw), calls.settings)
+        none = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
+        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
+    if warm:
+        arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.on(nlp.rows).lam_g}
+    solver = nlp.solver(bool(warm), calls.settings)
     said = solver(**arguments)
     stats = solver.stats()
     status = str(stats["return_status"])
@@ -57,18 +58,10 @@ def run(
     evaluated = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
     Tally.positions += evaluated * max(1, sum(map(len, nodes)))
     flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
-    reached = flat[len(calls.program.variables) :]
-    said_raw = {"lam_x": lam_x, "lam_g": lam_g, "extra": reached}
+    design, reached = nlp.rows.parted(flat)
+    multipliers = Multipliers(nlp.rows, lam_x, lam_g)
     iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
-    return Answer(status, calls.design(flat), reached, said_raw, iterations, value)
-
-
-def _padded(multipliers: Floats, size: int) -> Floats:
-    """Return multipliers for an NLP that has grown by empty rows at its end."""
-    padded = np.zeros(size)
-    common = min(size, len(multipliers))
-    padded[:common] = multipliers[:common]
-    return padded
+    return Answer(status, calls.design(design), reached, multipliers, iterations, value)
 
 
 class IterationCallback:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.physics.cycle import Floats
+from loomopt.solving.nlp.rows import Binding, Flags
 
 PIVOTS, PIVOT_NEWTON_STEPS, PIVOT_STEP = 20, 8, 1e-9
 """Limits exchanged before the solver must choose, Newton steps to where they meet, and the step that ends them: what
@@ -33,9 +34,6 @@ PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10
 """Rise toward a limit along a way, and relative singular value, that are no more than rounding of slopes."""
 
 
-Flags = NDArray[np.bool_]
-
-
 class Derivatives(Protocol):
     """What is asked of an NLP: functions of x, scaled, and its parameters, as CasADi calls them."""
 
@@ -53,11 +51,12 @@ class Derivatives(Protocol):
 
 
 class Reached(NamedTuple):
-    """A KKT point: x scaled; which limits are active, and the multipliers of all, 0 for those that are not."""
+    """A KKT point: x scaled; what is active, and the multipliers of all, 0 for what is not."""
 
     x: Floats
-    active: Flags
-    multipliers: Floats
+    active: Binding
+    lam_x: Floats
+    lam_g: Floats
 
 
 class _Problem(NamedTuple):
@@ -104,13 +103,8 @@ class _Step(NamedTuple):
     active: Flags
 
 
-def active_by(lam_x: Floats, lam_g: Floats, threshold: float) -> Flags:
-    """Return which limits are active, from a solver's multipliers."""
-    return np.concatenate([np.abs(lam_g), lam_x, -lam_x]) > threshold
-
-
-def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthest: float) -> Reached | None:
-    """Return the KKT point that pivots lead to from arguments["x0"] and the limits that were active there.
+def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Binding, farthest: float) -> Reached | None:
+    """Return the KKT point that pivots lead to from arguments["x0"] and what was active there.
 
     None where there is none within `farthest`, scaled.
     """
@@ -119,7 +113,8 @@ def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthes
     problem = _Problem(nlp, arguments, firm)
     # A held variable is active once, at its upper bound.
     below = np.concatenate([np.zeros(len(firm) - len(fixed), dtype=bool), fixed])
-    step: _Step | None = _Step(arguments["x0"], (active | firm) & ~below)
+    first = np.concatenate([active.rows, active.at_upper, active.at_lower])
+    step: _Step | None = _Step(arguments["x0"], (first | firm) & ~below)
     for _ in range(PIVOTS):
         meeting = _met(problem, step) or _met(problem, _parted(problem, step))
         if meeting is None or np.abs(meeting.x - arguments["x0"]).max() > farthest:
@@ -130,10 +125,23 @@ def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Flags, farthes
         elif meeting.excess[_worst(meeting)] > PIVOT_MET:
             step = _entered(problem, here)
         elif _dual_feasible(problem, here):
-            return Reached(np.clip(meeting.x, arguments["lbx"], arguments["ubx"]), meeting.active, here.multipliers)
+            return _reached(problem, here)
         else:
             step = _left(problem, here)
     return None
+
+
+def _reached(problem: _Problem, here: _Priced) -> Reached:
+    """Return a KKT point in the solver's words."""
+    x = np.clip(here.at.x, problem.arguments["lbx"], problem.arguments["ubx"])
+    rows, upper, lower = _sides(here.at.active, len(x))
+    lam_g, above, below = _sides(here.multipliers, len(x))
+    return Reached(x, Binding(rows, lower, upper), above - below, lam_g)
+
+
+def _sides(limits: Any, variables: int) -> list[Any]:
+    """Return what is said of all limits as that of rows, of upper and of lower bounds."""
+    return np.split(limits, [len(limits) - 2 * variables, len(limits) - variables])
 
 
 def _met(problem: _Problem, step: _Step | None) -> _Meeting | None:
@@ -251,7 +259,7 @@ def _moved(at: _Meeting, active: Flags, way: Floats, farthest: float) -> _Step |
 
 def _curvature(problem: _Problem, here: _Priced) -> Floats:
     """Return the Lagrangian's second derivatives."""
-    rows = here.multipliers[: len(here.at.active) - 2 * len(here.at.x)]
+    rows, *_ = _sides(here.multipliers, len(here.at.x))
     upper = np.asarray(problem.nlp.curvature(here.at.x, problem.arguments["p"], 1.0, rows))
     full: Floats = upper + upper.T - np.diag(np.diag(upper))
     return full

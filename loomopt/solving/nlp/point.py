@@ -6,10 +6,13 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler, sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import NEAR, POLISH_FARTHEST, ROUNDING, SAMPLES
+from loomopt.solving.nlp.rows import Multipliers
 
 SAMPLED = ((1e-3, 180), (1e-6, 360))
 """Samples that are enough for a coarser accuracy: what refining misses at so many is far below it (same study)."""
@@ -97,7 +100,9 @@ class Point:
     iterations: int = 0
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     violation: float = math.inf
-    raw: Mapping[str, Floats] = field(default_factory=dict)
+    extra: Floats = field(default_factory=lambda: np.zeros(0), compare=False)
+    """The epigraph variables, or the excesses, in natural sizes."""
+    multipliers: Multipliers = field(default_factory=Multipliers, compare=False)
     built: float = 0.0
     binding: tuple[tuple[Extreme, ...], ...] = ()
     """Per family, the extremes whose rows bind."""

@@ -5,15 +5,13 @@ IPOPT stops a hair inside its bounds. Where rows and bounds carry multipliers, N
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import (
-    BINDING,
     POLISH_DONE,
     POLISH_FARTHEST,
     POLISH_MET,
@@ -23,31 +21,17 @@ from loomopt.physics.tolerances import (
     TOUCHING,
 )
 from loomopt.solving.nlp.calls import Calls
-from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.rows import Binding, Multipliers
 
 Nodes = Sequence[Sequence[Extreme]]
-Flags = NDArray[np.bool_]
-
-
-class Binding(NamedTuple):
-    """Which rows and bounds bind, from multipliers: positive at an upper bound, negative at a lower one."""
-
-    rows: Flags
-    at_lower: Flags
-    at_upper: Flags
-
-
-def binding(lam_x: Floats, lam_g: Floats) -> Binding:
-    """Return what binds at a solver's multipliers."""
-    return Binding(np.abs(lam_g) > BINDING, lam_x < -BINDING, lam_x > BINDING)
 
 
 def polish(
-    calls: Calls, x: dict[str, float], extra: Floats, point: Point, peaks: Nodes
+    calls: Calls, x: dict[str, float], extra: Floats, multipliers: Multipliers, peaks: Nodes
 ) -> tuple[dict[str, float], Nodes]:
     """Return x (SI) put exactly on what binds, and the extremes that do; x itself where that is no small, clear step.
 
-    extra: the epigraph variables; point: the solver's answer with its multipliers; peaks: the extremes at x.
+    extra: the epigraph variables; multipliers: the solver's; peaks: the extremes at x.
     """
     touching: Nodes = ()
     for _ in range(POLISH_STEPS):
@@ -58,11 +42,10 @@ def polish(
             [e for e in of if calls.excess(family, e, extra) >= -TOUCHING]
             for family, of in zip(calls.families, calls.loose(sampler, peaks), strict=True)
         ]
-        met_at = _newton(calls, sampler, x, extra, point, touching)
+        met_at = _newton(calls, sampler, x, extra, multipliers, touching)
         if met_at is None:
             return x, touching
-        flat, step = met_at
-        x, extra = calls.design(flat), flat[len(calls.program.variables) :]
+        x, extra, step = met_at
         moved = calls.sampler(x)
         if moved is None or step <= SETTLED:
             return x, touching
@@ -71,19 +54,20 @@ def polish(
 
 
 def _newton(
-    calls: Calls, sampler: Sampler, x: dict[str, float], extra: Floats, point: Point, nodes: Nodes
-) -> tuple[Floats, float] | None:
-    """Return the scaled point where the binding rows and the nodes' rows are met, and the step there.
+    calls: Calls, sampler: Sampler, x: dict[str, float], extra: Floats, multipliers: Multipliers, nodes: Nodes
+) -> tuple[dict[str, float], Floats, float] | None:
+    """Return x (SI) and extra where the binding rows and the nodes' rows are met, and the step there, scaled.
 
     None where there is no such point nearby.
     """
     nlp = calls.transcribed(sampler, nodes, warm=False)
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
-    first = nlp.rows - len(calls.families) * nlp.slots
-    used = ~np.array(calls.idle_rows(nlp, nodes)[first:], dtype=bool)
-    bound = binding(point.raw["lam_x"], np.concatenate([point.raw["lam_g"][:first], used.astype(float)]))
+    bound = multipliers.binding(nlp.rows, list(map(len, nodes)))
     flat = met(nlp.jacobian, arguments, arguments["x0"], bound, calls.settings.farthest)
-    return None if flat is None else (flat, float(np.abs(flat - arguments["x0"]).max()))
+    if flat is None:
+        return None
+    design, extra = nlp.rows.parted(flat)
+    return calls.design(design), extra, float(np.abs(flat - arguments["x0"]).max())
 
 
 def met(

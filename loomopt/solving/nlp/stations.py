@@ -97,21 +97,14 @@ def station_switches(model: JobModel, variables: Collection[str]) -> list[Values
 
 
 def _chains(model: JobModel, variables: Collection[str]) -> dict[str, Chain]:
-    """Return the chains that hang on variables by their arcs' names; several cases have none in common."""
-    arcs = () if model.cases else model.kinematics.arcs
-    return {arc.name: arc.chain for arc in arcs if arc.chain and arc.chain.roots.intersection(variables)}
+    """Return the chains that hang on variables by their arcs' names."""
+    chains = {arc.name: arc.chain for arc in model.kinematics.arcs if arc.chain}
+    return {name: chain for name, chain in chains.items() if chain.roots.intersection(variables)}
 
 
 def held(switches: Sequence[Values], family: Family) -> list[int]:
     """Return the places of the stations, of these switches, where a family has a row."""
     return [k for k, switch in enumerate(switches) if family.counts(switch)]
-
-
-def owners(program: Program, families: Sequence[Family], rows: int) -> list[int]:
-    """Return the place of the family that each of so many whole-cycle rows is of: rows of stations, then slots."""
-    switches = station_switches(program.model, [variable.name for variable in program.variables])
-    first = [k for k, family in enumerate(families) for _ in held(switches, family)]
-    return first + [k for k in range(len(families)) for _ in range((rows - len(first)) // len(families))]
 
 
 class Stood:

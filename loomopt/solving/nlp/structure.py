@@ -5,11 +5,9 @@ through a few slots, each a node that the exchange fills; an unused slot weighs 
 """
 
 import functools
-import itertools
-import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +17,8 @@ from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, quadrature
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Cycle, Floats, Node, node_angle
+from loomopt.solving.nlp.layout import Layout
+from loomopt.solving.nlp.rows import RowMap, row_map
 from loomopt.solving.nlp.stations import (
     Epigraph,
     Family,
@@ -30,39 +30,6 @@ from loomopt.solving.nlp.stations import (
     recurrent,
     stations,
 )
-
-
-class Layout:
-    """Where each parameter stands in the NLP's parameter vector: numbers, then nodes from `nodes` on."""
-
-    def __init__(self) -> None:
-        self.places: dict[str, tuple[int, tuple[int, ...]]] = {}
-        self.size = self.nodes = 0
-
-    def add(self, name: str, *shape: int) -> None:
-        """Reserve room for an array."""
-        self.places[name] = (self.size, shape)
-        self.size += math.prod(shape)
-
-    def write(self, vector: Floats, name: str, values: Any) -> None:
-        """Put an array in its place."""
-        begin, shape = self.places[name]
-        vector[begin : begin + math.prod(shape)] = np.asarray(values, dtype=float).ravel()
-
-    def read(self, vector: Any, name: str) -> list[Any]:
-        """Return the entries of an array as a flat list."""
-        begin, shape = self.places[name]
-        return [vector[begin + k] for k in range(math.prod(shape))]
-
-    def columns(self, column: Any, name: str) -> list[Any]:
-        """Return the rows of a two-dimensional array in a column of CasADi's, each as a column."""
-        begin, (count, width) = self.places[name]
-        return [column[begin + k * width : begin + (k + 1) * width] for k in range(count)]
-
-    def rows(self, vector: Any, name: str) -> list[list[Any]]:
-        """Return the entries of a two-dimensional array, row by row."""
-        flat, (count, width) = self.read(vector, name), self.places[name][1]
-        return [flat[k * width : (k + 1) * width] for k in range(count)]
 
 
 class NodeParameters(NamedTuple):
@@ -111,10 +78,6 @@ class NodeParameters(NamedTuple):
         phi = node_angle(row[1], row[2 : 2 + self.corners], corners)
         return Node(phi, dict(zip(self.switches, row[2 + 2 * self.corners :], strict=True)))
 
-    def read_width(self, row: Sequence[Number], corners: Sequence[Number]) -> Number:
-        """Return the width, rad, of a node's share of a mean."""
-        return node_angle(row[0], row[2 + self.corners : 2 + 2 * self.corners], corners)
-
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -149,19 +112,14 @@ class Structure:
         return epigraphs(self.program, self.elastic)
 
     @functools.cached_property
-    def static(self) -> list[int]:
-        """Places of limits that are a row each; bounds of variables are the solver's own, unless they may give way."""
-        return list(self.program.single_limits if self.elastic else self.program.design_limits)
+    def rows(self) -> RowMap:
+        """Where its variables and rows stand."""
+        return row_map(self.program, self.slots, self.elastic)
 
     @functools.cached_property
     def ways(self) -> dict[int, tuple[int, ...]]:
         """Limits that may give way by place → the places of their excess variables."""
         return self.program.ways if self.elastic else {}
-
-    @functools.cached_property
-    def extras(self) -> int:
-        """How many variables there are beside the design's: epigraphs, or excesses."""
-        return len(set(itertools.chain(*self.ways.values()))) if self.elastic else len(self.epigraphs)
 
     @functools.cached_property
     def means(self) -> list[Integral]:
@@ -198,7 +156,7 @@ class Structure:
 
     @functools.cached_property
     def layout(self) -> Layout:
-        """Where each parameter stands."""
+        """Where each parameter stands: numbers, then nodes."""
         program, layout = self.program, Layout()
         layout.add("values", len(program.parameters))
         layout.add("hints", len(self.hints))
@@ -207,13 +165,13 @@ class Structure:
         layout.add("limit scale", len(program.limits))
         layout.add("objective weight", len(program.objectives))
         layout.add("objective scale", len(program.objectives))
-        layout.add("way weight", self.extras if self.elastic else 0)
+        layout.add("way weight", self.rows.extras if self.elastic else 0)
         for event in program.model.events_read:
             layout.add(f"still {event}", len(program.model.switches))
         layout.add("station", len(self.stations), len(self.open_switches))
         for k, places in enumerate(self.held):
             layout.add(f"sign {k}", len(places))
-        layout.nodes = layout.size
+        layout.add("nodes", 0)
         for name, count in self.points:
             layout.add(f"mean {name}", count, self.node.size)
         for k in range(len(self.families)):

@@ -84,11 +84,10 @@ class Transcription:
     """
 
     def __init__(self, made_of: Structure) -> None:
-        self.structure, self.slots = made_of, made_of.slots
+        self.structure, self.rows = made_of, made_of.rows
         written = expressions(made_of)
         self.nlp = {"x": written.x, "p": written.p, "f": written.f, "g": written.g}
-        self.rows = int(written.g.numel())
-        self._eliminated = Elimination(written) if written.lifts.defined else None
+        self._eliminated = Elimination(written, self.rows) if written.lifts.defined else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
         if self._eliminated:

@@ -16,7 +16,7 @@ from loomopt.solving.answer.solution import Clash
 from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
-from loomopt.solving.nlp.stations import families, owners
+from loomopt.solving.nlp.stations import families
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
@@ -71,14 +71,14 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
 
 def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
     """Return the limits with a price in the least relaxation: without any of them it would be less."""
-    rows = list(program.single_limits.values())
-    cycles = [program.limits[family.limit] for family in families(program, elastic=True)]
-    prices = np.abs(point.raw.get("lam_g", np.zeros(0)))
-    rest = len(prices) - len(rows) if cycles else 0
-    of = [*rows, *(cycles[k] for k in owners(program, families(program, elastic=True), rest))] if len(prices) else []
-    priced = zip(of, prices, strict=True)
-    told = (each for each, price in priced if price > PRICED and each.name in program.told)
-    return tuple(dict.fromkeys(map(words.limit, told)))
+    prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
+    if not prices:
+        return ()
+    found = list(prices.of_limits.items())
+    for rows in (prices.at_stations, prices.at_nodes):
+        found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
+    priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
+    return tuple(dict.fromkeys(words.limit(limit) for limit in priced if limit.name in program.told))
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

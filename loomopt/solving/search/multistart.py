@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'
-hardest target (tests/solving/test_rapier_starts.py: more than half do)."""
+hardest target (tests/jobs/rapier/test_rapier_starts.py: more than half do)."""
 
 
 BETTER, FLIPS = 1e-8, 2

@@ -146,9 +146,8 @@ def _excess(target: Target, point: Point, settings: Settings) -> float:
     sampler = calls.sampler(point.x)
     if sampler is None:
         return math.nan
-    extra = point.raw["extra"]
     found = zip(calls.families, calls.peaks(sampler), strict=True)
-    return max((calls.excess(family, e, extra) for family, of in found for e in of), default=0.0)
+    return max((calls.excess(family, e, point.extra) for family, of in found for e in of), default=0.0)
 
 
 def _uniform(target: Target, points: Sequence[int]) -> Ladder:

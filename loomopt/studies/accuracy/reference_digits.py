@@ -13,7 +13,6 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.program import Program
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.balance import total
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp.point import Point
@@ -35,7 +34,7 @@ that still leads there; share by which float64 may order two extremes wrongly.""
 
 MET_ROUNDS, MET = 6, 1e-28
 """Steps onto what binds with slopes in float64, each worth at least 8 digits, and where they have arrived: references
-must be 100 times tighter than errors of 1e-25 (tests/studies/test_accuracy_references.py)."""
+must be 100 times tighter than errors of 1e-25 (tests/studies/accuracy/test_accuracy_references.py)."""
 
 
 OPEN_RANK, OPEN_TURNS, OPEN_FLAT = 1e-9, 3, 1e-7
@@ -101,42 +100,40 @@ class _Rows:
         self.maths = systems.mpmath(digits)
         self.fixed: dict[str, Number] = {}
         self.number: Callable[[Number], Number] = self.maths.number
-        prices = point.raw["lam_x"]
+        prices = point.multipliers
         self.free = []
-        for k, variable in enumerate(program.variables):
-            end = variable.upper if prices[k] > BINDING else variable.lower if prices[k] < -BINDING else None
+        for variable, price in zip(program.variables, prices.of_variables, strict=True):
+            end = variable.upper if price > BINDING else variable.lower if price < -BINDING else None
             if end is not None or variable.lower == variable.upper:
                 self.fixed[variable.name] = self.number(variable.lower if end is None else end)
             else:
                 self.free.append(variable)
         self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
         self.sampler = Sampler(program.model, {**program.parameters, **x})
-        static = list(program.design_limits.values())
-        rows = point.raw["lam_g"]
-        self.static = [limit for k, limit in enumerate(static) if limit.sign == 0 or abs(rows[k]) > BINDING]
-        magnitudes = [o for o in program.objectives if o.is_magnitude]
-        pairs = np.abs(rows[len(static) : len(static) + 2 * len(magnitudes)]).reshape(-1, 2)
-        self.zero = [o for o, pair in zip(magnitudes, pairs, strict=True) if pair.min() > BINDING]
+        priced = [(program.single_limits[k], abs(price)) for k, price in prices.of_limits.items()]
+        self.static = [limit for limit, price in priced if limit.sign == 0 or price > BINDING]
         above = epigraphs(program)
-        self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].quantities]
+        levels = [(k, program.objectives[epigraph.objective]) for k, epigraph in enumerate(above)]
+        self.zero = [o for k, o in levels if o.is_magnitude and np.abs(prices.of_pieces(k)).min() > BINDING]
+        self.tops = [k for k, level in levels if level.quantities]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
-        before = len(static) + 2 * len(magnitudes)
-        self.binding = self._binding(rows[before:])
+        self.binding = self._binding()
         self.start += [self._top(above[k]) for k in self.tops]
 
-    def _binding(self, prices: Floats) -> list[list[Extreme]]:
-        """Return the nodes that bind of each family, those of rows at corners too; prices: of whole-cycle rows."""
+    def _binding(self) -> list[list[Extreme]]:
+        """Return the nodes that bind of each family, those of rows at corners too."""
         program, sampler = self.program, self.sampler
         found = [list(of) for of in self.point.binding]
         corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
-        stood, place = Stood(corners, sampler.cycle), 0
-        for family, of in zip(self.families, found, strict=True):
-            signs = stood.signs(sampler, family.row)
-            for k in held([corner.switch for corner in corners], family):
-                if prices[place] > BINDING:
-                    of.append(Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k])))
-                place += 1
+        stood = Stood(corners, sampler.cycle)
+        for family, of, prices in zip(self.families, found, self.point.multipliers.at_stations, strict=True):
+            signs, own = stood.signs(sampler, family.row), held([corner.switch for corner in corners], family)
+            of += [
+                Extreme(int(stood.pieces[k]), float(stood.u[k]), float(signs[k]))
+                for k, price in zip(own, prices, strict=True)
+                if price > BINDING
+            ]
         return found
 
     def _top(self, epigraph: Epigraph) -> Number:
@@ -175,11 +172,11 @@ class _Rows:
         return found
 
     def level(self, place: int, unknown: Sequence[Number], exact: Reading | None = None) -> Number:
-        """Return an objective in its natural size: its peaks together, or its row."""
-        tops = zip(self.levels, unknown[len(self.free) :], strict=True)
-        peaks, level = [top for of, top in tops if of == place], self.program.objectives[place]
-        if peaks:
-            return total(peaks)
+        """Return an objective in its natural size: its peak, or its row."""
+        tops = dict(zip(self.levels, unknown[len(self.free) :], strict=True))
+        if place in tops:
+            return tops[place]
+        level = self.program.objectives[place]
         return (exact or self.design(unknown)).single(level.row) / self.number(level.scale)
 
     def slopes(self, unknown: Sequence[Number]) -> Floats:

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,18 +10,21 @@ import numpy as np
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme
 from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.rows import Multipliers, row_map
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 
 
 def written(point: Point, program: Program) -> dict[str, Any]:
     """Return a point that a solve of a program ended in as JSON data."""
+    said = point.multipliers
+    raw = {"lam_x": said.lam_x, "lam_g": said.lam_g, "extra": point.extra} if said else {}
     return {
         "task": _task(program),
         "x": dict(point.x),
         "nodes": [[list(node) for node in family] for family in point.nodes],
         "binding": [[list(node) for node in family] for family in point.binding],
-        "raw": {name: values.tolist() for name, values in point.raw.items()},
+        "raw": {name: values.tolist() for name, values in raw.items()},
     }
 
 
@@ -28,11 +32,13 @@ def read(data: Mapping[str, Any], program: Program) -> Point | None:
     """Return the point that data say, as a start for a program; None where they are of another structure, or none."""
     if not data or data["task"] != _task(program):
         return None
-    raw = {name: np.array(values, dtype=np.float64) for name, values in data["raw"].items()}
     nodes, binding = _nodes(data["nodes"]), _nodes(data["binding"])
-    return Point(
-        dict(data["x"]), "Solve_Succeeded", True, nodes=nodes, raw=raw, binding=binding, structure=program.structure
-    )
+    point = Point(dict(data["x"]), "Solve_Succeeded", True, nodes=nodes, binding=binding, structure=program.structure)
+    if not data["raw"]:
+        return point
+    lam_x, lam_g, extra = (np.array(data["raw"][name], dtype=np.float64) for name in ("lam_x", "lam_g", "extra"))
+    rows = row_map(program, 0).sized(len(lam_g))
+    return replace(point, extra=extra, multipliers=Multipliers(rows, lam_x, lam_g))
 
 
 def _nodes(families: list[list[list[Any]]]) -> Nodes:

@@ -3,12 +3,12 @@ import csv
 import io
 import math
 
-import clear
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference import crank_rocker_synthesis
+from support import clear
 
 import loomopt as lo
 from loomopt.base.errors import BadInput

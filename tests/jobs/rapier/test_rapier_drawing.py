@@ -5,9 +5,9 @@ import io
 import math
 from typing import Any
 
-import clear
 import numpy as np
 import pytest
+from support import clear
 
 from loomopt.base.errors import BadInput
 from loomopt.interface.figures import figure

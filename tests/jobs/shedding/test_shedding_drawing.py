@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plain_cam
 import pytest
+from reference import cam as plain_cam
 
 import loomopt as lo
 from loomopt.base.errors import BadInput

@@ -1,18 +1,13 @@
 """Contact speed: the first root of the least cam force, against the plain reference in 30 digits."""
 
 import dataclasses
-import importlib
 import math
-from pathlib import Path
 
 import pytest
+from reference import shedding as plain
 
 import loomopt as lo
 from loomopt.jobs import registry
-
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(str(Path(__file__).parents[3] / "benchmarks"))
-    plain = importlib.import_module("plain_shedding")
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 JOB = registry.of(FULL)

@@ -3,9 +3,9 @@
 import math
 import re
 
-import inch
 import numpy as np
 import pytest
+from support import inch
 
 import loomopt as lo
 from loomopt.jobs import registry

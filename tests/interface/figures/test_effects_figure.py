@@ -1,0 +1,67 @@
+"""The bars of an effects study: what they show, and that nothing meets."""
+
+from dataclasses import replace
+
+import pytest
+from support import inch, overlaps, uncoiled
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+
+
+@pytest.fixture(scope="module")
+def shedding():
+    return lo.effects(uncoiled.scene("shedding"))
+
+
+def ends(axes, container):
+    """Return where bars end, %."""
+    return [bar.get_x() + bar.get_width() for bar in axes.containers[container]]
+
+
+def test_bars_end_at_the_shares_beside_the_tolerance(shedding):
+    figure = shedding.plot()
+    first, limits = figure.axes
+    names = [label.get_text() for label in first.get_yticklabels()]
+    marked = [name.removesuffix(" (may go)") for name in names if name.endswith("(may go)")]
+    assert marked == list(shedding.left_out)
+    assert [name.split()[0] for name in names] == [row.effect for row in shedding.rows]
+    assert first.get_xscale() == "log"
+    assert first.lines[0].get_xdata() == [1.0, 1.0], "the tolerance, %"
+    for row, end in zip(shedding.rows, ends(limits, 0), strict=True):
+        assert end == pytest.approx(max(100 * row.excess, limits.get_xlim()[0]), rel=1e-9)
+    warp = next(k for k, row in enumerate(shedding.rows) if row.effect == "warp_tension")
+    assert ends(first, 1)[warp] == pytest.approx(100 * shedding.rows[warp].regret["K1"], rel=1e-9)
+    assert set(ends(first, 0)) == {first.get_xlim()[0]}, "no shift"
+    told = [text.get_text() for text in limits.texts]
+    assert f"{100 * shedding.rows[0].excess:+.3g} %" in told
+
+
+def test_nothing_meets(shedding):
+    assert overlaps.found(shedding.plot()) == []
+    long = replace(shedding, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
+    assert overlaps.found(long.plot()) == []
+
+
+def test_an_inch_machine_at_350_rpm():
+    found = lo.effects(uncoiled.scene(inch.scene("shedding-static", operation__speed="350 rpm")))
+    assert overlaps.found(found.plot()) == []
+    assert "lbf/in" in found._repr_html_()
+    assert "N/m" not in found._repr_html_()
+
+
+def test_what_is_unknown_is_no_bar(shedding):
+    gone = replace(shedding.rows[0], shift={"K1": None}, regret={"K1": None}, excess=None, may_go=False)
+    figure = replace(shedding, rows=(gone, *shedding.rows[1:])).plot()
+    assert [text.get_text() for text in figure.axes[0].texts].count("none") == 2
+    with pytest.raises(BadInput, match="nothing to draw"):
+        replace(shedding, rows=()).plot()
+
+
+def test_it_is_written_the_same_each_time(shedding, tmp_path):
+    paths = [tmp_path / name for name in ("a.svg", "b.svg")]
+    for path in paths:
+        shedding.plot(path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    with pytest.raises(BadInput):
+        shedding.plot(tmp_path / "a.gif")

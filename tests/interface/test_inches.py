@@ -1,0 +1,278 @@
+"""The same machine in millimetres and in inches: the same numbers, and tables that differ in units only."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from support import inch
+
+import loomopt as lo
+from loomopt.base.units import SI_UNIT, UNITS, factor, parse_unit
+from loomopt.interface import tables
+from loomopt.interface.cli.app import run
+from loomopt.interface.text import answers, layout, scenes
+from loomopt.interface.text.scenes import curves, parts
+from loomopt.jobs import registry
+from loomopt.scenes import packaged
+from loomopt.solving.answer.words import Words
+
+WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
+TABLE = {"targets__match__table": str(WISH)}
+SAID = re.compile(r"[A-Za-z]+(?:[*/^]\(?[A-Za-z0-9]+\)?)*|1/[a-z]+(?:\^\d)?")
+CASES = ["beatup-light balance", "rapier stroke-dwell", "shedding stiffness", "shedding force"]
+MIXED = {
+    "beatup": {"mechanism.l1": "31 mm", "operation.M0": "76 kgf*m", "mechanism.m4e": "0 lb", "mechanism.m4": "56800 g"},
+    "rapier": {"mechanism.l1": "3.00728346 in", "operation.stroke": "850 mm", "display.force": "lbf"},
+    "shedding": {"effects.weight.G": "37.6836 kgf", "operation.N_min": "0 lbf", "mechanism.travel": "65.6 mm"},
+}
+
+
+def in_inches(name, **changes):
+    return inch.scene(name, **(TABLE if name == "rapier" else {}), **changes)
+
+
+def all_on(scene):
+    """Return a scene with every effect that it has values for and that goes with the others."""
+    for name in [*scene.document.get("available", {}), *scene.schema.effects]:
+        try:
+            scene = scene.with_effect(name)
+        except lo.BadInput:
+            continue
+    return scene
+
+
+def masked(parts):
+    """Return a text with its numbers as # and its units as U, and the room that tables give them left out."""
+    text = layout.render(parts, None)
+    text = SAID.sub(lambda word: "U" if _is_unit(word[0]) else word[0], text)
+    text = re.sub(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", "#", text)
+    return re.sub(r"[-\s]+", " ", text)
+
+
+def _is_unit(word):
+    names = set(re.findall(r"[A-Za-z]+", word))
+    return names <= {*UNITS, "lbf", "psi"}
+
+
+def by_powers(units):
+    """Return the different units of each dimension."""
+    found: dict[tuple[int, ...], set[str]] = {}
+    for unit in units:
+        found.setdefault(parse_unit(unit).powers, set()).add(unit)
+    return found
+
+
+@pytest.fixture(scope="module", params=CASES)
+def pair(request):
+    """Return the answers of one machine, in its own units and in inches."""
+    name, target = request.param.split()
+    return tuple(lo.solve(scene, target, starts=1) for scene in (lo.load(name), in_inches(name)))
+
+
+def test_an_answer_has_the_same_numbers(pair):
+    one, other = (answer.as_dict() for answer in pair)
+    assert pair[0].status == "optimal"
+    assert one["units"] == other["units"]
+    assert one["reached"] == other["reached"]
+    for key in ("design", "figures"):
+        assert other[key] == {n: v if v is None else pytest.approx(v, rel=1e-9, abs=0) for n, v in one[key].items()}
+    for key in ("limits", "binding"):
+        assert len(one[key]) == len(other[key]) > 0
+        for mine, theirs in zip(one[key], other[key], strict=True):
+            for word in mine.keys() - {"text"}:
+                assert theirs[word] == (pytest.approx(mine[word], rel=1e-9) if is_size(mine[word]) else mine[word])
+
+
+def is_size(value):
+    return isinstance(value, float | dict) and value != {} and not any(isinstance(v, str) for v in _inner(value))
+
+
+def _inner(value):
+    return value.values() if isinstance(value, dict) else [value]
+
+
+def test_what_a_person_sees_differs_in_units_only(pair):
+    shown = [masked(answers.solution(answer, answer.scene)) for answer in pair]
+    assert shown[0] == shown[1]
+    text = layout.render(answers.solution(pair[1], pair[1].scene), None)
+    assert not re.search(r" (mm|N\*m|N|N/m|kg)\b", text)
+    own, inches = (set(answer.table()["unit"]) for answer in pair)
+    assert ("mm" in own, "in" in inches, "mm" in inches) == (True, True, False)
+
+
+def test_a_table_has_the_same_sizes(pair):
+    own, inches = (answer.table() for answer in pair)
+    assert list(own.columns) == list(inches.columns)
+    assert list(own.index) == list(inches.index)
+    for name in own.index:
+        ratio = factor(own["unit"][name]) / factor(inches["unit"][name])
+        for column in ("today", "design", "min", "max"):
+            a, b = own[column][name] * ratio, inches[column][name]
+            assert b == pytest.approx(a, rel=1e-9, abs=0, nan_ok=True), (name, column)
+        assert list(own.loc[name, ["ok", "binds"]]) == list(inches.loc[name, ["ok", "binds"]])
+
+
+def test_a_price_is_told_in_the_tables_units(pair):
+    """The worth in words is the worth in SI."""
+    for answer in pair:
+        words = Words(answer.scene)
+        for price in answer.binding:
+            (figure, worth), *_ = price.worth.items()
+            size = factor(words.unit(figure)) / factor(words.unit(price.limit))
+            number, *unit = price.reading.split()
+            assert float(number) == pytest.approx(worth / size, rel=5e-3)
+            assert " ".join(unit).endswith(f"per {words.unit(price.limit)}")
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_show_and_evaluate_differ_in_units_only(name):
+    scenes = lo.load(name), in_inches(name)
+    evaluated = [lo.evaluate(scene) for scene in scenes]
+    assert evaluated[0].as_dict() == evaluated[1].as_dict()
+    told = [masked(answers.evaluation(found, s, None)) for found, s in zip(evaluated, scenes, strict=True)]
+    assert told[0] == told[1]
+    drawn = [masked(curves(scene, {}, None)[1:]) for scene in scenes]
+    assert drawn[0].count("U") == drawn[1].count("U") > 2
+    shown = [parts(scene) for scene in scenes]
+    own, inches = ([part for part in parts if isinstance(part, layout.Grid)] for parts in shown)
+    numbers = [[(line[0], line[2], line[3]) for line in grids[0].lines if line[2]] for grids in (own, inches)]
+    assert numbers[0] == numbers[1], "SI is the same"
+    given = {line[0]: line[1] for line in inches[0].lines}
+    for key, text in given.items():
+        assert text == (scenes[1].given(key) or "(default)"), "as it was given, bounds and limits too"
+
+
+def test_a_relaxation_is_the_same_in_other_words():
+    answers = [lo.solve(scene("beatup-light"), "torque", starts=1) for scene in (lo.load, in_inches)]
+    assert [answer.status for answer in answers] == ["infeasible", "infeasible"]
+    one, other = (answer.relaxation for answer in answers)
+    assert [(r.limit, r.side, r.alone) for r in one] == [(r.limit, r.side, r.alone) for r in other]
+    for mine, theirs in zip(one, other, strict=True):
+        assert theirs.needed == pytest.approx(mine.needed, rel=1e-9)
+        assert masked([mine.text]) == masked([theirs.text])
+    assert any(" lbf*in -> " in each.text for each in other)
+    assert not any(re.search(r" (mm|N\*m|kg)\b", text) for a in other for text in (a.text, answers[1].message))
+
+
+def test_what_physics_says_of_a_clash_is_in_the_scenes_units():
+    clash = ("surge_ratio >= 13", "shear_share <= 0.5")
+    scenes = (all_on(lo.load("shedding")), all_on(in_inches("shedding")))
+    own, inches = (registry.of(scene).explain(scene, clash) for scene in scenes)
+    assert re.search(r" mm carry at least \S+ MPa .* allows \S+ MPa", own)
+    assert re.search(r" in carry at least \S+ psi .* allows \S+ psi", inches)
+    assert masked([own]) == masked([inches])
+
+
+def seen(scene):
+    """Return the tables of a scene that a person sees, each as its units."""
+    found = lo.evaluate(scene)
+    yield [row["unit"] for row in tables.rows(found, scene)]
+    grids = [part for part in scenes.curves(scene, {}, None) if isinstance(part, layout.Grid)]
+    heads = [head for grid in grids for head in grid.columns]
+    yield [head.partition("[")[2].rstrip("]") for head in heads]
+    yield [scene.shown_in(kind) for kind in SI_UNIT]
+
+
+@pytest.mark.parametrize("written", ["own", "inches", "mixed"])
+@pytest.mark.parametrize("name", packaged.problems())
+def test_no_table_has_two_units_of_one_kind(name, written):
+    """Effects that have values are on; two units of one dimension are two units of one kind: energy is no torque."""
+    scene = in_inches(name) if written == "inches" else lo.load(name)
+    if written == "mixed":
+        scene = scene.update(MIXED[scene.job])
+    for units in seen(all_on(scene)):
+        assert units
+        assert [several for several in by_powers(units).values() if len(several - {"J"}) > 1] == []
+
+
+def test_two_units_of_one_kind_would_be_found():
+    assert by_powers(["lbf/in", "N/mm", "deg"])[parse_unit("N/m").powers] == {"lbf/in", "N/mm"}
+
+
+DISPLAY = """
+[display]
+length = "in"
+force = "lbf"
+torque = "lbf*in"
+mass = "lb"
+inertia = "lb*in^2"
+stiffness = "lbf/in"
+angle = "rad"
+speed = "rad/s"
+"""
+
+
+@pytest.fixture
+def cli(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*words, status=0):
+        assert run(list(words)) == status
+        return capsys.readouterr().out
+
+    return call
+
+
+def test_display_in_a_file_is_followed_by_every_table(cli):
+    text = packaged.problems()["beatup"].read_text(encoding="utf-8")
+    Path("own.toml").write_text(text, encoding="utf-8")
+    Path("shown.toml").write_text(text.replace("[targets", f"{DISPLAY}\n[targets", 1), encoding="utf-8")
+    own, shown = (json.loads(cli("solve", file, "--starts", "1", "--json")) for file in ("own.toml", "shown.toml"))
+    for key in ("design", "figures", "units", "reached"):
+        assert own[key] == shown[key], "JSON stays SI"
+    assert own["scene"]["hash"] == shown["scene"]["hash"]
+    assert shown["scene"]["document"]["display"]["length"] == "in"
+    assert "in, " in cli("show", "shown.toml")
+    assert re.search(r"bounds\.l1\.min +30 mm +0\.03 +m", cli("show", "shown.toml")), "as it was given"
+    for command in ("solve", "evaluate"):
+        out = cli(command, "shown.toml")
+        assert re.search(r"^l1 .* in +1\.1811 \.\.\. 1\.37795", out, re.MULTILINE)
+        assert re.search(r"^swing .* rad ", out, re.MULTILINE)
+        assert not re.search(r" (mm|deg|N\*m|kg)\b", out)
+    assert "front dead centre at 1.1" in cli("simulate", "shown.toml")
+    assert re.search(r"^swing >= 0\.39968 rad +proven +\S+ +\S+ +rad ", cli("prove", "shown.toml"), re.MULTILINE)
+
+
+def test_display_is_followed_by_the_files_of_an_answer_and_set_on_the_command_line(cli):
+    cli(
+        "solve",
+        "beatup",
+        "--starts",
+        "1",
+        "--set",
+        'display.length="in"',
+        "--set",
+        "display.torque=lbf*in",
+        "--out",
+        "a",
+    )
+    table = [line.split(",") for line in Path("a/table.csv").read_text().splitlines() if not line.startswith("#")]
+    assert table[0] == ["name", "unit", "today", "design", "min", "max", "ok", "binds", "reached"]
+    cells = {line[0]: dict(zip(table[0], line, strict=True)) for line in table[1:]}
+    assert cells["l1"]["unit"] == "in"
+    assert float(cells["l1"]["min"]) == pytest.approx(30 / 25.4)
+    assert (cells["l1"]["binds"], cells["M3_fdc"]["unit"], cells["M3_fdc"]["reached"]) == ("min", "lbf*in", "yes")
+    assert "Md [lbf*in]" in Path("a/curves.csv").read_text()
+    assert json.loads(Path("a/answer.json").read_text())["design"]["l1"] == pytest.approx(0.03)
+    again = cli("evaluate", "beatup", "--design", "a/answer.json")
+    assert re.search(r"^l1 .* in ", again, re.MULTILINE), "an answer's scene is seen as it was"
+
+
+@pytest.mark.parametrize(
+    "given", ["display.lenght=in", "display.length=lbf", "display.length=inn", "display.length=3", "display=in"]
+)
+def test_a_unit_that_is_none_exits_with_2_and_one_line(capsys, given):
+    assert run(["solve", "beatup", "--set", given]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "display" in err
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_a_table_of_an_inch_scene_has_no_metric_length(name):
+    """Whatever a unit is composed of: m/rad beside in/rad^2 would be of two systems."""
+    for units in seen(all_on(in_inches(name))):
+        assert [unit for unit in units if re.search(r"\b(mm|m|N|kg)\b", unit)] == []

@@ -1,0 +1,199 @@
+"""What a designer works with in Python: figure, drawing, files, one-row tables, words; all of it in Jupyter too."""
+
+import inspect
+import json
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from support import inch
+
+import loomopt as lo
+from loomopt.interface.cli.app import run
+from loomopt.interface.figures.shown_figure import ShownFigure
+
+PNG = b"\x89PNG"
+
+
+@pytest.fixture(scope="module")
+def answer():
+    return lo.solve("beatup-light", starts=1)
+
+
+@pytest.fixture(scope="module")
+def evaluation(answer):
+    return lo.evaluate("beatup", answer, target="torque")
+
+
+@pytest.fixture(params=["answer", "evaluation"])
+def found(request):
+    return request.getfixturevalue(request.param)
+
+
+def tree(html):
+    return ElementTree.fromstring(html.replace("&nbsp;", " "))
+
+
+def test_a_plot_is_a_figure_that_shows_itself_and_is_written_where_asked(found, tmp_path):
+    figure = found.plot(tmp_path / "curves.svg")
+    assert isinstance(figure, Figure)
+    assert isinstance(figure, ShownFigure)
+    assert figure._repr_png_().startswith(PNG)
+    of = "best design for balance" if isinstance(found, lo.Answer) else "a given design, limits not held"
+    assert figure.get_suptitle() == f"{found.scene.name}: {of}, curves over the cycle"
+    assert len(figure.axes) >= len(found.curves().columns) / 3
+    assert ElementTree.parse(tmp_path / "curves.svg").getroot().tag.endswith("svg")
+    with pytest.raises(lo.BadInput):
+        found.plot(tmp_path / "curves.txt")
+    assert [path.name for path in tmp_path.iterdir()] == ["curves.svg"]
+
+
+def test_a_plot_is_the_picture_of_the_command(answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer.plot("python.png")
+    Path("answer.json").write_text(json.dumps(answer.as_dict()))
+    assert run(["simulate", "beatup-light", "--design", "answer.json", "--out", "command.png"]) == 0
+    assert Path("python.png").read_bytes() == Path("command.png").read_bytes()
+
+
+def test_a_drawing_shows_itself(found):
+    drawn = found.draw()
+    texts = {element.text for element in tree(drawn._repr_svg_()).iter() if element.text}
+    assert {"A", "B", "C", "D"} <= texts
+    assert 'mm" height="' in drawn.svg, "at true scale; as it shows itself: tests/interface/text/test_notebook.py"
+    assert drawn.drawing.primitives
+
+
+@pytest.mark.parametrize("name", ["a.svg", "a.dxf", "a.csv"])
+def test_an_export_is_the_file_of_the_command(answer, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert answer.export(name) == Path(name)
+    Path("design.json").write_text(json.dumps(dict(answer.design)))
+    assert run(["export", "beatup-light", "--design", "design.json", "--out", f"b{Path(name).suffix}"]) == 0
+    own, theirs = (Path(each).read_text().splitlines() for each in (name, f"b{Path(name).suffix}"))
+    assert len(own) == len(theirs) > 5
+    assert sum(mine != other for mine, other in zip(own, theirs, strict=True)) < 0.05 * len(own)
+
+
+def test_an_evaluation_is_exported_too_and_other_files_are_refused(evaluation, tmp_path):
+    assert evaluation.export(tmp_path / "a.csv").read_text()
+    with pytest.raises(lo.BadInput):
+        evaluation.export(tmp_path / "a.step")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+def test_one_row_holds_all_of_the_design_and_its_figures_in_the_tables_units(found):
+    frame, table = found.to_frame(), found.table()
+    assert len(frame) == 1
+    row = frame.iloc[0]
+    for name, unit, value in zip(table.index, table["unit"], table["design"], strict=True):
+        assert row[f"{name} [{unit}]"] == value
+    assert frame.attrs["scene_hash"] == found.scene.hash
+    assert frame.attrs["target"] == found.target
+
+
+def test_one_row_in_si_is_design_and_figures_themselves(found):
+    row = found.to_frame(si=True).iloc[0]
+    for name, value in {**found.design, **found.figures}.items():
+        if value is not None:
+            assert row[f"{name} [{found.units[name]}]"] == value
+
+
+def test_rows_of_answers_compare_and_those_of_other_units_do_in_si(answer):
+    today = lo.evaluate("beatup-light")
+    both = pd.concat([today.to_frame(), answer.to_frame()], ignore_index=True)
+    assert list(both["outcome"]) == ["admissible", "optimal"]
+    assert not both.isna().any(axis=None)
+    inches = lo.evaluate(inch.scene("beatup-light"))
+    assert {"l1 [mm]"} <= set(today.to_frame().columns) - set(inches.to_frame().columns)
+    assert "l1 [in]" in inches.to_frame()
+    alike = pd.concat([each.to_frame(si=True) for each in (today, inches)], ignore_index=True)
+    numbers = alike.select_dtypes("number")
+    assert not alike.isna().any(axis=None)
+    assert len(numbers.columns) > 15
+    for name in numbers:
+        assert math.isclose(*numbers[name], rel_tol=1e-9, abs_tol=1e-12)
+
+
+def test_a_list_of_a_design_is_one_cell():
+    knots = (0.0, 8.0, 0.0, -8.0, 0.0)
+    law = {"mechanism.law": "spline", "mechanism.law_coefficients": str(list(knots))}
+    found = lo.evaluate(lo.load("shedding").update(law), {"K1": 1e5, "law": knots})
+    row = found.to_frame().iloc[0]
+    assert row["K1 [N/m]"] == pytest.approx(1e5)
+    assert row["law [1]"] == pytest.approx(knots)
+
+
+def test_words_of_things_are_short_and_say_what_counts(answer, evaluation):
+    infeasible = lo.solve("beatup-light", "retrofit", starts=1)
+    told = {
+        repr(answer): ["Answer", "beatup-light, balance: optimal", "M3_fdc -76.9811 N*m", "peak_torque 82.3371 N*m"],
+        repr(evaluation): ["Evaluation", "beatup, torque", "peak_torque"],
+        repr(answer.scene): ["Scene", "beatup-light", "job beatup", "inertia, resistance"],
+        repr(answer.prove()): ["Proofs", "beatup-light, balance: every limit holds at every crank angle"],
+        repr(answer.draw()): ["beatup-light"],
+        repr(infeasible): ["infeasible", "limits that clash", "l1 >= 30 mm"],
+    }
+    for text, words in told.items():
+        assert len(text) <= 200
+        assert "\n" not in text
+        assert [word for word in words if word not in text] == []
+
+
+def test_everything_shows_itself_in_jupyter(answer, evaluation):
+    shown = {"scene": answer.scene, "answer": answer, "evaluation": evaluation, "proofs": answer.prove()}
+    pages = {name: tree(thing._repr_html_()) for name, thing in shown.items()}
+    assert all(page.findall("table") for page in pages.values())
+    drawn = {name for name, page in pages.items() if page.findall("{http://www.w3.org/2000/svg}svg")}
+    assert drawn == {"scene", "answer", "evaluation"}
+    words = {name: "".join(page.itertext()) for name, page in pages.items()}
+    assert "Beat-up, light cloth" in words["scene"]
+    assert "M3_fdc" in words["evaluation"]
+    assert "every limit holds" in words["proofs"]
+
+
+def test_today_beside_an_answer_is_an_evaluation_of_its_scene(answer):
+    assert isinstance(answer.before, lo.Evaluation)
+    assert (answer.before.scene, answer.before.target) == (answer.scene, "balance")
+    assert answer.before.figures == lo.evaluate("beatup-light").figures
+
+
+def test_an_evaluation_goes_on_in_its_own_scene_and_target(evaluation):
+    assert evaluation.target == "torque"
+    again = evaluation.evaluate()
+    assert (again.figures, again.limits, again.target) == (evaluation.figures, evaluation.limits, "torque")
+    assert evaluation.prove().target == "torque"
+    assert evaluation.curves().attrs["target"] == "torque"
+
+
+PUBLIC = [getattr(lo, name) for name in lo.__all__]
+CLASSES = [each for each in PUBLIC if inspect.isclass(each)]
+METHODS = [
+    (kind, name, getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member))
+    for kind in CLASSES
+    for name, member in inspect.getmembers_static(kind)
+    if not name.startswith("_") and "loomopt" in str(getattr(member, "__module__", None) or member)
+]
+CALLS = [(lo, each.__name__, each) for each in PUBLIC if not inspect.isclass(each)] + [
+    each for each in METHODS if inspect.isfunction(each[2])
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "call"), CALLS, ids=lambda value: getattr(value, "__name__", str(value)))
+def test_an_editor_knows_every_argument_and_result(kind, name, call):
+    signature = inspect.signature(call)
+    arguments = [each for each in signature.parameters.values() if each.name != "self"]
+    assert all(each.annotation is not inspect.Parameter.empty for each in arguments)
+    assert signature.return_annotation is not inspect.Signature.empty
+    assert inspect.getdoc(call)
+    assert "Any" not in str(signature) or name == "as_dict"  # JSON's own data
+
+
+def test_the_methods_that_an_editor_completes_are_there():
+    names = {name for kind, name, _ in METHODS if kind is lo.Answer}
+    assert {"plot", "draw", "export", "to_frame", "table", "curves", "evaluate", "simulate", "prove"} <= names
+    assert (Path(lo.__file__).parent / "py.typed").is_file()
+    assert all(inspect.getdoc(kind) for kind in CLASSES)

@@ -1,0 +1,92 @@
+"""Reference rows of every effect of every job: a new algebraic effect is its file and its rows here.
+
+reference/effects.csv: job, effect, which of its examples, the design (today's, or the job's other one below), crank
+angle in deg, what ("term" of a load; a check's figure or row, a figure of the crank's own speed or of an event, by
+name; only a term and a check's figure have an angle), value in SI. What an effect needs beside it has its
+first example.
+"""
+
+import csv
+import functools
+import math
+from pathlib import Path
+
+import pytest
+from reference import effects as plain_effects
+
+from loomopt.jobs import registry
+from loomopt.maths import systems
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects.kinds import Check, Event, Speed
+
+ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[2] / "reference" / "effects.csv").open())]
+EFFECTS = {
+    (job, name): effect
+    for job in registry.own_names()
+    for name, effect in registry.find(job).schema({}).effects.items()
+}
+OTHER = {
+    "beatup": {"l1": 0.0305, "l2": 0.083, "l3": 0.15, "l4": 0.166, "m4e": 3.0, "r4e": 0.07},
+    "rapier": {"l4": 0.018, "l5": 0.48, "phi40": registry.load("rapier").mechanism["phi40"] + 0.15},
+    "shedding": {"K1": 20000.0, "X0": 0.05},
+}
+
+
+@functools.cache
+def sampled(job, effect, example, design):
+    """Return the packaged machine with the effect at its example, ready to be read."""
+    return registry.find(job).sampler(scene_of(job, effect, example), OTHER[job] if design == "other" else {})
+
+
+def scene_of(job, effect, example):
+    """Return the packaged scene with the effect at its example, and what it needs beside it."""
+    names = dict.fromkeys(EFFECTS[job, effect].beside, 0) | {effect: example}
+    return registry.load(job).update({f"effects.{n}": dict(EFFECTS[job, n].examples[k]) for n, k in names.items()})
+
+
+def asked(effect):
+    """Return what an effect must have rows of, for each of its examples."""
+    if isinstance(effect, Speed):
+        return set(effect.rows)
+    if isinstance(effect, Event):
+        return {figure.name for figure in effect.figures}
+    return {*effect.quantities, *effect.rows} if isinstance(effect, Check) else {"term"}
+
+
+@pytest.mark.parametrize(("job", "name"), EFFECTS)
+def test_every_effect_has_its_rows(job, name):
+    effect = EFFECTS[job, name]
+    expected = {(str(k), what) for k in range(len(effect.examples)) for what in asked(effect)}
+    assert {(row[2], row[5]) for row in ROWS if row[:2] == (job, name)} == expected
+
+
+@pytest.mark.parametrize("row", ROWS, ids=" ".join)
+def test_an_effect_says_what_its_row_does(row):
+    job, effect, example, design, angle, what, value = row
+    found = sampled(job, effect, int(example), design)
+    if isinstance(EFFECTS[job, effect], Event):
+        read = registry.find(job).parted(scene_of(job, effect, int(example)), found).figures[what]
+    elif not angle:
+        read = found.static[what]
+    else:
+        phi = math.radians(float(angle))
+        node = Node(phi, found.cycle.switch(found.cycle.place(phi)[0]))
+        instant = found.model.instant(systems.FLOAT, found.given, node)
+        read = instant.terms()[effect] if what == "term" else quantity(found, what, node)
+    assert float(read) == pytest.approx(float(value), rel=1e-11, abs=1e-12)
+
+
+def quantity(found, name, node):
+    return found.model.quantity(systems.FLOAT, found.given, name, node)
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if plain_effects.knows(*row[:2])], ids=" ".join)
+def test_a_row_is_what_plain_formulas_say_in_many_digits(row):
+    """Rows of an effect that plain_effects.py does not know stand for themselves."""
+    job, effect, example, design, angle, what, value = row
+    values = EFFECTS[job, effect].examples[int(example)]
+    assert float(value) == plain_effects.value(job, effect, values, design, angle, what)
+
+
+def test_no_two_rows_are_of_one_thing():
+    assert len({row[:6] for row in ROWS}) == len(ROWS)

@@ -1,0 +1,133 @@
+"""KKT systems whose multipliers are plain to see."""
+
+import numpy as np
+import pytest
+from support import toy
+
+from loomopt.model.sampling import Sampler
+from loomopt.physics.tolerances import POSITIVE, STATIONARY
+from loomopt.solving.certificate import kkt
+from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import Multipliers, System, replaceable, solved
+
+
+def at(program, x):
+    """Return the active set at x and its slopes."""
+    sampler = Sampler(program.model, x)
+    active = active_set(program, sampler)
+    return active, Exact(program, x, sampler, active.rows).gradients()
+
+
+def level(program, x, place=0, earlier=()):
+    active, gradients = at(program, x)
+    system = kkt.system(active, place, earlier)
+    return active, system, kkt.solved(gradients, system)
+
+
+XY = {"x": 0.0, "y": 0.0}
+LEAN = {"f": lambda v: 3 * v["x"] + 2 * v["y"]}
+
+
+def test_limits_share_a_slope_by_their_own():
+    program = toy.program("xy", LEAN, limits=(("x", -1, 0.0), ("y", -1, 0.0), ("y", 1, 0.0)))
+    _, system, found = level(program, XY)
+    assert system.inequalities == (0, 1, 2)
+    assert system.equalities == ()
+    assert found.of == pytest.approx([3.0, 2.0, 0.0, 1.0])
+    assert found.residual < 1e-14
+    assert found.positive == {0, 1, 3}
+    without = system.without(1)
+    assert (without.inequalities, without.pieces) == ((0, 2), system.pieces)
+    assert kkt.solved(at(program, XY)[1], without).residual > 0.5
+
+
+def test_an_equality_may_pull_either_way_and_a_limit_may_not():
+    for value in (3.0, -3.0):
+        rows = {"f": lambda v, value=value: value * v["x"] + v["y"] ** 2}
+        _, _, found = level(toy.program("xy", rows, limits=(("x", 0, 0.0),)), XY)
+        assert found.of == pytest.approx([-value, 1.0])
+    _, _, found = level(toy.program("xy", LEAN, limits=(("x", 1, 0.0), ("y", -1, 0.0))), XY)
+    assert found.residual > 0.5
+    assert found.of[0] == 0.0
+
+
+def test_pieces_of_an_objective_share_a_multiplier_of_one():
+    """max(x, −2 x + y, −y) at 0: weights 2/4, 1/4, 1/4."""
+    rows = {"p": lambda v: v["x"], "q": lambda v: -2 * v["x"] + v["y"], "r": lambda v: -v["y"]}
+    _, system, found = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
+    assert system.pieces == (0, 1, 2)
+    assert found.of == pytest.approx([0.5, 0.25, 0.25])
+    assert found.residual < 1e-14
+
+
+def multipliers(*of):
+    return Multipliers(np.array(of, dtype=float), 0.0)
+
+
+TWO = {"a": lambda v: 2 * v["x"], "b": lambda v: v["x"] + v["y"] ** 2, "c": lambda v: v["x"] - v["y"]}
+
+
+def test_what_binds_at_one_level_is_an_equality_at_the_next():
+    program = toy.program("xy", TWO, limits=(("x", -1, 0.0), ("y", -1, 0.0)), objectives=("a", "c"))
+    active, _ = at(program, XY)
+    system = kkt.system(active, 1, [multipliers(2.0, 0.0, 1.0, 0.0)])
+    assert (system.equalities, system.inequalities) == ((0,), (1,))
+    assert system.held.tolist() == [[0, 0, 1, 0]]
+    assert system.limits == (1, 0)
+    faint = kkt.system(active, 1, [multipliers(0.9e-8, 0.0, 1.0, 0.0)])
+    assert faint.equalities == ()
+
+
+def test_a_peak_of_several_pieces_is_held_piece_by_piece():
+    program = toy.program("xy", TWO, objectives=("a, b", "c"))
+    active, _ = at(program, XY)
+    held = kkt.system(active, 1, [multipliers(0.5, 0.5, 0.0)]).held
+    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
+    assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held.tolist() == [[1, 0, 0]]
+
+
+def test_both_pieces_of_a_magnitude_that_vanishes_are_held():
+    active, _ = at(toy.program("xy", TWO, objectives=("|a|", "c")), XY)
+    held = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held
+    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
+
+
+def test_a_row_binds_above_a_hundred_millionth():
+    assert POSITIVE == 1e-8
+    assert multipliers(POSITIVE, 1.1e-8, -1.1e-8, 0.0).positive == {1, 2}
+
+
+def test_multipliers_are_normalised_to_pieces_that_weigh_one_together():
+    """A slope that is left takes its share of the sum: here 0.5."""
+    system = kkt.System((1, 2), (0,), (), np.zeros((0, 3)))
+    assert multipliers(3.0, 0.1, 0.4).normalised(system) == pytest.approx([6.0, 0.2, 0.8])
+    empty = kkt.System((1,), (0,), (), np.zeros((0, 2)))
+    assert multipliers(3.0, 0.0).normalised(empty).tolist() == [3.0, 0.0], "no sum to share"
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
+    """Of rows that depend on each other some can stand for others; of independent ones none."""
+    rng = np.random.default_rng(seed)
+    rows, size = int(rng.integers(2, 7)), int(rng.integers(2, 6))
+    slopes = rng.normal(size=(rows, size)) * 10.0 ** rng.integers(-3, 4, (rows, 1))
+    prices = 10.0 ** rng.integers(-4, 2, rows)
+    gradients = np.vstack([slopes, -prices @ slopes])
+    one = System((rows,), tuple(range(rows)), (), np.zeros((0, rows + 1)))
+    found = solved(gradients, one)
+    named = replaceable(gradients, one, found, STATIONARY)
+    without = [
+        k for k in range(rows) if found.of[k] > POSITIVE and solved(gradients, one.without(k)).residual <= STATIONARY
+    ]
+    assert set(without) <= set(named)
+    if rows <= size and np.linalg.svd(gradients[:rows], compute_uv=False)[-1] * prices.min() > 1e-4:
+        assert named == []
+
+
+def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
+    """Slopes (1, 0), twice that, and (0, 1): the first two can stand for each other, the third for none."""
+    gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
+    one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
+    found = Multipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
+    assert replaceable(gradients, one, found, STATIONARY) == [0, 1]

@@ -1,0 +1,140 @@
+"""The least relaxation, on limits whose clash is plain to see."""
+
+import math
+
+import pytest
+from support import toy
+
+from loomopt.physics.tolerances import NEEDED
+from loomopt.solving.answer.words import Words
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import elastic
+from loomopt.solving.search.elastic import clash, least
+
+ROWS = {"f": lambda v: v["x"] ** 2 + v["y"] ** 2, "p": lambda v: v["x"] + v["y"], "q": lambda v: v["x"] - v["y"]}
+
+
+def found(limits, sizes=None, waves=None):
+    program = toy.program("xy", ROWS, waves, limits=limits, sizes=sizes)
+    words = Words(toy.scene_of(toy.ToyJob(program)))
+    return clash(program, least(program, [program.starts[0]], Settings()), Settings(), words)
+
+
+def told(answer):
+    return {(one.limit, one.side, one.alone): one.needed for one in answer.relaxations}
+
+
+def test_either_of_two_limits_that_clash_would_do_alone():
+    answer = found((("x", -1, 2.0), ("x", 1, 1.0), ("y", 1, 5.0)))
+    assert answer.limits == ("x >= 2", "x <= 1")
+    assert told(answer)["x", "min", True] == pytest.approx(1.0, rel=1e-7)
+    assert told(answer)["x", "max", True] == pytest.approx(2.0, rel=1e-7)
+    assert ("y", "max", True) not in told(answer)
+
+
+def test_the_least_sum_is_in_natural_sizes():
+    """p ≥ 4 against x ≤ 1 and y ≤ 1: what is large by nature gives way first."""
+    answer = found((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"p": 10.0})
+    assert told(answer)["p", "min", True] == pytest.approx(2.0, rel=1e-7)
+    assert answer.relaxations[0].limit == "p"
+    small = found((("p", -1, 4.0), ("x", 1, 1.0), ("y", 1, 1.0)), sizes={"x": 10.0})
+    assert small.relaxations[0].limit == "x"
+    assert small.relaxations[0].needed == pytest.approx(3.0, rel=1e-7)
+
+
+def test_limits_that_must_give_way_together_are_not_alone():
+    clashing = (("x", -1, 2.0), ("x", 1, 1.0), ("y", -1, 2.0), ("y", 1, 1.0))
+    answer = found(clashing)
+    assert {one.alone for one in answer.relaxations} == {False}
+    assert sum(abs(one.needed - one.value) for one in answer.relaxations) == pytest.approx(2.0, rel=1e-7)
+    assert {one.limit for one in answer.relaxations} == {"x", "y"}
+
+
+def test_an_equality_gives_way_to_the_side_that_helps():
+    answer = found((("x", 0, 3.0), ("x", 1, 1.0)))
+    sides = {(one.side, one.value): one.needed for one in answer.relaxations}
+    assert sides["min", 3.0] == pytest.approx(1.0, rel=1e-7)
+    assert sides["max", 1.0] == pytest.approx(3.0, rel=1e-7)
+
+
+def test_what_a_whole_cycle_limit_needs():
+    waves = {"w": lambda m, v, phi: v["x"] + m.cos(phi)}
+    answer = found((("w", 1, 0.25),), waves=waves)
+    assert answer.limits == ("w <= 0.25",)
+    assert told(answer) == {("w", "max", True): pytest.approx(1.0, rel=1e-7)}
+
+
+def test_where_a_design_needs_nothing_the_search_for_the_least_relaxation_ends(monkeypatch):
+    program = toy.program("xy", ROWS, limits=(("x", -1, 1.0),))
+    nearest = least(program, [program.starts[0]] * 3, Settings())
+    assert nearest.relaxed == {}
+    assert nearest.x["x"] >= 1.0 - 1e-9
+    calls = []
+    original = exchange.solve
+
+    def solve(*arguments, **more):
+        calls.append(arguments)
+        return original(*arguments, **more)
+
+    monkeypatch.setattr(exchange, "solve", solve)
+    least(program, [program.starts[0]] * 3, Settings())
+    assert len(calls) == 1
+
+
+# Starts -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sums", "most", "best"),
+    [
+        ((2.0, 1.5, 1.0), (math.inf, 2.0 - NEEDED, 1.5 - NEEDED), 1.0),
+        ((2.0, None, 1.0), (math.inf, 2.0 - NEEDED, 2.0 - NEEDED), 1.0),
+        ((None, 2.0, None), (math.inf, math.inf, 2.0 - NEEDED), 2.0),
+        ((None, None), (math.inf, math.inf), None),
+    ],
+)
+def test_each_start_need_only_be_followed_below_the_best_so_far(monkeypatch, sums, most, best):
+    calls: list[float] = []
+
+    def solve(program, start, settings, elastic, known):
+        total = sums[len(calls)]
+        calls.append(known.most)
+        reached = total is not None
+        return Point({}, "", reached, relaxed={0: 1.0} if reached else {}, excesses=(total,) if reached else ())
+
+    monkeypatch.setattr(exchange, "solve", solve)
+    program = toy.program("xy", ROWS, limits=(("x", -1, 2.0),))
+    answer = least(program, [{}] * len(sums), Settings())
+    assert tuple(calls) == most
+    assert (answer.excesses[0] if answer else None) == best
+
+
+def test_another_basin_of_the_least_relaxation_is_found_from_another_start():
+    """x² ≥ 4 needs less where x may go below −1 than where it may go above 0.5."""
+    rows = {**ROWS, "s": lambda v: v["x"] ** 2}
+    program = toy.program("xy", rows, limits=(("s", -1, 4.0), ("x", 1, 0.5), ("x", -1, -1.0)))
+    right, left = ({"x": x, "y": 0.0} for x in (3.0, -3.0))
+    assert sum(least(program, [right], Settings()).excesses) == pytest.approx(1.5, abs=1e-7)
+    assert sum(least(program, [right, left], Settings()).excesses) == pytest.approx(1.0, abs=1e-7)
+
+
+def test_a_limit_alone_is_found_though_all_at_once_another_gives_way():
+    """Least together: p gives way by 1. Alone: x to 3, or y to 3."""
+    limits = (("p", -1, 4.0), ("x", 1, 1.5), ("y", 1, 1.5))
+    answer = found(limits)
+    assert told(answer)["p", "min", True] == pytest.approx(3.0, rel=1e-7)
+    assert told(answer)["x", "max", True] == pytest.approx(2.5, rel=1e-7)
+    assert told(answer)["y", "max", True] == pytest.approx(2.5, rel=1e-7)
+
+
+def test_a_limit_that_does_not_suffice_is_not_told():
+    """The circle keeps x at 1 or below, whatever y may be."""
+    answer = found((("f", 1, 1.0), ("x", -1, 2.0), ("y", 1, 5.0)))
+    assert {key[0] for key in told(answer)} == {"f", "x"}
+
+
+def test_both_rows_of_a_limit_need_what_the_worse_one_does():
+    program = toy.program("xy", ROWS, limits=(("x", -1, 2.0), ("x", -1, 3.0), ("x", 1, 0.0), ("y", 1, 1.0)))
+    needed = {0: 0.5, 1: -1.5, 2: 2.0, 3: 0.9e-9}
+    assert elastic._by_limit(program, needed) == {1: -1.5, 2: 2.0}

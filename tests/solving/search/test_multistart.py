@@ -1,0 +1,222 @@
+"""How wide a search goes: so many starts, or many designs looked at; when it ends, and what it says of itself."""
+
+import random
+from dataclasses import replace
+
+import pytest
+from searches import BAD, certified, empty, solved
+from support import toy
+
+import loomopt as lo
+from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import multistart
+from loomopt.solving.search.batch import DESIGNS
+from loomopt.solving.search.multistart import BETTER, MORE_STARTS, searched
+from loomopt.solving.search.search import Search
+
+__all__ = ["certified", "solved"]
+
+
+def test_more_starts_are_tried_where_none_is_certified(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    answers["all"] = BAD
+    points += [Point({"x": float(k), "y": 0.0}, "Solve_Succeeded", True) for k in range(MORE_STARTS)]
+    told = []
+    found = searched(empty(), 2, 0, (), lambda number, count: told.append((number, count)))
+    assert told == [(1, 2), (2, 2), *((k, 8) for k in range(3, 9))]
+    assert (len(calls), len(found.candidates)) == (8, 8)
+    assert len({tuple(start.items()) for start, _, _ in calls}) == 8
+
+
+def test_one_certified_start_is_enough(certified, solved):
+    calls, points = solved
+    points.append(Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, built=0.25))
+    found = searched(empty(), 1, 0, (), None)
+    assert (len(calls), found.passed, found.built) == (1, True, 0.25)
+    assert found.solved >= 0.0
+    assert found.certified > 0.0
+
+
+def test_a_neighbour_leads_on_or_is_forgotten(certified, solved):
+    answers = certified[1]
+    calls, points = solved
+    near = Point({"x": 7.0, "y": 1.0}, "Solve_Succeeded", True)
+    points.append(near)
+    assert searched(empty(), 3, 0, (near,), None).passed
+    assert calls == [({"x": 7.0, "y": 1.0}, 1000.0, near)]
+    answers[7.0] = BAD
+    points += [near, Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True)]
+    found = searched(empty(), 1, 0, (near,), None)
+    assert (len(found.candidates), found.passed, found.best.x["x"]) == (2, True, 1.0)
+
+
+# Many designs -----------------------------------------------------------------------------------------------------
+
+HILLS = {"f": lambda v: (v["x"] ** 2 - 4) ** 2 / 16 + v["x"] / 4 + v["y"] ** 2}
+"""Two basins: the wide one of its start at x = 2, the deeper one at x = −2."""
+
+
+def hills(**more):
+    return replace(
+        toy.program("xy", HILLS, bounds={"x": (-3.0, 3.0), "y": (-1.0, 1.0)}, start={"x": 2.0, "y": 0}), **more
+    )
+
+
+def wide(program, **more):
+    return searched(Search(toy.ToyJob(program), program, Settings(), **more), None, 0, (), None)
+
+
+def test_the_deeper_basin_is_found_and_what_was_done_is_counted():
+    found = wide(hills())
+    assert found.best.x["x"] < -1.9
+    assert found.designs == DESIGNS
+    assert len(found.candidates) > 8
+    one = searched(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
+    assert one.best.x["x"] > 1.8
+    assert (len(one.candidates), one.designs) == (1, 0)
+
+
+def test_where_one_optimum_is_all_there_is_no_designs_are_looked_at():
+    found = wide(hills(single="because"))
+    assert (len(found.candidates), found.designs) == (1, 0)
+    assert found.best.x["x"] > 1.8, "the programme's word is taken"
+
+
+def test_starts_that_cannot_be_better_are_left():
+    found = wide(hills())
+    left = [c.point for c in found.candidates if c.point.status == "Beaten"]
+    least = min(c.objectives[0] for c in found.reached)
+    assert left
+    assert all(point.value > least - 2 * BETTER for point in left)
+
+
+@pytest.mark.parametrize(
+    ("objectives", "least", "alone"),
+    [
+        (("|f|",), 0.0, True),
+        (("x",), 0.0, True),
+        (("|f|", "x"), 0.0, True),
+        (("|f|",), 0.1, False),
+        (("f",), 0.0, False),
+    ],
+)
+def test_nothing_more_is_solved_where_no_design_can_be_better(objectives, least, alone):
+    rows = {"f": lambda v: (v["x"] - 1) * (v["y"] - 1) + least if least else v["x"]}
+    limits = (("f", -1, least),) if least else ()
+    found = wide(toy.program("xy", rows, limits=limits, objectives=objectives, bounds={"x": (0, 3), "y": (0, 1)}))
+    assert found.passed
+    assert (len(found.candidates) == 1) == alone
+    assert found.best.candidate.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
+
+
+def test_each_start_is_told_with_how_many_there_are():
+    told = []
+    program = hills()
+    searched(Search(toy.ToyJob(program), program, Settings()), None, 0, (), lambda k, of: told.append((k, of)))
+    assert [k for k, _ in told] == list(range(1, len(told) + 1))
+    assert told[-1][0] == told[-1][1]
+    assert [of for _, of in told] == sorted(of for _, of in told)
+
+
+def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
+    calls, points = solved
+    program = toy.program("xy", limits=(("x", -1, 2.0), ("x", 1, 1.0)), objectives=("x",))
+    points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
+    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, excesses=(1.0,))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(multistart, "least", lambda *_: nearest)
+        found = wide(program)
+    assert len(calls) == 1
+    assert found.clashes
+    assert found.nearest is nearest
+
+
+def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, solved):
+    calls, points = solved
+    program = toy.program("xy", limits=(("x", -1, 2.0),), objectives=("x",))
+    points += [Point(program.starts[0], "Infeasible_Problem_Detected", False)]
+    points += [Point({"x": 2.0, "y": 0.0}, "Solve_Succeeded", True)] * 40
+    nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, excesses=(0.0,))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(multistart, "least", lambda *_: nearest)
+        found = wide(program)
+    assert calls[1][0] == {"x": 2.5, "y": 0.0}
+    assert found.passed
+    assert not found.clashes
+
+
+def test_a_neighbours_basin_is_kept_to_and_said():
+    first = wide(hills())
+    away = searched(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
+    warm = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (away.best.candidate.point,), None)
+    assert (warm.stayed, first.stayed) == (True, False)
+    assert warm.best.x["x"] > 1.8
+
+
+# Rapier and beat-up -----------------------------------------------------------------------------------------------
+
+SMALL_BASIN = {
+    "operation.stroke": "932 mm",
+    "operation.s_dwell": "5.1 mm",
+    "operation.dwell_after": "17.1 deg",
+    "operation.dwell_before": "31.6 deg",
+    "bounds.l4": {"min": "8 mm", "max": "21 mm"},
+    "bounds.l5": {"min": "455 mm", "max": "563 mm"},
+    "bounds.l6": {"min": "175 mm", "max": "263 mm"},
+    "bounds.l3p": {"min": "153 mm", "max": "191 mm"},
+    "bounds.C0x": {"min": "418 mm", "max": "502 mm"},
+    "bounds.C0y": {"min": "161 mm", "max": "280 mm"},
+    "bounds.alpha": {"min": "24.3 deg", "max": "38.5 deg"},
+    "bounds.phi40": {"min": "138.7 deg", "max": "170.4 deg"},
+}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_basin_that_random_starts_miss_is_found_whatever_the_seed(seed):
+    answer = lo.solve(lo.load("rapier").update(SMALL_BASIN), seed=seed)
+    assert answer.status == "optimal", answer.message
+    assert answer.figures["peak_acceleration"] == pytest.approx(0.84455731, abs=5e-9)
+    assert answer.solver["basins"] >= 2
+
+
+def test_the_packaged_drive_is_as_before():
+    answer = lo.solve(lo.load("rapier"))
+    assert answer.figures["peak_acceleration"] == pytest.approx(0.694984753570, abs=1e-11)
+
+
+def scene_of(generator):
+    changes = {"operation.M0": f"{generator.uniform(550, 900):.1f} N*m"}
+    for name, (low, high) in {"l1": (26, 38), "l2": (55, 95), "l3": (130, 180), "l4": (145, 185)}.items():
+        centre, width = generator.uniform(low, high), generator.uniform(0.02, 0.12)
+        changes |= {f"bounds.{name}.min": f"{centre * (1 - width):.2f} mm"}
+        changes |= {f"bounds.{name}.max": f"{centre * (1 + width):.2f} mm"}
+    return lo.load("beatup").update(dict(sorted(changes.items(), reverse=True)))
+
+
+def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts():
+    generator, seen = random.Random(3), 0
+    for _ in range(30):
+        scene = scene_of(generator)
+        found = lo.solve(scene)
+        if found.status != "optimal":
+            continue
+        seen += 1
+        others = lo.solve(scene, starts=16)
+        ours, theirs = ([abs(one.figures["M3_fdc"]), one.figures["peak_torque"]] for one in (found, others))
+        assert ours[0] <= theirs[0] + 1e-4
+        assert ours[0] < theirs[0] - 1e-4 or ours[1] <= theirs[1] * (1 + 1e-6)
+        if seen == 6:
+            break
+    assert seen == 6
+
+
+def test_of_several_neighbours_the_better_basin_counts():
+    """Both points lead on; whichever comes first, the deeper of two valleys is the answer."""
+    found = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
+    best = found.best.candidate.point
+    other = next(c.point for c in found.reached if abs(c.objectives[0] - found.best.candidate.objectives[0]) > 1e-3)
+    for near in ((other, best), (best, other)):
+        again = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
+        assert again.stayed
+        assert again.best.candidate.objectives == pytest.approx(found.best.candidate.objectives)

@@ -1,0 +1,122 @@
+"""One point of a front: ends that nothing dominates, axes that are figures, and what misses what was asked."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+from loomopt.interface import results
+from loomopt.studies.front import front, plan
+from loomopt.studies.front import solver as solving
+from loomopt.studies.front.solver import Asking
+from loomopt.studies.front.trade import read_front
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Task
+
+RPM = math.pi / 30
+
+
+def ends(problem, axes, target=None, **more):
+    """Return the rows of both ends."""
+    trade = front.trade(lo.load(problem), axes, target, **more)
+    return [trade.solved(task, None) for task in trade.batch(())]
+
+
+def at(trade, value, parent):
+    """Return the row with the second axis held at a value, from a parent."""
+    ask = {"also": [], "held": parent.warm["held"], "wide": False}
+    return trade.solved(Task(99, parent.point, {trade.axes[1]: value}, ask), parent)
+
+
+def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_none(monkeypatch):
+    solver = front.trade(lo.load("beatup"), ("peak_torque", "m4e"), "balance").solver
+    asking = Asking(0, (None, 3.0))
+    found = solver.solve(asking, [], False)
+    assert found.status == "optimal"
+    monkeypatch.setattr(solving, "FEASIBLE", -0.01)
+    above = solver.solve(asking, [found.warm], False)
+    assert (above.status, above.reason) == ("uncertified", "m4e comes out above what was asked")
+
+
+def test_of_designs_of_the_least_power_an_end_has_the_least_radius():
+    """A counterweight on the rocking shaft costs no power and shifts the centre of mass: r4 = m4 r4⁰/(m4 + m4e)."""
+    scene = lo.load("beatup")
+    _, least = ends("beatup", ("r4", "peak_power"))
+    mass, radius = scene.mechanism["m4"], scene.mechanism["r4"]
+    assert least.certified
+    assert plan.value(least, "peak_power") == pytest.approx(5173.394990630681, rel=1e-9)
+    assert least.design["m4e"] == pytest.approx(12.4)
+    assert plan.value(least, "r4") == pytest.approx(mass * radius / (mass + 12.4), rel=1e-8)
+
+
+@pytest.mark.parametrize("axes", [("l6", "peak_acceleration"), ("peak_acceleration", "l6")])
+def test_an_end_is_sought_in_every_basin_at_its_second_level_too(axes):
+    shortest = ends("rapier", axes)[axes.index("l6")]
+    assert shortest.certified
+    assert plan.value(shortest, "l6") == pytest.approx(0.12)
+    assert plan.value(shortest, "peak_acceleration") == pytest.approx(0.606149142, rel=1e-8)
+
+
+def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
+    """The least l3 needs the shortest crank, whose price what is held of l3 may carry too."""
+    trade = front.trade(lo.load("beatup"), ("l1", "l3"))
+    found = read_front(trade, run.run(trade))
+    assert found.message.startswith("l1 and l3 do not conflict: one design is best in both.")
+    assert found.values("l1") == pytest.approx([0.03])
+    assert found.values("l3") == pytest.approx([0.147938261848])
+
+
+def test_stiffness_against_the_speed_up_to_which_contact_holds():
+    ranges = {"contact_speed": (10 * RPM, 900 * RPM)}
+    trade = front.trade(lo.load("shedding"), ("K1", "contact_speed"), ranges=ranges, points=3)
+    rows = run.run(trade)
+    for speed, stiffness in ((200.0, 13354.018003), (400.0, 46819.099799), (900.0, 228117.326425)):
+        row = at(trade, speed * RPM, rows[0])
+        assert row.certified
+        assert plan.value(row, "K1") == pytest.approx(stiffness, rel=1e-10)
+        assert row.figures["contact_speed"] == pytest.approx(speed * RPM, rel=1e-10)
+        assert row.figures["speed"] == pytest.approx(600 * RPM)
+    found = read_front(trade, rows)
+    assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
+    assert found.changes[0]["kind"] == "kink"
+
+
+@pytest.mark.parametrize("axes", [("contact_max", "contact_speed"), ("contact_speed", "peak_power")])
+def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_read_at_the_scenes_speed(axes):
+    scene = lo.load("shedding")
+    trade = front.trade(scene, axes, points=4)
+    found = read_front(trade, run.run(trade))
+    assert len(found.rows) >= 4
+    assert all(row.certified for row in found.rows)
+    assert min(found.values("contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
+    for row in found.rows:
+        there = lo.evaluate(scene, row.design).figures
+        for axis in axes:
+            assert plan.value(row, axis) == pytest.approx(row.figures[axis], rel=1e-9)
+            assert there[axis] == pytest.approx(row.figures[axis], rel=1e-9)
+    for one, other in itertools.pairwise(found.values(axes[0])):
+        assert one < other
+
+
+def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it():
+    trade = front.trade(lo.load("shedding"), ("K1", "contact_speed"), points=3)
+    parent = trade.solved(trade.batch(())[0], None)
+    ask = {"also": [], "held": parent.warm["held"], "wide": False}
+    task = Task(99, parent.point, {"contact_speed": 200 * RPM}, ask)
+    answer = results.solved(trade.solve(task, parent), trade.scene)
+    limit = next(each for each in answer.limits if each.name == "contact_speed")
+    assert limit.min == pytest.approx(200 * RPM)
+    assert limit.value == pytest.approx(200 * RPM)
+    assert answer.admissible
+    assert answer.evaluate().limits == answer.limits
+    assert answer.prove().passed
+    softer = replace(answer, design={**answer.design, "K1": 0.99 * answer.design["K1"]}).evaluate()
+    assert [each.name for each in softer.limits if not each.ok] == ["contact_speed"]
+
+
+def test_a_contact_speed_that_nothing_limits_is_not_traded():
+    with pytest.raises(BadInput, match=r"nothing limits the speed.*trade another axis"):
+        front.trade(lo.load("shedding-static"), ("K1", "contact_speed"))

@@ -1,0 +1,67 @@
+"""The plain reference of the heald frame beside the product: one scene for both, answers kept for the whole run."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+from reference import shedding as plain
+
+import loomopt as lo
+
+ANGLES = ("rise", "far_dwell", "return", "near_dwell")
+CYCLOID = 2 * np.pi
+"""The peak s'' of the cycloidal law, by which a free law is bounded unless a scene says otherwise."""
+TRAVELS = {"65.6 mm": plain.PAPER, "14.5 mm": plain.PRINTED}
+
+
+def product(case):
+    """Return the product's scene of a plain one: of its effects only those that are not 0."""
+    optional = {"effects.damping.C": (case.C, "N*s/m"), "effects.dry_friction.F": (case.F, "N")}
+    changes = {key: f"{value!r} {unit}" for key, (value, unit) in optional.items() if value}
+    changes |= {f"mechanism.{name}": f"{angle!r} deg" for name, angle in zip(ANGLES, case.angles, strict=True)}
+    return lo.load("shedding").update(
+        {
+            "mechanism.travel": f"{case.travel!r} m",
+            "mechanism.law": case.law,
+            "effects.weight.G": f"{case.G!r} N",
+            "effects.inertia.M": f"{case.M!r} kg",
+            "operation.N_min": f"{case.N_min!r} N",
+            "operation.speed": f"{case.rpm!r} rpm",
+            "effects.warp_tension": {"T1": f"{case.T1!r} N", "T2": f"{case.T2!r} N", "shape": case.shape},
+            **changes,
+        }
+    )
+
+
+def freed(case, n, symmetric=False, bound=CYCLOID):
+    """Return the product's least spring of a plain scene with a free law of n intervals."""
+    return _freed(case, n, symmetric, float(bound))
+
+
+@functools.cache
+def _freed(case, n, symmetric, bound):
+    own = {"intervals": n, "symmetric": symmetric, "acceleration": bound}
+    return lo.solve(product(case).update({f"targets.law.{key}": value for key, value in own.items()}), "law")
+
+
+def programmed(case, n, symmetric=False, bound=CYCLOID):
+    """Return the same stiffness, N/m, by the plain reference's linear programmes."""
+    return _programmed(case, n, symmetric, float(bound))
+
+
+@functools.cache
+def _programmed(case, n, symmetric, bound):
+    return float(plain.least_law(case, n, bound, symmetric)[0])
+
+
+def flat(design):
+    """Return a design with every number of its law under a name of its own."""
+    knots = {f"law_{k}": value for k, value in enumerate(design["law"])}
+    return {name: value for name, value in design.items() if name != "law"} | knots
+
+
+def lowest(case, law, K1, points=2001):
+    """Return the least and the largest cam force, N, of s'' at even knots with a spring K1, by a dense scan."""
+    at = replace(case, law=tuple(law))
+    found = [plain.force(np, at, s, np.linspace(float(s[3]), float(s[4]), points), K1) for s in plain.stretches(at)]
+    return min(each.min() for each in found), max(each.max() for each in found)
