@@ -9,8 +9,9 @@ from loomopt.base.errors import BadInput
 from loomopt.model import drive
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel, with_words_fixed
+from loomopt.model.moves import AxisMove, Move, ScaleMove, Wish
 from loomopt.model.objectives import Objective, Value
-from loomopt.model.program import Move, Program, Variable, Wish
+from loomopt.model.program import Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, label, owned
@@ -229,18 +230,18 @@ def scale_move(name: str, along: tuple[str, ...], known: Mapping[str, float], li
     """Return the move that scales lengths in common, and would stay nearest to today's."""
     today = {n: known[n] for n in along if n in known}
     ranges = {n: limited[n] for n in along if n in limited}
-    return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, ranges)
+    return ScaleMove(name, along, (Wish("today", LEAST_CHANGE),), today, ranges)
 
 
 def axis_moves(scene: Scene, known: Mapping[str, float], limited: Bounds) -> list[Move]:
     """Return the moves along numbers of checks that may change nothing, and would stay nearest to today's."""
-    found = []
+    found: list[Move] = []
     for check in (effect for effect in scene.active if isinstance(effect, Check)):
         for axis in check.axes:
             name = owned(check, axis.key)
             if name in limited and limited[name][0] < limited[name][1]:
                 wish = (Wish("today", LEAST_CHANGE),)
-                found.append(Move(axis.name, (name,), "axis", wish, {name: known[name]}, {name: limited[name]}))
+                found.append(AxisMove(axis.name, (name,), wish, {name: known[name]}, {name: limited[name]}))
     return found
 
 

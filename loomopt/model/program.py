@@ -7,12 +7,13 @@ serves every scene of the same structure.
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.limits import BoundLimit, CycleLimit, Limit, SingleLimit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import Move
 from loomopt.model.objectives import Objective, Peak
 from loomopt.physics.tolerances import FEASIBLE
 
@@ -64,33 +65,6 @@ def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
         high = min((limit.value for limit in each if limit.sign >= 0), default=math.inf)
         found.append(Goal(name, low, high, FEASIBLE * max(limit.scale for limit in each)))
     return tuple(found)
-
-
-class Wish(NamedTuple):
-    """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
-
-    when, above: it holds where that variable exceeds that value, SI; "" for always.
-    """
-
-    toward: Literal["today", "least", "most"]
-    reason: str
-    when: str = ""
-    above: float = 0.0
-
-
-class Move(NamedTuple):
-    """A direction that may leave everything unchanged, along straight lines in the NLP's variables.
-
-    kind "scale": all of `along` grow in proportion; "axis": each of `along` changes by itself.
-    wishes: the first that holds is followed; today, bounds: of each of `along`, SI.
-    """
-
-    name: str
-    along: tuple[str, ...]
-    kind: Literal["scale", "axis"]
-    wishes: tuple[Wish, ...]
-    today: Mapping[str, float]
-    bounds: Mapping[str, tuple[float, float]]
 
 
 Numbers = Mapping[str, float]

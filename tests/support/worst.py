@@ -25,7 +25,7 @@ class WorstMagnitude(Worst):
 class WorstPeak(Worst):
     """The worst peak of several quantities."""
 
-    sides = ()
+    sides, least = (), 0.0
 
     @property
     def quantities(self):

@@ -14,9 +14,10 @@ from loomopt.model import numbers as scene_numbers
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import AxisMove, Move, Wish
 from loomopt.model.numbers import Bounds, bound_limits, demand_figures, demanded, ends
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Move, Numbers, Program, Variable, Wish, goals
+from loomopt.model.program import Numbers, Program, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load
 from loomopt.physics.tolerances import NO_MASS
@@ -249,7 +250,7 @@ def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: B
         ),
     }
     axes = tuple(
-        Move("counterweight", (name,), "axis", wishes[name], {name: known[name]}, {name: limited[name]})
+        AxisMove("counterweight", (name,), wishes[name], {name: known[name]}, {name: limited[name]})
         for name in COUNTERWEIGHT
         if name in names and limited[name][0] < limited[name][1]
     )

@@ -16,9 +16,10 @@ from loomopt.maths.systems import FLOAT
 from loomopt.model import numbers as scene_numbers
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import Move
 from loomopt.model.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
 from loomopt.model.objectives import Objective, Peak, Value
-from loomopt.model.program import Move, Program, Variable, goals
+from loomopt.model.program import Program, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive

@@ -15,9 +15,10 @@ from loomopt.model import drive
 from loomopt.model import numbers as scene_numbers
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import AxisMove, Move, Wish
 from loomopt.model.numbers import axis_moves, bound_limits, demand_figures, demanded, ends, floored, inside
 from loomopt.model.objectives import Objective, Peak, Value
-from loomopt.model.program import Move, Program, Variable, Wish, goals, nothing_follows
+from loomopt.model.program import Program, Variable, goals, nothing_follows
 from loomopt.model.sampling import sampled
 from loomopt.model.speeds import followed
 from loomopt.physics.effects.kinds import Check, owned
@@ -230,7 +231,7 @@ class _Task:
         if preload.lower == preload.upper:
             return tuple(found)
         today, bounds = {"X0": self.known["X0"]}, {"X0": self.limited["X0"]}
-        return (Move("preload", ("X0",), "axis", (Wish("today", scene_numbers.LEAST_CHANGE),), today, bounds), *found)
+        return (AxisMove("preload", ("X0",), (Wish("today", scene_numbers.LEAST_CHANGE),), today, bounds), *found)
 
     def _bounds(self, variables: Sequence[Variable]) -> list[Limit]:
         """Return the bounds of variables as limits; a requirement gives way on one side only."""

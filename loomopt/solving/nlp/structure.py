@@ -220,7 +220,7 @@ class Structure:
 
 def means(program: Program, elastic: bool) -> list[Integral]:
     """Return the means that a limit reads, or an objective; an elastic program has no objectives."""
-    read = {limit.row for limit in program.limits}
+    read = {row for limit in program.limits for row in limit.reads}
     read |= set() if elastic else {row for objective in program.objectives for row in objective.rows}
     return [mean for mean in program.model.integrals if {mean.name, mean.root} & read]
 

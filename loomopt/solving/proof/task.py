@@ -11,7 +11,8 @@ from loomopt.maths.intervals import Floats, Interval
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
 from loomopt.model.limits import Limit
-from loomopt.model.program import Move, Program, Variable
+from loomopt.model.moves import Move
+from loomopt.model.program import Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.solving.proof.rows import BoxRows, OpenError
 
@@ -188,7 +189,7 @@ def silent(program: Program) -> Scale | None:
     ends = {v.name: (v.lower, v.upper) for v in program.variables}
     for move in program.moves:
         known = all(name in ends and ends[name][0] > 0 and math.isfinite(ends[name][1]) for name in move.along)
-        if move.kind == "scale" and known and _changes_nothing(program, move):
+        if known and not move.is_apart and _changes_nothing(program, move):
             bounds = {name: ends[name] for name in move.along}
             return Scale(bounds, min(bounds, key=lambda name: bounds[name][1] / bounds[name][0]))
     return None

@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RA
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
-from loomopt.solving.search.settle import unchanging, wished
+from loomopt.solving.search.settle import unchanging
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
@@ -191,8 +191,9 @@ def _width(variable: Variable) -> float:
 
 def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
     """Return the variables that moves settle one by one at x (SI): by another rule, or apart from all that is open."""
-    axes = [(name, wished(program, move, x)) for move in program.moves if move.kind == "axis" for name in move.along]
-    others = {name for name, wish in axes if wish and wish.toward != "today"}
+    values = {**program.parameters, **x}
+    axes = [(name, move.wished(values)) for move in program.moves if move.is_apart for name in move.along]
+    others = {name for name, wish in axes if wish and not wish.is_least_change}
     names, level = _level(certificate)
     sizes = np.linalg.norm(level, axis=0)
     apart = {name for name, size in zip(names, sizes, strict=True) if size >= 1.0 - RANK}

@@ -148,7 +148,7 @@ class Target:
         number = systems.mpmath(REFERENCE_DIGITS).number
         scaled = {v.name: number(x[v.name]) / number(v.scale) for v in self.program.variables}
         for move in self.program.moves:
-            if move.kind == "axis":
+            if move.is_apart:
                 scaled |= dict.fromkeys(move.along, number(0.0))
                 continue
             length = sum(scaled[name] ** 2 for name in move.along) ** number(0.5)

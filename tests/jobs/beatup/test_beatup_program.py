@@ -7,8 +7,9 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.model.limits import BoundLimit, DesignLimit, Limit, RatioLimit
+from loomopt.model.moves import AxisMove, ScaleMove, Wish
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Program, Variable, Wish
+from loomopt.model.program import Program, Variable
 from loomopt.physics.tolerances import NO_MASS
 
 BEATUP = registry.load("beatup")
@@ -118,9 +119,9 @@ def test_starts_use_part_of_the_counterweight_and_never_none_alone():
 
 def test_moves_are_data_the_counterweights_first():
     found = JOB.program(BEATUP, "balance").moves
-    assert [(move.name, move.along, move.kind) for move in found] == [
-        ("counterweight", ("r4e",), "axis"),
-        ("scale", LENGTHS, "scale"),
+    assert [(move.name, move.along, type(move)) for move in found] == [
+        ("counterweight", ("r4e",), AxisMove),
+        ("scale", LENGTHS, ScaleMove),
     ]
     used, none = found[0].wishes
     assert used == Wish("most", "least added mass, so the largest radius", "s", used.above)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.program import Move, Wish
+from loomopt.model.moves import AxisMove, Wish
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
@@ -179,7 +179,7 @@ def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
 def sliding(bend):
     """Return two levels, of which x² + bend · y² is the first; z changes nothing and is a move."""
     rows = {"f": lambda v: v["x"] ** 2 + bend * v["y"] ** 2, "g": lambda v: v["x"] ** 3}
-    move = Move("slide", ("z",), "axis", (Wish("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
+    move = AxisMove("slide", ("z",), (Wish("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
     return toy.program("xyz", rows, objectives=("f", "g"), moves=(move,), sizes={"z": 3.0})
 
 
