@@ -39,11 +39,11 @@ notebooks: .venv/installed-test
 
 benchmark: .venv/installed-test
 	$(BIN)/pip install -q -e '.[bench]'
-	$(BIN)/python benchmarks/kinematics_speed.py
-	$(BIN)/python benchmarks/balance_peers.py
-	$(BIN)/python benchmarks/rapier_peers.py
-	$(BIN)/python benchmarks/shedding_peers.py
-	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/measure/kinematics_speed.py
+	$(BIN)/python benchmarks/peers/balance_peers.py
+	$(BIN)/python benchmarks/peers/rapier_peers.py
+	$(BIN)/python benchmarks/peers/shedding_peers.py
+	$(BIN)/python benchmarks/measure/startup.py
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -m venv .venv

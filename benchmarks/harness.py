@@ -6,10 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))  # of its package `reference`
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
@@ -18,7 +15,7 @@ def one_thread() -> None:
     """Start this script again with single-threaded linear algebra: on problems this small, threads only cost time."""
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.environ |= dict.fromkeys(THREADS, "1")
-        os.execv(sys.executable, [sys.executable, *sys.argv])
+        os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 
 def processor_time() -> None:

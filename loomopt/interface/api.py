@@ -12,9 +12,8 @@ from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.designs import Given as Design
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
 from loomopt.solving.answer import solution
-from loomopt.solving.options import GAP, OMITTED, SECONDS, Everywhere, check_numbers, target_name
+from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_numbers, target_name
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -71,6 +70,8 @@ def solve(
     objective, in at most so many seconds (`answer.global_bound`). on_iteration(number), on_start(number, of),
     on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
+    from loomopt.solving import engine
+
     own = _scene(scene)
     if near is not None and not isinstance(near, solution.Solution):
         raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
@@ -80,9 +81,9 @@ def solve(
         accuracy=accuracy,
         starts=starts,
         seed=seed,
-        near=near,
+        near=[near.point] if near and near.point else [],
         prove=prove,
-        everywhere=Everywhere(gap, seconds, on_step or (lambda text: None)) if everywhere else None,
+        global_proof=GlobalProof(gap, seconds, on_step or (lambda text: None)) if everywhere else None,
         on_iteration=on_iteration,
         on_start=on_start,
         on_step=on_step,

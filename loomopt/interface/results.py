@@ -12,8 +12,7 @@ from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.answer import solution
+from loomopt.solving.answer import evaluation, solution
 from loomopt.solving.options import check_numbers, target_name
 
 if TYPE_CHECKING:
@@ -162,7 +161,7 @@ records.show_by(_html)
 
 def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
     """Return figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
-    return _judged(engine.evaluate(scene, design, target), scene, target_name(scene, target))
+    return _judged(evaluation.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
 def solved(found: solution.Solution, scene: Scene) -> Answer:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.units import SI_UNIT, factor
@@ -10,7 +10,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.words import Words, grouped
 from loomopt.studies.run.findings import SceneStudy
-from loomopt.studies.run.rows import Row, parts
+from loomopt.studies.run.rows import Multiplier, Row
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,10 +46,9 @@ class Units:
         kind = self.study.kinds.get(name) or self.words.kind(name)
         return SI_UNIT[kind] if self.si else self.study.scene.shown_in(kind)
 
-    def price(self, name: str) -> tuple[str, float]:
+    def price(self, multiplier: Multiplier) -> tuple[str, float]:
         """Return the unit of a multiplier, and its size in SI."""
-        figure, limit, _ = parts(name)
-        over, under = self.of(figure), self.of(limit)
+        over, under = self.of(multiplier.figure), self.of(multiplier.side.limit)
         return (over if under == "1" else f"{over}/{grouped(under)}"), factor(over) / factor(under)
 
 
@@ -63,23 +62,25 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         "sought": [study.sought(row) for row in rows],
         "design": [row.design for row in rows],
         "figures": [row.figures for row in rows],
-        "multipliers": [row.multipliers for row in rows],
     }
     units, found = Units(study, si), dict[str, list[Column]]()
     for part, numbers in numbers_of.items():
         taken = {column.name for columns in found.values() for column in columns}
         taken |= {"change"} if part == "figures" else set()
         names = dict.fromkeys(name for each in numbers for name in each if name not in taken)
-        made = (_column(units, part, name, numbers) for name in names)
-        found[part] = [column for column in made if any(value is not None for value in column.values)]
+        found[part] = _filled(
+            Column(name, units.of(name), factor(units.of(name)), tuple(each.get(name) for each in numbers))
+            for name in names
+        )
+    multipliers = dict.fromkeys(multiplier for row in rows for multiplier in row.multipliers)
+    found["multipliers"] = _filled(
+        Column(each.text, *units.price(each), tuple(row.multipliers.get(each) for row in rows)) for each in multipliers
+    )
     return found if si else _without_rounding(found)
 
 
-def _column(units: Units, part: str, name: str, numbers: Sequence[Mapping[str, float | None]]) -> Column:
-    values = tuple(each.get(name) for each in numbers)
-    if part == "multipliers":
-        return Column(name, *units.price(name), values)
-    return Column(name, units.of(name), factor(units.of(name)), values)
+def _filled(columns: Iterable[Column]) -> list[Column]:
+    return [column for column in columns if any(value is not None for value in column.values)]
 
 
 def _without_rounding(found: dict[str, list[Column]]) -> dict[str, list[Column]]:

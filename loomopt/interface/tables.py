@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base.refusals import refusal
 from loomopt.base.units import factor
 from loomopt.jobs import registry
+from loomopt.model.session import working
 from loomopt.physics.effects.kinds import Event
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes import designs
@@ -145,6 +146,7 @@ def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
     return found.rename(columns=names)
 
 
+@working()
 def curves(
     scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
 ) -> "pd.DataFrame":

@@ -4,14 +4,14 @@ import abc
 import functools
 import importlib
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
+from loomopt.jobs.task import Task
 from loomopt.maths.systems import Number
 from loomopt.model import drive, numbers
 from loomopt.model.curves import STEPS, Columns, curves, tops
@@ -19,7 +19,7 @@ from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
-from loomopt.physics.effects.kinds import Event
+from loomopt.physics.effects.kinds import Check, Event, label
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
@@ -77,6 +77,8 @@ class Job(abc.ABC):
     name: str
     own_schema: SceneSchema
     """What a scene may hold, where that does not depend on the scene."""
+    task: type[Task]
+    """What builds the program of a scene and target, or of axes that are traded."""
     open_boxes: str = ""
     """Why branch and bound does not close on its designs, "" where it does."""
     loosening: Mapping[str, str] = MappingProxyType({})
@@ -93,10 +95,6 @@ class Job(abc.ABC):
         """Return the mechanism with the effects the scene calls for; design: whose own parts take the scene's place."""
 
     @abc.abstractmethod
-    def program(self, scene: Scene, target: str) -> Program:
-        """Return a target as a task: structure and numbers. Raises BadInput."""
-
-    @abc.abstractmethod
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum of the target is worth."""
 
@@ -105,6 +103,10 @@ class Job(abc.ABC):
         """Return what the curves over the cycle show of the motion, and what force and torque are called."""
 
     # What few jobs say otherwise.
+
+    def program(self, scene: Scene, target: str) -> Program:
+        """Return a target as a task: structure and numbers. Raises BadInput."""
+        return self.task(scene, target).program()
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
         """Return what a scene may hold; document: the raw scene, on which that may depend."""
@@ -140,7 +142,7 @@ class Job(abc.ABC):
 
     def numbers(self, scene: Scene) -> dict[str, float]:
         """Return every number of the scene by full name."""
-        return numbers.numbers(scene)
+        return self.task(scene).known
 
     def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
         """Return all numbers of a design, by any name of each; a number it does not name stays the scene's."""
@@ -197,18 +199,8 @@ class Job(abc.ABC):
         known = axes.asked_of(scene.schema.axes, bounded, asked, scene.origin)
         if target:
             self.demand(scene, target)
-        program, size = self.held(scene, target or "", tuple(asked))
-        return axes.with_axes(program, known, asked, scene.full, size)
-
-    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
-        """Return what a target ("" for none) demands of all that is traded, as a program whose levels are held.
-
-        With the natural size, SI, of what is sought the least of, by axis. traded: axes; what a target asks of them
-        falls away. Raises BadInput.
-        """
-        program = self.program(scene, target or scene.schema.default_target)
-        today = sampled(program.model, {**program.parameters, **self.values(program, self.today(scene))})
-        return replace(program, objectives=(), goals=()), functools.partial(numbers.size, program, today)
+        task = self.task(scene, target or "", tuple(asked))
+        return axes.with_axes(task.program(), known, asked, scene.full, task.size)
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
         """Return the NLP's variables of a design."""
@@ -233,11 +225,26 @@ class Job(abc.ABC):
 
     def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
         """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending."""
-        return numbers.sizes(scene)
+        found: dict[str, Sequence[float]] = {}
+        for check, own in _checks(scene):
+            for key, sold in check.sold(own).items():
+                bound = scene.bounds.get(label(check, key))
+                if bound is not None and bound.free and bound.min < bound.max:
+                    found[label(check, key)] = sold
+        return found
 
     def explain(self, scene: Scene, clash: Sequence[str]) -> str:
         """Return what physics says of why the limits `clash` (phrases) do; "" where it says nothing."""
-        return numbers.explained(scene, self.numbers(scene), clash)
+        known = self.numbers(scene)
+        limited = numbers.bounds(scene, known)
+        told = [check.explain(known, limited, own, clash, scene.show) for check, own in _checks(scene)]
+        return " ".join(text for text in told if text)
+
+
+def _checks(scene: Scene) -> list[tuple[Check[Any], Any]]:
+    """Return the checks that are on, each with the values of its table."""
+    on = zip(scene.active, scene.effects.values(), strict=True)
+    return [(effect, own) for effect, own in on if isinstance(effect, Check)]
 
 
 def demand(scene: Scene, target: str) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple
 
 Numbers = Mapping[str, float]
+LEAST_CHANGE = "least change from today"
 
 
 class Wish(NamedTuple):

@@ -2,7 +2,6 @@
 
 import abc
 import functools
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -13,13 +12,15 @@ from loomopt.maths import recording
 from loomopt.maths.recording import Bind, Program, Recorded, Tape
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral, JobModel, Stills
+from loomopt.model.session import current
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.schema import Values
 
 GAUSS_NODES = 32
 """Nodes of a mean on each piece: of an analytic formula the error falls by a constant factor a node. Packaged means are
-right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/tolerances.py); the rest is for narrower peaks."""
+right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/measure/tolerances.py); the rest is for narrower
+peaks."""
 
 
 WORTH_IT = 64
@@ -64,9 +65,6 @@ class _History:
     refused: bool = False
 
 
-_HISTORIES: weakref.WeakKeyDictionary[JobModel, dict[object, _History]] = weakref.WeakKeyDictionary()
-
-
 class Quantities:
     """Whole-cycle quantities of one design at nodes, SI.
 
@@ -82,8 +80,8 @@ class Quantities:
         switches = tuple(node.switch)
         run = self._bound.get((names, switches))
         if run is None:
-            histories = _HISTORIES.setdefault(self.model, {})
-            run = self._run(names, switches, histories.setdefault((names, switches, self.given.known), _History()))
+            history = current().beside(self.model, (names, switches, self.given.known), _History)
+            run = self._run(names, switches, history)
         if run is None:
             read = self.model.together(self.systems[1], self.given, node)
             return tuple([read(name) for name in names])

@@ -14,6 +14,7 @@ from loomopt.maths.peaks import inside_samples, vertex
 from loomopt.maths.systems import Number
 from loomopt.model.model import Integral, JobModel, Stills
 from loomopt.model.reading import DATUM, Quantities, Reading, Rows, quadrature
+from loomopt.model.session import current
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.tolerances import LEAST_SHARE, SAMPLES
@@ -58,17 +59,14 @@ def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
 
 
-class Tally:
-    """How many positions of mechanisms were evaluated so far, by samples, nodes and boxes."""
-
-    positions = 0
-
-
 class Sampler:
-    """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined."""
+    """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined.
+
+    It counts in the session in which it was made.
+    """
 
     def __init__(self, model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> None:
-        self.model, self.values = model, dict(values)
+        self.model, self.values, self.session = model, dict(values), current()
         given = model.given(systems.FLOAT, values)
         self.hints = model.hints(given)
         self.given: Given = model.given(systems.FLOAT, {**values, **self.hints}) if self.hints else given
@@ -127,7 +125,7 @@ class Sampler:
     def together(self, names: Sequence[str], pieces: Pieces, u: Floats) -> dict[str, Floats]:
         """Return several quantities at nodes (pieces, u), SI: the pose is computed once for all."""
         found = {name: np.empty(u.shape) for name in names}
-        Tally.positions += len(u) * len(found)
+        self.session.positions += len(u) * len(found)
         for begin in range(0, len(u), CHUNK):
             part = slice(begin, begin + CHUNK)
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -138,7 +136,7 @@ class Sampler:
 
     def at_angle(self, names: tuple[str, ...], phi: float) -> tuple[float, ...]:
         """Return quantities that no switch changes at one crank angle, rad, SI; raises where there is no real value."""
-        Tally.positions += 1
+        self.session.positions += 1
         return self._floats(names, Node(phi, {}))
 
     @lazy
@@ -200,7 +198,7 @@ class Sampler:
         pieces, u = self.grid()
         if len(u) > CHUNK:
             return self.at(name, pieces, u)
-        Tally.positions += len(u)
+        self.session.positions += len(u)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.array(np.broadcast_to(self._on_grid(name), u.shape), dtype=np.float64)
 
@@ -231,7 +229,7 @@ class Sampler:
 
     def _at_angles(self, name: str, angles: Floats) -> Floats:
         """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
-        Tally.positions += len(angles)
+        self.session.positions += len(angles)
         node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
         with np.errstate(invalid="ignore", divide="ignore"):
             (values,) = self.quantities((name,), node)
@@ -287,13 +285,9 @@ class Sampler:
         return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))
 
 
-KEPT = 32
-"""Samplers that are kept: more than the designs that one start, its silent levels and its certificate look at."""
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _kept(model: JobModel, names: tuple[str, ...], numbers: bytes, samples: int) -> Sampler:
-    return Sampler(model, dict(zip(names, array("d", numbers), strict=True)), samples)
+SAMPLERS, KEPT = "samplers", 32
+"""What a session calls samplers, and how many it keeps: more than the designs that one start, its silent levels and its
+certificate look at."""
 
 
 def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> Sampler:
@@ -302,12 +296,12 @@ def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES
     The same to the last bit, and to the sign of a zero. Raises what a design without a real cycle raises.
     """
     names = tuple(sorted(values))
-    return _kept(model, names, array("d", [values[name] for name in names]).tobytes(), samples)
+    numbers = array("d", [values[name] for name in names])
 
+    def made() -> Sampler:
+        return Sampler(model, dict(zip(names, numbers, strict=True)), samples)
 
-def forget() -> None:
-    """Let go of what is kept: how many positions a solve evaluates does not depend on the one before."""
-    _kept.cache_clear()
+    return current().kept(SAMPLERS, KEPT, (model, names, numbers.tobytes(), samples), made)
 
 
 class _SampledRows(Rows):

@@ -5,7 +5,6 @@ acceleration and direction of motion cannot be followed, and is refused by name.
 """
 
 import bisect
-import functools
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -264,13 +263,16 @@ def followed(scene: Scene, sampler: Sampler) -> Parted | None:
     Raises BadInput where it cannot be followed.
     """
     try:
-        return _followed(sampler)
+        return sampler.session.kept("parted", MOST_PARTED, sampler, lambda: _followed(sampler))
     except UnfollowedError as error:
         problem = error.problem.format(force=scene.show(error.force, "force"))
         raise refusal(problem, scene.origin, f"effects.{error.effect}", remedy=error.remedy) from None
 
 
-@functools.lru_cache(maxsize=8)
+MOST_PARTED = 8
+"""Designs of which it is kept how the output parts from its mechanism."""
+
+
 def _followed(sampler: Sampler) -> Parted | None:
     events = [effect for effect in sampler.model.effects if isinstance(effect, Event)]
     if len(events) > 1:

@@ -8,7 +8,7 @@ import numpy as np
 from loomopt.maths.systems import numpy
 from loomopt.model.model import JobModel
 from loomopt.model.reading import Quantities
-from loomopt.model.sampling import Sampler, Tally, sampled
+from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats, Node
 
 SPEED_AT_REST, SPEED_STEPS, SPEED_MET = 1e-12, 30, 1e-8
@@ -57,7 +57,7 @@ def _at_speeds(at_rest: Sampler, name: str, nodes: Node, speeds: Sequence[float]
     values = {**at_rest.values, **at_rest.hints, "speed": np.array(speeds)[:, None]}
     given = at_rest.model.given(numpy(), values)
     (found,) = Quantities(at_rest.model, (numpy(), numpy()), given)((name,), nodes)
-    Tally.positions += found.size
+    at_rest.session.positions += found.size
     return np.broadcast_to(found, (len(speeds), len(nodes.phi)))
 
 

@@ -29,9 +29,10 @@ START_ROOM = 0.01
 
 # NLP
 #
-# Variables, rows and objectives in their natural sizes. The experiment: benchmarks/tolerances.py solves every target of
-# three packaged scenes, and two neighbours of each, with one number at a time a tenth and ten times as large (counts:
-# half and double). What is not said below changes no objective there by 4e-11, nor IPOPT's iterations by a tenth.
+# Variables, rows and objectives in their natural sizes. The experiment: benchmarks/measure/tolerances.py solves every
+# target of three packaged scenes, and two neighbours of each, with one number at a time a tenth and ten times as large
+# (counts: half and double). What is not said below changes no objective there by 4e-11, nor IPOPT's iterations by a
+# tenth.
 
 
 NEAR, ROUNDING = 1e-8, 1e-12

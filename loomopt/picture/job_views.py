@@ -1,7 +1,8 @@
 """How a job shows itself: what its own views return, and views/ renders."""
 
+import abc
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
@@ -12,7 +13,18 @@ if TYPE_CHECKING:
 Numbers = Mapping[str, float]
 
 
-class JobViews:
+class Span(NamedTuple):
+    """A stretch of the cycle, rad, that may run over angle 0: where it begins and where it ends."""
+
+    begin: float
+    end: float
+
+
+Marks = Mapping[str, float | Span]
+"""Name → a crank angle, rad, or a stretch of the cycle."""
+
+
+class JobViews(abc.ABC):
     """A job's own views; a design, SI, may name only some numbers, the others are today's.
 
     angle: what phi is; lists: part of a design that is a list → what its numbers are, "{count}" for how many.
@@ -21,21 +33,21 @@ class JobViews:
     angle: str = "crank angle"
     lists: Mapping[str, str] = {}
 
+    @abc.abstractmethod
     def linkage(self, scene: "Scene", design: Numbers) -> "Drawing":
         """Return the mechanism drawn at full scale in the positions that matter. Raises BadInput."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
         """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
-        raise NotImplementedError
 
-    def marks(self, scene: "Scene", design: Numbers) -> dict[str, float]:
-        """Return the crank angles a reader looks for, rad; a stretch "begins" and "ends"."""
-        raise NotImplementedError
+    @abc.abstractmethod
+    def marks(self, scene: "Scene", design: Numbers) -> Marks:
+        """Return the crank angles and stretches of the cycle a reader looks for."""
 
     def panels(self, scene: "Scene", design: Numbers, columns: Sequence[str]) -> "tuple[Panel, ...]":
         """Return what a figure of the curves shows: all columns in the words of `words`, unless a job knows better."""

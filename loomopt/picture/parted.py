@@ -1,10 +1,11 @@
 """What is shown of a design whose output may part from its mechanism: remarks, marks over the period, a panel."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from loomopt.model.separation import Parted
 from loomopt.physics.cycle import TURN
 from loomopt.physics.motion.flight import Landing
+from loomopt.picture.job_views import Marks, Span
 from loomopt.picture.panels import Panel
 from loomopt.scenes.scene import Scene
 
@@ -41,15 +42,13 @@ def _landing_speed(scene: Scene, landing: Landing) -> str:
     return scene.show(abs(landing.speed), "velocity", 5)
 
 
-def marks(parted: Parted, every: Mapping[str, float]) -> dict[str, float]:
+def marks(parted: Parted, every: Marks) -> Marks:
     """Return marks over the period, rad: those of every turn, where contact is lost, and where wide flights end."""
-    found, lifts, landings = dict[str, float](), list[float](), list[float]()
+    found, lifts, landings = dict[str, float | Span](), list[float](), list[float]()
     turns = parted.course.periodic
-    begins = {name: every.get(f"{name.removesuffix(' ends')} begins", 0.0) for name in every}
     for k, turn in enumerate(turns):
-        for name, angle in every.items():
-            ahead = TURN if len(turns) > 1 and angle < begins[name] else 0.0
-            found[_of_turn(name, k + 1) if k else name] = k * TURN + angle + ahead
+        for name, mark in every.items():
+            found[f"{name} of turn {k + 1}" if k else name] = _of_turn(mark, k, len(turns))
         lifts += [k * TURN + angle for angle in turn.lifts]
         landings += [k * TURN + landing.angle for landing in turn.landings]
     whole, events = len(turns) * TURN, sorted([*lifts, *landings])
@@ -61,10 +60,12 @@ def marks(parted: Parted, every: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
-def _of_turn(name: str, turn: int) -> str:
-    """Return a mark's name in a later turn; what begins and ends stays a pair."""
-    what, _, last = name.rpartition(" ")
-    return f"{what} of turn {turn} {last}" if last in ("begins", "ends") else f"{name} of turn {turn}"
+def _of_turn(mark: float | Span, turn: int, turns: int) -> float | Span:
+    """Return a mark in one of several turns, counted from 0."""
+    if not isinstance(mark, Span):
+        return turn * TURN + mark
+    ahead = TURN if turns > 1 and mark.end < mark.begin else 0.0
+    return Span(turn * TURN + mark.begin, turn * TURN + mark.end + ahead)
 
 
 def together(panels: Sequence[Panel], columns: tuple[str, str], name: str) -> tuple[Panel, ...]:

@@ -23,7 +23,7 @@ LEAST_GAP, MOST_GAP = 1e-6, 0.5
 """Gaps that may be asked for: an answer is right to 1e-8, and boxes round it close ever more slowly."""
 
 
-class Everywhere(NamedTuple):
+class GlobalProof(NamedTuple):
     """That an answer be proven best of all admissible designs; say: is told how far the proof has come.
 
     gap: relative, what is left open; seconds: how long it may take.
@@ -34,25 +34,34 @@ class Everywhere(NamedTuple):
     say: Callable[[str], None] = lambda text: None
 
 
-def check_everywhere(asked: Everywhere | None) -> None:
+def check(
+    scene: Scene, accuracy: float, starts: int | None, seed: int, global_proof: GlobalProof | None = None
+) -> None:
+    """Raise BadInput for a scene that cannot be solved, or options outside what can be kept."""
+    check_sought(scene)
+    check_numbers(accuracy, starts, seed)
+    check_global_proof(global_proof)
+
+
+def check_global_proof(proof: GlobalProof | None) -> None:
     """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
-    if asked is None:
+    if proof is None:
         return
-    arguments.number(asked.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
-    arguments.number(asked.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
-    if not LEAST_GAP <= asked.gap <= MOST_GAP:
+    arguments.number(proof.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
+    arguments.number(proof.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
+    if not LEAST_GAP <= proof.gap <= MOST_GAP:
         raise BadInput(
             "the gap is out of range",
             key="--gap",
-            value=f"{asked.gap:g}",
+            value=f"{proof.gap:g}",
             allowed=f"{LEAST_GAP:g} to {MOST_GAP:g}",
             remedy="Write --gap 1e-3, or leave it out.",
         )
-    if not 0 < asked.seconds < math.inf:
+    if not 0 < proof.seconds < math.inf:
         raise BadInput(
             "the time is out of range",
             key="--time",
-            value=f"{asked.seconds:g}",
+            value=f"{proof.seconds:g}",
             allowed="seconds, more than 0",
             remedy="Write --time 60, or leave it out.",
         )

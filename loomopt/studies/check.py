@@ -104,7 +104,7 @@ def front_line(study: trade.Trade, row: Row) -> dict[str, object]:
     axes = {name: plan.value(row, name) for name in study.axes}
     numbers = {**axes, **row.design, **row.figures, **axes}
     found |= {f"{name} [{words.si(name)}]": value for name, value in numbers.items() if value is not None}
-    found[f"{study.solver.slope} [{over}/{grouped(under)}]"] = slope
+    found[f"{study.solver.slope.text} [{over}/{grouped(under)}]"] = slope
     found["touched"] = " | ".join(dict.fromkeys(str(label) for label, *_ in row.warm["active"]))
     return found
 

@@ -25,7 +25,7 @@ from loomopt.solving.nlp.point import Point
 from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.run import warm
 from loomopt.studies.run.findings import Change, Findings
-from loomopt.studies.run.rows import Row, Task, parts, priced
+from loomopt.studies.run.rows import Multiplier, Row, Side, Task
 
 COARSE = 8
 """Steps of each axis between two points that are searched from scratch; a power of two."""
@@ -243,20 +243,22 @@ class Sweep:
         )
 
 
-def multipliers(answer: Solution) -> dict[str, float]:
-    """Return what each limit that binds costs: the figure that it moves, the limit and its side → worth, SI."""
+def multipliers(answer: Solution) -> dict[Multiplier, float]:
+    """Return what each limit that binds costs, SI."""
     return {
-        priced(figure, each.limit, each.side): worth for each in answer.binding for figure, worth in each.worth.items()
+        Multiplier(figure, Side(each.limit, each.side)): worth
+        for each in answer.binding
+        for figure, worth in each.worth.items()
     }
 
 
 def _changes(line: Sequence[Row]) -> Iterator[Change]:
     """Yield where the active set changes along rows over one number."""
     for row, after in itertools.pairwise(line):
-        before, now = ({parts(name)[1:] for name in each.multipliers} for each in (row, after))
+        before, now = ({multiplier.side for multiplier in each.multipliers} for each in (row, after))
         if row.certified and after.certified and before != now:
             between = (next(iter(row.place.values())), next(iter(after.place.values())))
-            yield Change(between, "active set", tuple(sorted({limit for limit, _ in before ^ now})))
+            yield Change(between, "active set", tuple(map(Side, sorted({side.limit for side in before ^ now}))))
 
 
 def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:

@@ -1,8 +1,11 @@
-"""Benchmarks in their small size are slow studies: `make slow`."""
+"""Benchmarks in their small size are slow studies: `make slow`. Their package stands at the checkout's top."""
 
+import sys
 from pathlib import Path
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 
 def pytest_collection_modifyitems(items):

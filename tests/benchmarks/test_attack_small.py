@@ -1,4 +1,4 @@
-"""A small fixed draw of random scenes attacked from outside (benchmarks/attack.py), and that the attack has teeth."""
+"""A small fixed draw of random scenes attacked from outside (adversarial/attack.py), and that the attack has teeth."""
 
 import dataclasses
 import importlib
@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_benchmarks_small import FOLDER
+from test_benchmarks_small import TOP
 
 import loomopt as lo
 
@@ -29,15 +29,22 @@ NARROW = {
 
 @pytest.fixture(scope="module")
 def attack():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("attack")
+    return importlib.import_module("benchmarks.adversarial.attack")
 
 
 @pytest.mark.parametrize("job", COUNTS)
 def test_no_answer_of_the_draw_is_beaten_broken_refuted_or_left_uncertified(job):
-    command = [sys.executable, str(FOLDER / "attack.py"), "--jobs", job, "--count", str(COUNTS[job]), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.adversarial.attack",
+        "--jobs",
+        job,
+        "--count",
+        str(COUNTS[job]),
+        "--json",
+    ]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=300)
     said = json.loads(done.stdout)
     assert said["failures"] == []
     assert done.returncode == 0, done.stderr
@@ -65,7 +72,7 @@ def narrow_drive(rapier):
 
 def test_a_certified_optimum_of_the_wrong_basin_is_beaten(attack, monkeypatch):
     monkeypatch.setitem(attack.CALLS, "default", {"starts": 1})
-    trial = attack.Trial(narrow_drive(importlib.import_module("attack_rapier")), seed=0)
+    trial = attack.Trial(narrow_drive(importlib.import_module("benchmarks.adversarial.attack_rapier")), seed=0)
     trial.solved(["default"])
     assert trial.answer.certificate.passed
     assert trial.answer.figures["peak_acceleration"] == pytest.approx(0.9253096, abs=1e-6)

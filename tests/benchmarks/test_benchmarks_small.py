@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[2] / "benchmarks"
+TOP = Path(__file__).parents[2]
 ATTEMPTS = 3
 """A ratio that holds in one of them holds: other work on the machine can only spoil it."""
 
 
 def run(script):
     """Return what a benchmark says in its small size."""
-    command = [sys.executable, str(FOLDER / script), "--quick", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    command = [sys.executable, "-m", f"benchmarks.{script}", "--quick", "--json"]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -41,11 +41,11 @@ def least(script, ratio, enough):
 
 
 def test_curves_take_at_most_1_3_times_a_plain_numpy_transcription():
-    assert least("kinematics_speed.py", "loomopt_to_plain", 1.3) <= 1.3
+    assert least("measure.kinematics_speed", "loomopt_to_plain", 1.3) <= 1.3
 
 
 def test_every_way_to_evaluate_the_curves_is_right_to_rounding():
-    errors = {method: row["error"] for method, row in rows("kinematics_speed.py").items()}
+    errors = {method: row["error"] for method, row in rows("measure.kinematics_speed").items()}
     assert len(errors) == 7
     assert max(errors.values()) < 1e-14
 
@@ -54,7 +54,7 @@ def test_curves_in_numpy_beat_casadi_and_mpmath():
     floors = {"CasADi map, chunks of 8192": 2, "CasADi call on a row": 2, "mpmath, 40 digits": 100}
     ratios = dict.fromkeys(floors, 0.0)
     for attempt in range(ATTEMPTS):
-        found = said("kinematics_speed.py") if attempt == 0 else run("kinematics_speed.py")
+        found = said("measure.kinematics_speed") if attempt == 0 else run("measure.kinematics_speed")
         told = {row["method"]: row["ratio"] for row in found["rows"]}
         ratios = {method: max(ratio, told[method]) for method, ratio in ratios.items()}
         if all(ratios[method] > floor for method, floor in floors.items()):
@@ -64,18 +64,18 @@ def test_curves_in_numpy_beat_casadi_and_mpmath():
 
 def test_re_solving_for_another_cloth_takes_hardly_longer_than_slsqp_on_a_grid():
     """SLSQP in C, as SciPy has it since 1.16, took the lead that we had over the one in Fortran (0.93 of it)."""
-    assert least("balance_peers.py", "resolve_to_slsqp", 1.25) <= 1.25
+    assert least("peers.balance_peers", "resolve_to_slsqp", 1.25) <= 1.25
 
 
 def test_building_takes_less_than_three_solves():
-    assert least("balance_peers.py", "build_to_solve", 3.0) < 3.0
+    assert least("peers.balance_peers", "build_to_solve", 3.0) < 3.0
 
 
 @pytest.mark.parametrize(
     "method", ["loomopt: solve from today's machine", "loomopt: re-solve", "loomopt: whole call, with report"]
 )
 def test_loomopts_designs_are_the_best_known_over_the_whole_turn(method):
-    found = rows("balance_peers.py")[method]
+    found = rows("peers.balance_peers")[method]
     assert found["M3 off [N*m]"] < 1e-6
     assert found["peak off"] < 1e-8
     assert found["peak understated"] < 1e-8
@@ -83,6 +83,6 @@ def test_loomopts_designs_are_the_best_known_over_the_whole_turn(method):
 
 
 def test_a_grid_understates_the_peak():
-    found = rows("balance_peers.py")["SciPy SLSQP, 360 points: re-solve"]
+    found = rows("peers.balance_peers")["SciPy SLSQP, 360 points: re-solve"]
     assert 1e-5 < found["peak understated"] < 1e-2
     assert 1e-5 < found["peak off"] < 1e-2

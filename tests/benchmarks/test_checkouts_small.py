@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from test_benchmarks_small import FOLDER
+from test_benchmarks_small import TOP
 
 ANSWER = {
     "status": "optimal",
@@ -21,25 +21,23 @@ ANSWER = {
 
 @pytest.fixture(scope="module")
 def compared():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("same_answers")
+    return importlib.import_module("benchmarks.measure.same_answers")
 
 
 def run(script, *asked):
-    command = [sys.executable, str(FOLDER / script), str(FOLDER.parent), "--json", *asked]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    command = [sys.executable, "-m", f"benchmarks.measure.{script}", str(TOP), "--json", *asked]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
 def test_a_checkout_gives_the_same_answers_as_itself():
-    said = run("same_answers.py", "--only", "shedding-static")
+    said = run("same_answers", "--only", "shedding-static")
     assert (said["cases"], said["exceptions"]) == (3, 0)
 
 
 def test_all_work_is_timed_in_both():
-    rows = run("paired.py", "--only", "beatup pulse", "--repeats", "1")["rows"]
+    rows = run("paired", "--only", "beatup pulse", "--repeats", "1")["rows"]
     assert [row["work"] for row in rows] == ["built", "cold", "certificate", "warm", "evaluate", "simulate", "read"]
     assert all(row["here [ms]"] > 0 and row["there [ms]"] > 0 for row in rows)
 

@@ -1,12 +1,10 @@
 """A front beside the peer that gets ten times its time, in small: who judges, what counts, what is said without it."""
 
 import importlib
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_benchmarks_small import FOLDER
 
 from loomopt.scenes import packaged
 from loomopt.studies import check
@@ -14,12 +12,7 @@ from loomopt.studies import check
 
 @pytest.fixture(scope="module")
 def peers():
-    """Return the benchmark, as it runs from the checkout's top."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER.parent))
-        yield importlib.import_module("benchmarks.front_peers")
-        for name in [name for name in sys.modules if name.partition(".")[0] == "benchmarks"]:
-            del sys.modules[name]
+    return importlib.import_module("benchmarks.peers.front_peers")
 
 
 @pytest.fixture(scope="module")

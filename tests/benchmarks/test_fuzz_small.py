@@ -1,10 +1,9 @@
-"""Input spoilt at random, a few hundred of it: read or refused by one plain line, nothing else (benchmarks/fuzz.py)."""
+"""Input spoilt at random, a few hundred: read or refused by one plain line, nothing else (adversarial/fuzz.py)."""
 
 import importlib
 import random
 
 import pytest
-from test_benchmarks_small import FOLDER
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
@@ -14,9 +13,7 @@ COUNTS = {"scenes": 150, "designs": 100, "tables": 100, "calls": 30}
 
 @pytest.fixture(scope="module")
 def fuzz():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("fuzz")
+    return importlib.import_module("benchmarks.adversarial.fuzz")
 
 
 @pytest.mark.parametrize("kind", COUNTS)

@@ -5,12 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "global_peers.py"
+TOP, SCRIPT = Path(__file__).parents[2], "benchmarks.peers.global_peers"
 
 
 def test_no_random_design_lies_below_a_proven_bound_and_peers_agree_where_they_are_installed():
-    command = [sys.executable, str(SCRIPT), "--quick", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    command = [sys.executable, "-m", SCRIPT, "--quick", "--json"]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     rows = {row["method"]: row for row in json.loads(done.stdout)["rows"]}
     assert not any(row["refuted"] for row in rows.values())

@@ -5,14 +5,11 @@ import json
 import random
 
 import pytest
-from test_benchmarks_small import FOLDER
 
 
 @pytest.fixture(scope="module")
 def infeasible():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("infeasible")
+    return importlib.import_module("benchmarks.adversarial.infeasible")
 
 
 def test_a_scene_without_room_is_told_with_what_it_needs(infeasible):

@@ -6,20 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from test_benchmarks_small import FOLDER, least, rows, said
+from test_benchmarks_small import least, rows, said
 
 import loomopt as lo
 
-SCRIPT = "rapier_peers.py"
+SCRIPT = "peers.rapier_peers"
 LOOMOPT, CALL = "loomopt: solve", "loomopt: whole call, own starts, certificate"
 GRID, ADDED = "SciPy SLSQP, 360 points", "SciPy SLSQP, 72 points and the extremes missed"
 
 
 @pytest.fixture(scope="module")
 def peers():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("rapier_peers")
+    return importlib.import_module("benchmarks.peers.rapier_peers")
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
-from test_benchmarks_small import ATTEMPTS, FOLDER, least, rows, run, said
+from test_benchmarks_small import ATTEMPTS, least, rows, run, said
 
 import loomopt as lo
 
-PEERS, LAW = "shedding_peers.py", "shedding_law.py"
+PEERS, LAW = "peers.shedding_peers", "peers.shedding_law"
 CALL, FORMULA = "loomopt: whole call", "formula, 360 points, the highest refined"
 EXCHANGE = "SciPy SLSQP, 36 points and the lowest added"
 BOUND = 2 * math.pi
@@ -27,16 +27,12 @@ KEPT = ((6176.1875, 119.21, 177.46), (8029.14, 144.51, 227.45))
 
 @pytest.fixture(scope="module")
 def peers():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("shedding_peers")
+    return importlib.import_module("benchmarks.peers.shedding_peers")
 
 
 @pytest.fixture(scope="module")
 def study():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("shedding_law")
+    return importlib.import_module("benchmarks.peers.shedding_law")
 
 
 @pytest.fixture(scope="module")

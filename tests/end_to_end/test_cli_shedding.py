@@ -5,9 +5,9 @@ import math
 
 import pandas as pd
 import pytest
-from reference import shedding as plain
 
 from loomopt.interface.cli.app import run
+from reference import shedding as plain
 
 KEYS = ["loomopt", "problem", "target", "status", "message", "effects", "scene", "reached", "design", "figures"]
 KEYS += ["units", "limits", "binding", "certificate", "solver", "global", "time"]

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference import shedding as plain
 
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms.cam_laws import LAWS
+from reference import shedding as plain
 
 PAPER = plain.PAPER
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")

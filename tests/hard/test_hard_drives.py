@@ -10,12 +10,12 @@ import re
 import numpy as np
 import pytest
 from hard_digits import MP, TIME_STEP, angle, centres, exact, worst_ulps
-from reference import crank_rocker_synthesis, sley_synthesis
 
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from reference import crank_rocker_synthesis, sley_synthesis
 
 # Synthesis: θ → 0, K → 1 -----------------------------------------------------------------------------------------
 

@@ -8,11 +8,11 @@ import mpmath as global_mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from reference import crank_rocker_synthesis
 
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.mechanisms.crank_rocker import Lengths
+from reference import crank_rocker_synthesis
 
 SYSTEMS = (systems.FLOAT, systems.numpy(), systems.casadi(), systems.mpmath(), systems.sympy())
 LINKAGES = {

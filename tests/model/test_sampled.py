@@ -6,8 +6,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.model import sampling
-from loomopt.model.sampling import KEPT, Sampler, sampled
+from loomopt.model.sampling import KEPT, SAMPLERS, Sampler, sampled
+from loomopt.model.session import current
 
 SCENE = lo.load("beatup")
 JOB = registry.of(SCENE)
@@ -16,12 +16,12 @@ MODEL = JOB.model(SCENE)
 
 
 def test_the_same_design_is_sampled_once():
-    sampling.forget()
+    current().forget(SAMPLERS)
     first = sampled(MODEL, VALUES)
     assert sampled(MODEL, dict(reversed(VALUES.items()))) is first
     assert sampled(MODEL, VALUES, 360) is not first
     assert sampled(MODEL, {**VALUES, "l1": math.nextafter(VALUES["l1"], 1.0)}) is not first
-    sampling.forget()
+    current().forget(SAMPLERS)
     assert sampled(MODEL, VALUES) is not first
 
 
@@ -39,7 +39,7 @@ def test_what_is_kept_is_what_would_be_sampled():
 
 
 def test_no_more_are_kept_than_one_start_looks_at():
-    sampling.forget()
+    current().forget(SAMPLERS)
     first = sampled(MODEL, VALUES)
     for k in range(KEPT):
         sampled(MODEL, {**VALUES, "m4e": 1.0 + k})

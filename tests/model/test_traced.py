@@ -16,10 +16,11 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
-from loomopt.model import reading, sampling
+from loomopt.model import reading
 from loomopt.model.model import JobModel, Quantity, Row
 from loomopt.model.reading import DATUM, Quantities
 from loomopt.model.sampling import Sampler
+from loomopt.model.session import Session, current, working
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.scenes.packaged import problems
@@ -254,7 +255,7 @@ def test_recordings_go_with_their_model(monkeypatch):
     monkeypatch.setattr(reading, "WORTH_IT", 0)
     model = yoke()
     Sampler(model, NUMBERS).at("torque", np.array([0]), np.array([0.5]))
-    assert model in reading._HISTORIES
+    assert model in current()._beside
     gone = weakref.ref(model)
     del model
     gc.collect()
@@ -267,10 +268,8 @@ def test_an_answer_does_not_hang_on_what_was_recorded(name, monkeypatch):
     answers = []
     for worth_it in (reading.WORTH_IT, 0, 10**9):
         monkeypatch.setattr(reading, "WORTH_IT", worth_it)
-        if worth_it:
-            monkeypatch.setattr(reading, "_HISTORIES", weakref.WeakKeyDictionary())
-        sampling.forget()
-        answers.append(lo.solve(lo.load(name)))
+        with working(Session() if worth_it else None):
+            answers.append(lo.solve(lo.load(name)))
     for other in answers[1:]:
         assert other.design == answers[0].design
         assert other.figures == answers[0].figures

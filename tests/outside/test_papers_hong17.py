@@ -9,7 +9,6 @@ import dataclasses
 import math
 
 import pytest
-from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.interface.text import glossary
@@ -19,6 +18,8 @@ from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.picture.job_views import Span
+from reference import crank_rocker_synthesis
 
 ROWS = {row.key: row._asdict() for row in glossary.read("rapier").figures}
 RAPIER = lo.load("rapier")
@@ -79,7 +80,9 @@ def figure(name):
 
 
 def rear_dead_centre():
-    return math.degrees(JOB.views.marks(RAPIER, built())["rear dead centre"])
+    rear = JOB.views.marks(RAPIER, built())["rear dead centre"]
+    assert not isinstance(rear, Span)
+    return math.degrees(rear)
 
 
 def link_5_at_180():

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference import crank_rocker_synthesis
 
 import loomopt as lo
 from loomopt.interface.text import glossary
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
+from reference import crank_rocker_synthesis
 
 ROWS = {row.key: row._asdict() for row in glossary.read("beatup").figures}
 BEATUP = lo.load("beatup")

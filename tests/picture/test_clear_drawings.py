@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from reference import crank_rocker_synthesis
 from support import clear, inch
 
 import loomopt as lo
@@ -15,6 +14,7 @@ from loomopt.interface.files import outputs
 from loomopt.picture.drawing import LEADER, sheet
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text, text_box
 from loomopt.scenes import packaged
+from reference import crank_rocker_synthesis
 
 NAMES = packaged.problems()
 MACHINES = 12

@@ -15,7 +15,7 @@ from loomopt.interface.text import scenes
 from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
-from loomopt.picture.job_views import JobViews
+from loomopt.picture.job_views import JobViews, Span
 from loomopt.picture.shapes import LAYERS
 from loomopt.scenes import packaged
 
@@ -45,9 +45,10 @@ def test_a_beatup_drawn_imports_neither_the_rapiers_views_nor_sympy():
 
 
 def shown(monkeypatch, marks):
-    """Return the first line and the crank angles, deg, of a table of curves with these marks, deg."""
-    angles = np.unique(np.radians([*np.arange(0, 361, 0.5), *marks.values()]))
-    views = SimpleNamespace(marks=lambda scene, design: {name: math.radians(value) for name, value in marks.items()})
+    """Return the first line and the crank angles, deg, of a table of curves with these marks, rad."""
+    single = [mark for mark in marks.values() if not isinstance(mark, Span)]
+    angles = np.unique([*np.radians(np.arange(0, 361, 0.5)), *single])
+    views = SimpleNamespace(marks=lambda scene, design: marks)
     columns = {"phi [rad]": angles, "S [m]": np.sin(angles)}
     job = SimpleNamespace(today=lambda scene: {}, curves=lambda scene, design: columns, views=views)
     monkeypatch.setattr(registry, "of", lambda scene: job)
@@ -58,16 +59,10 @@ def shown(monkeypatch, marks):
 
 
 def test_single_marks_have_rows_and_stretches_none(monkeypatch):
-    marks = {"front dead centre": 0.0, "hand-over": 182.53, "pulse begins": 20.2, "pulse ends": 40.4}
+    marks = {"front dead centre": 0.0, "hand-over": math.radians(182.53), "pulse": Span(0.352, 0.705)}
     head, rows = shown(monkeypatch, marks)
     assert head == "Drive: front dead centre at 0.000 deg, hand-over at 182.530 deg"
     assert set(rows) == {*range(0, 361, 15), 182.53}
-
-
-def test_an_end_without_its_beginning_is_a_mark_of_its_own(monkeypatch):
-    head, rows = shown(monkeypatch, {"dwell after ends": 35.87, "dwell before begins": 323.36})
-    assert head == "Drive: dwell after ends at 35.870 deg, dwell before begins at 323.360 deg"
-    assert {35.87, 323.36} <= set(rows)
 
 
 def test_a_cycle_without_marks_is_shown_every_fifteen_degrees(monkeypatch):
@@ -112,7 +107,6 @@ def test_the_pulse_is_marked_from_end_to_end_also_where_another_effect_parts_it(
         scene = scene.with_effect(effect)
     marks = registry.of(scene).views.marks(scene, {})
     front, half = lo.evaluate(scene).figures["beta"], math.radians(29.8) / 2
-    assert marks["pulse begins"] == pytest.approx(front - half, rel=1e-12)
-    assert marks["pulse ends"] == pytest.approx(front + half, rel=1e-12)
+    assert marks["pulse"] == pytest.approx(Span(front - half, front + half), rel=1e-12)
     without = registry.of(scene).views.marks(scene.without_effect("resistance"), {})
     assert set(without) == {"front dead centre", "rear dead centre"}

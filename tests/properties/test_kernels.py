@@ -23,7 +23,6 @@ from machines import (
     sides_of,
     tables,
 )
-from reference import crank_rocker_synthesis, sley_synthesis
 
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import cam_spline, crank_rocker
@@ -32,6 +31,7 @@ from loomopt.physics.mechanisms.cam_laws import LAWS, Derivatives
 from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
 from loomopt.physics.mechanisms.rapier_drive import Pose as Drive
+from reference import crank_rocker_synthesis, sley_synthesis
 
 MOST = 50
 """C of |error| ≤ C eps (|f| + Σ|x ∂f/∂x|).

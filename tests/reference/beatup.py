@@ -1,4 +1,4 @@
-"""The beat-up written out once more in plain NumPy, straight from the printed equations: a second opinion for tests.
+"""The beat-up written out once more in plain NumPy, straight from the printed equations, for any scene.
 
 Nothing of loomopt's mechanics, balance or solving is used; only a scene's numbers are read.
 """
@@ -13,12 +13,23 @@ DESIGN = (*LENGTHS, "m4e", "r4e")
 G = 9.80665
 
 
+def front_angle(l1, l2, l3, l4):
+    """Return beta, the crank angle of front dead centre, rad [Yuan24, eq 12]."""
+    return np.arccos(((l2 + l1) ** 2 + l4**2 - l3**2) / (2 * (l2 + l1) * l4))
+
+
+def extreme_transmission(l1, l2, l3, l4):
+    """Return mu with the crank on the frame's line towards the rocker, and 180 deg less mu away from it, rad."""
+    near = np.arccos((l2**2 + l3**2 - (l4 - l1) ** 2) / (2 * l2 * l3))
+    return near, np.pi - np.arccos((l2**2 + l3**2 - (l4 + l1) ** 2) / (2 * l2 * l3))
+
+
 def dead_centres(l1, l2, l3, l4):
     """Return beta, beta_r, psi at front and rear, rad, by the law of cosines [Yuan24, eq 12]."""
-    beta = np.arccos(((l2 + l1) ** 2 + l4**2 - l3**2) / (2 * (l2 + l1) * l4))
+    beta = front_angle(l1, l2, l3, l4)
     beta_r = np.arccos(((l2 - l1) ** 2 + l4**2 - l3**2) / (2 * (l2 - l1) * l4))
-    psi_f = np.arctan2((l1 + l2) * np.sin(beta), (l1 + l2) * np.cos(beta) - l4)
-    psi_r = np.arctan2((l2 - l1) * np.sin(beta_r), (l2 - l1) * np.cos(beta_r) - l4)
+    psi_f = np.pi - np.arccos((l3**2 + l4**2 - (l2 + l1) ** 2) / (2 * l3 * l4))
+    psi_r = np.pi - np.arccos((l3**2 + l4**2 - (l2 - l1) ** 2) / (2 * l3 * l4))
     return beta, beta_r, psi_f, psi_r
 
 
@@ -95,10 +106,13 @@ class Machine:
         """Return the figures of one position, SI."""
         l1, l2, l3, l4 = (design[name] for name in LENGTHS)
         beta, beta_r, psi_f, psi_r = dead_centres(l1, l2, l3, l4)
-        near = np.arccos((l2**2 + l3**2 - (l4 - l1) ** 2) / (2 * l2 * l3))
-        far = np.arccos((l2**2 + l3**2 - (l4 + l1) ** 2) / (2 * l2 * l3))
         m4e, r4e = design["m4e"], design["r4e"]
-        found = {"beta": beta, "theta": beta - beta_r, "swing": psi_r - psi_f, "mu_min": min(near, np.pi - far)}
+        found = {
+            "beta": beta,
+            "theta": beta - beta_r,
+            "swing": psi_r - psi_f,
+            "mu_min": min(extreme_transmission(l1, l2, l3, l4)),
+        }
         found["M3_fdc"] = float(self.torques(design, np.array([beta]))[0][0])
         found["alpha_fdc"] = float(motion(design, np.array([beta]))[2][0]) * self.w**2
         found["J4"] = self.own.get("inertia", {}).get("J4", math.nan) + m4e * r4e**2

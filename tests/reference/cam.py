@@ -1,17 +1,9 @@
-"""The cam once more, from rotated vectors and laws written plainly: what the product's drawing is compared with."""
+"""The cam once more, from rotated vectors and any law of u: what the product's drawing is compared with."""
 
 import numpy as np
 from scipy.interpolate import PPoly
 
 TURN90 = np.array([[0.0, -1.0], [1.0, 0.0]])
-
-
-def cycloidal(u):
-    return u - np.sin(2 * np.pi * u) / (2 * np.pi), 1 - np.cos(2 * np.pi * u), 2 * np.pi * np.sin(2 * np.pi * u)
-
-
-def harmonic(u):
-    return (1 - np.cos(np.pi * u)) / 2, np.pi * np.sin(np.pi * u) / 2, np.pi**2 * np.cos(np.pi * u) / 2
 
 
 def spline(knots):

@@ -99,6 +99,24 @@ def polynomial_4567(m, u):
     return s, 140 * (u - u * u) ** 3, 420 * (u - u * u) ** 2 * (1 - 2 * u)
 
 
+def polynomial_56789(m, u):
+    s = u**5 * (126 - 420 * u + 540 * u**2 - 315 * u**3 + 70 * u**4)
+    return s, 630 * (u - u * u) ** 4, 2520 * (u - u * u) ** 3 * (1 - 2 * u)
+
+
+def harmonics(first, third):
+    """Return s' = 1 − (first cos x + third cos 3x)/(first + third), x = 2πu."""
+
+    def formula(m, u):
+        x, total = 2 * m.pi * u, first + third
+        s = u - (first * m.sin(x) + third * m.sin(3 * x) / 3) / total / (2 * m.pi)
+        s1 = 1 - (first * m.cos(x) + third * m.cos(3 * x)) / total
+        return s, s1, 2 * m.pi * (first * m.sin(x) + 3 * third * m.sin(3 * x)) / total
+
+    return formula
+
+
+# s = u − first/(2π (first + third)) sin 2πu − …: 15/(32π) and 1/(96π) are 15 : 1, 27/(56π) and 1/(168π) are 27 : 1.
 FIRST_HALF: dict[str, list[tuple]] = {
     "cycloidal": [(0, 0.5, cycloidal)],
     "harmonic": [(0, 0.5, harmonic)],
@@ -106,10 +124,14 @@ FIRST_HALF: dict[str, list[tuple]] = {
     "modified_trapezoid": [(0, 0.125, trapezoid_start), (0.125, 0.375, trapezoid_even), (0.375, 0.5, trapezoid_middle)],
     "polynomial_345": [(0, 0.5, polynomial_345)],
     "polynomial_4567": [(0, 0.5, polynomial_4567)],
+    "polynomial_56789": [(0, 0.5, polynomial_56789)],
+    "gutman_13": [(0, 0.5, harmonics(15, 1))],
+    "freudenstein_13": [(0, 0.5, harmonics(27, 1))],
 }
 """From u, to u, s and its two derivatives; the second half follows from s(u) + s(1 − u) = 1."""
 
 
+LAWS = tuple(FIRST_HALF)
 SMOOTH = ("cycloidal", "modified_sine", "modified_trapezoid", "polynomial_345")
 """Fixed laws with a continuous s'' and a peak no higher than the cycloid's."""
 

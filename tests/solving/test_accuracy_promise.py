@@ -5,8 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from reference.beatup import Machine
-from reference.rapier import Drive
 from support.shedding_cases import plain, programmed
 
 import loomopt as lo
@@ -14,6 +12,8 @@ from loomopt.base.errors import BadInput
 from loomopt.interface import tables
 from loomopt.jobs import registry
 from loomopt.model.reading import GAUSS_NODES
+from reference.beatup import Machine
+from reference.rapier import Drive
 
 ACCURACIES = [10.0**-power for power in range(2, 12)]
 BEST = ACCURACIES[-1]

@@ -5,11 +5,12 @@ from dataclasses import replace
 import pytest
 from support import toy
 
-from loomopt.solving import engine
-from loomopt.solving.answer import report
+from loomopt.solving.answer import evaluation
 from loomopt.solving.answer.solution import Clash
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
+from loomopt.solving.search import multistart
+from loomopt.solving.search.search import Search
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 VALLEYS = {"f": lambda v: (v["x"] ** 2 - 1) ** 2 + v["x"] / 4 + v["y"] ** 2}
@@ -59,11 +60,11 @@ def test_starts_are_told_as_they_come():
 def test_an_answer_may_start_its_neighbour():
     program = toy.program("xy", BOWL)
     first = toy.solve(program)
-    again = toy.solve(program, near=first)
+    again = toy.solve(program, near=[first.point])
     assert again.design == pytest.approx(first.design, abs=1e-12)
     assert again.solver["starts"] == 1
     other = toy.program("xy", VALLEYS)
-    away = toy.solve(other, near=first, starts=1)
+    away = toy.solve(other, near=[first.point], starts=1)
     assert away.design["x"] == pytest.approx(0.97, abs=0.02), "of another structure: no help"
 
 
@@ -123,24 +124,24 @@ def test_the_callback_counts_iterations():
     seen: list[int] = []
     toy.solve(toy.program("xy", VALLEYS), on_iteration=seen.append)
     assert seen[:3] == [0, 1, 2]
-    assert engine._callback(None) is None
 
 
 def test_a_program_is_solved_without_its_scene():
     program = toy.program("xy", BOWL)
-    found = engine.solve_program(program, toy.ToyJob(program), Settings())
+    search = Search(toy.ToyJob(program), program, Settings())
+    found = multistart.resolved(search)
     assert found.passed
     assert found.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
-    again = engine.solve_program(program, toy.ToyJob(program), Settings(), near=found.candidates[0].point)
+    again = multistart.resolved(search, near=[found.candidates[0].point])
     assert (again.passed, len(again.candidates)) == (True, 1)
     other = replace(found.candidates[0].point, structure="another")
-    assert engine.solve_program(program, toy.ToyJob(program), Settings(), near=other).candidates[0].point.iterations > 0
+    assert multistart.resolved(search, near=[other]).candidates[0].point.iterations > 0
 
 
 def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):
     answer = toy.solve(toy.program("xy", BOWL))
     asked = []
-    monkeypatch.setattr(report, "evaluation", lambda *_: asked.append(1))
+    monkeypatch.setattr(evaluation, "evaluation", lambda *_: asked.append(1))
     assert asked == []
     assert answer.before is None
     assert answer.before is None

@@ -6,7 +6,7 @@ import pytest
 from support import toy
 
 from loomopt.jobs import registry
-from loomopt.solving import engine
+from loomopt.solving.answer.evaluation import evaluate
 from loomopt.solving.answer.solution import Clash
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point
@@ -44,5 +44,5 @@ def test_a_figure_has_the_power_of_its_objective_undone():
 def test_what_a_design_does_not_name_is_todays(given):
     job = toy.ToyJob(toy.program("xy", BOWL))
     with mock.patch.object(registry, "of", return_value=job):
-        found = engine.evaluate(toy.scene_of(job), given)
+        found = evaluate(toy.scene_of(job), given)
     assert found.design == {"x": 0.5, "y": 0.5, **(given or {})}

@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.studies.front import front
+from loomopt.studies.front import front, plan
 from loomopt.studies.run.rows import Task
 
 DEGREE, RPM = math.pi / 180, math.pi / 30
@@ -72,7 +72,8 @@ def test_the_worth_of_both_dwells_is_the_slope_of_their_front(rapier):
     ask = {"also": [], "held": [], "wide": False}
     row = trade.solved(Task(0, None, {"dwell": 35 * DEGREE}, ask), None)
     assert answer.figures["peak_acceleration"] == pytest.approx(row.figures["peak_acceleration"], rel=1e-9)
-    assert price(answer, "dwell") == pytest.approx(row.multipliers["peak_acceleration per dwell"], rel=1e-6)
+    slope = row.multipliers[plan.sloped(("peak_acceleration", "dwell"))]
+    assert price(answer, "dwell") == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["dwell_after", "dwell"])

@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.beatup.design import BALANCED
+from loomopt.jobs.beatup.program import BALANCED
 from loomopt.model.limits import DesignLimit
 from loomopt.model.program import Goal, goals
 from loomopt.physics.tolerances import FEASIBLE

@@ -9,12 +9,13 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model import model
 from loomopt.model.sampling import sampled
-from loomopt.solving import engine
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.nlp.point import Settings
+from loomopt.solving.search import multistart
+from loomopt.solving.search.search import Search
 
 SCENE = lo.load("beatup").with_effect("shaft_torsion")
 BEST = {"l1": 0.03, "l2": 0.084060251, "l3": 0.151314494, "l4": 0.167, "m4e": 0.0}
@@ -127,7 +128,7 @@ def test_an_optimum_of_too_few_harmonics_is_not_certified():
 
 def test_a_search_that_ends_where_more_are_needed_begins_again_with_them():
     program, job = coarse(8), registry.of(SCENE)
-    search = engine.solve_program(program, job, Settings(), 1, 0)
+    search = multistart.resolved(Search(job, program, Settings()), 1)
     assert counted(program) == "8"
     assert counted(search.program) == "32"
     assert search.passed

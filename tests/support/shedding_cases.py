@@ -4,10 +4,11 @@ import functools
 from dataclasses import replace
 
 import numpy as np
-from reference import shedding as plain
 
 import loomopt as lo
+from reference import shedding as plain
 
+FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 ANGLES = ("rise", "far_dwell", "return", "near_dwell")
 CYCLOID = 2 * np.pi
 """The peak s'' of the cycloidal law, by which a free law is bounded unless a scene says otherwise."""
@@ -31,6 +32,31 @@ def product(case):
             **changes,
         }
     )
+
+
+def framed(reference):
+    """Return the product's scene of a plain one, its spring free up to its preload and any stiffness."""
+    spline = not isinstance(reference.law, str)
+    scene = FULL.update(
+        {
+            "mechanism.travel": f"{reference.travel!r} m",
+            "mechanism.X0": f"{reference.X0!r} m",
+            "bounds.X0": {"min": "0 m", "max": f"{reference.X0!r} m"},
+            "bounds.K1": {"min": "0 N/m", "max": "1e12 N/m"},
+            "mechanism.law": "spline" if spline else reference.law,
+            **({"mechanism.law_coefficients": list(reference.law)} if spline else {}),
+            "operation.speed": f"{reference.rpm!r} rpm",
+            "operation.N_min": f"{reference.N_min!r} N",
+            "effects.inertia.M": f"{reference.M!r} kg",
+            "effects.weight.G": f"{reference.G!r} N",
+            "effects.warp_tension": {"T1": f"{reference.T1} N", "T2": f"{reference.T2} N", "shape": reference.shape},
+            "effects.damping.C": f"{reference.C} N*s/m",
+            "effects.dry_friction.F": f"{reference.F} N",
+            **{f"mechanism.{name}": f"{value} deg" for name, value in zip(ANGLES, reference.angles, strict=True)},
+        }
+    )
+    scene = scene if reference.C else scene.without_effect("damping")
+    return scene if reference.F else scene.without_effect("dry_friction")
 
 
 def freed(case, n, symmetric=False, bound=CYCLOID):

@@ -25,7 +25,9 @@ from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.schema import Figure, Table, Target, Values
+from loomopt.picture.equations import Equation
 from loomopt.picture.job_views import JobViews
+from loomopt.picture.shapes import Drawing
 from loomopt.scenes import scene
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
@@ -168,6 +170,22 @@ class Nothing(Table):
     """A table without keys."""
 
 
+class ToyViews(JobViews):
+    """Nothing is there to be seen."""
+
+    def linkage(self, scene: Scene, design: Numbers) -> Drawing:
+        raise NotImplementedError
+
+    def joints_csv(self, scene: Scene, design: Numbers) -> str:
+        raise NotImplementedError
+
+    def equations(self, scene: Scene) -> tuple[Equation, ...]:
+        return ()
+
+    def marks(self, scene: Scene, design: Numbers) -> dict[str, float]:
+        return {}
+
+
 class ToyJob(Job):
     """The job of one program: figures are its rows and peaks, numbers have no unit."""
 
@@ -218,7 +236,7 @@ class ToyJob(Job):
 
     @property
     def views(self) -> JobViews:
-        return JobViews()
+        return ToyViews()
 
     @property
     def resources(self) -> Traversable:

@@ -14,6 +14,7 @@ from loomopt.interface.figures.figure import COLOURS, STYLES
 from loomopt.interface.figures.heads import LEGEND, SIZE, Entry, head
 from loomopt.model.curves import ANGLE
 from loomopt.physics.cycle import Floats
+from loomopt.picture.job_views import Marks, Span
 from loomopt.picture.panels import Panel, each
 from loomopt.picture.shapes import plain
 
@@ -100,14 +101,14 @@ HIGH, HIGH_WIDE, WIDTHS = 1.15, 1.9, (7.0, 11.0)
 
 
 class Turn(NamedTuple):
-    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and the marks' angles, rad.
+    """One machine's curves over a closed turn: crank angles, deg, columns, SI, and marks.
 
     unit: in which a person sees crank angles.
     """
 
     angles: Floats
     columns: "pd.DataFrame"
-    marks: Mapping[str, float]
+    marks: Marks
     unit: str = "deg"
 
     @property
@@ -129,17 +130,17 @@ def curves(
     frame: "pd.DataFrame",
     path: Path | None,
     title: str,
-    marks: Mapping[str, float] | None = None,
+    marks: Marks | None = None,
     panels: Sequence[Panel] = (),
-    today: tuple["pd.DataFrame", Mapping[str, float]] | None = None,
+    today: tuple["pd.DataFrame", Marks] | None = None,
     angle: str = "crank angle",
     unit: str = "deg",
 ) -> Any:
     """Return small diagrams over `phi [rad]`; written as PNG, PDF or SVG where there is a path.
 
-    marks: name → crank angle, rad, such as both dead centres; a pair such as "pulse begins" and "pulse ends"
-    is shaded. panels: what to show, one panel per column with its unit without them. today: curves and marks of
-    today's machine, drawn dashed beside a design's. angle: what phi is; unit: in which it is shown.
+    marks: such as both dead centres; a stretch such as the pulse is shaded. panels: what to show, one panel per
+    column with its unit without them. today: curves and marks of today's machine, drawn dashed beside a design's.
+    angle: what phi is; unit: in which it is shown.
     Raises BadInput for another suffix, and ValueError where there is no column.
     """
     if path:
@@ -163,7 +164,7 @@ def curves(
     return page
 
 
-def _turn(frame: "pd.DataFrame", marks: Mapping[str, float], unit: str) -> Turn:
+def _turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> Turn:
     """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
@@ -287,7 +288,8 @@ def _points(axes: Any, panel: Panel, turn: Turn, colour: str, said: str) -> list
 def _row(values: Floats, turn: Turn, how: str) -> int | None:
     """Return the row of what is marked, the first of those alike; None where nothing is known."""
     if how not in WORDS:
-        place = math.degrees(turn.marks.get(how, math.nan))
+        mark = turn.marks.get(how, math.nan)
+        place = math.nan if isinstance(mark, Span) else math.degrees(mark)
         near = np.flatnonzero(np.abs(turn.angles - turn.angles[0] - (place - turn.angles[0]) % turn.whole) <= SAME)
         return int(near[0]) if near.size and np.isfinite(values[near[0]]) else None
     heights = {"peak": np.abs(values), "most": values, "least": -values}[how]
@@ -319,12 +321,10 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
 def _mark(axes: Any, of: Turn) -> list[tuple[float, str]]:
     """Shade stretches and mark angles wherever they fall on the axis; return the names with their places."""
     (low, high), whole = axes.get_xlim(), of.whole
-    marks = {name: angle for name, angle in of.marks.items() if math.isfinite(angle)}
     names: list[tuple[float, str]] = []
-    stretches = [name.removesuffix(" begins") for name in marks if name.endswith(" begins")]
-    stretches = [name for name in stretches if f"{name} ends" in marks]
-    for name in stretches:
-        begin, end = math.degrees(marks[f"{name} begins"]), math.degrees(marks[f"{name} ends"])
+    spans = {name: mark for name, mark in of.marks.items() if isinstance(mark, Span)}
+    for name, span in spans.items():
+        begin, end = math.degrees(span.begin), math.degrees(span.end)
         end = begin + (end - begin) % whole
         parts = [(max(begin + turn, low), min(end + turn, high)) for turn in _turns(begin, low - whole, high, whole)]
         parts = [(left, right) for left, right in parts if left < right]
@@ -332,8 +332,8 @@ def _mark(axes: Any, of: Turn) -> list[tuple[float, str]]:
             axes.axvspan(left, right, color="#fde68a", alpha=0.6, linewidth=0, zorder=0)
         widest = max(parts, key=lambda part: part[1] - part[0], default=(low, low))
         names.append((sum(widest) / 2, name))
-    marks = {name: angle for name, angle in marks.items() if name.rpartition(" ")[0] not in stretches}
-    for name, angle in marks.items():
+    angles = {name: mark for name, mark in of.marks.items() if not isinstance(mark, Span) and math.isfinite(mark)}
+    for name, angle in angles.items():
         for turn in _turns(math.degrees(angle), low, high, whole):
             place = math.degrees(angle) + turn
             if low <= place <= high:

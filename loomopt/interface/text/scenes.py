@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
+from loomopt.picture.job_views import Marks, Span
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import Scene, given
@@ -103,7 +104,7 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
     full = {**job.today(scene), **flat(design)}
     columns = dict(job.curves(scene, full))
     angle = np.degrees(columns.pop("phi [rad]"))
-    places = {name: math.degrees(value) for name, value in _single(job.views.marks(scene, full)).items()}
+    places = {name: math.degrees(value) for name, value in _angles(job.views.marks(scene, full)).items()}
     rows = [
         k
         for k, a in enumerate(angle)
@@ -123,12 +124,9 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
     return [f"{scene.title}: {marks}", *tables]
 
 
-def _single(marks: Mapping[str, float]) -> dict[str, float]:
-    """Return the marks that are one crank angle, not an end of a stretch such as "pulse begins", "pulse ends"."""
-    ends = {"begins": "ends", "ends": "begins"}
-    parts = {name: name.rpartition(" ") for name in marks}
-    paired = {name for name, (what, _, end) in parts.items() if f"{what} {ends.get(end, end)}" in marks.keys() - {name}}
-    return {name: angle for name, angle in marks.items() if name not in paired and math.isfinite(angle)}
+def _angles(marks: Marks) -> dict[str, float]:
+    """Return the marks that are one crank angle, rad."""
+    return {name: mark for name, mark in marks.items() if not isinstance(mark, Span) and math.isfinite(mark)}
 
 
 def _table(some: Sequence[tuple[str, list[str]]], rows: Sequence[int]) -> Grid:

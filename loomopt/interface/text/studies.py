@@ -91,7 +91,7 @@ def change_said(study: SceneStudy, change: Change, si: bool) -> str:
     """Return a change as a sentence."""
     key = next(iter(study.kinds))
     unit = study_table.Units(study, si).of(key)
-    limits = [joined(limit) for limit in change.limits]
+    limits = [joined(side.text) for side in change.limits]
     low, high = (joined(show(value, unit)) for value in change.between)
     if change.at is None:
         return f"{joined(key)} from {low} to {high}: what binds changes, {', '.join(limits)}"

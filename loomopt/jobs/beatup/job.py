@@ -1,47 +1,80 @@
 """The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24]."""
 
-from collections.abc import Callable, Collection
+import math
+from typing import final
 
 import numpy as np
 
+from loomopt.base.errors import BadInput
+from loomopt.jobs import base
 from loomopt.jobs.base import Figures, Job, Studied
-from loomopt.jobs.beatup import design as designs
-from loomopt.jobs.beatup import program as programs
-from loomopt.jobs.beatup.scene import SCHEMA, check
+from loomopt.jobs.beatup.model import FRONT
+from loomopt.jobs.beatup.program import BALANCE, BeatupTask, model
+from loomopt.jobs.beatup.scene import RESISTED, SCHEMA, VARIABLES, RetrofitTarget, TorqueTarget, fault
+from loomopt.model.axes import opposite
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
-from loomopt.model.numbers import bounds
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.tolerances import NO_MASS
 from loomopt.scenes.scene import Scene
 
 
+@final
 class Beatup(Job):
     """A four-bar crank-rocker with the reed on its rocker."""
 
     name = "beatup"
     own_schema = SCHEMA
+    task = BeatupTask
     loosening = {"r4e": "s"}  # noqa: RUF012 (never changed)
 
     def check(self, scene: Scene) -> None:
-        """Raise BadInput where today's machine is not one that this job can work on."""
-        check(scene)
+        """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
+        reason = fault(scene.mechanism, scene.show)
+        if reason:
+            raise BadInput(
+                f"today's machine is not a crank-rocker: {reason}",
+                file=scene.origin,
+                key="mechanism.l1, l2, l3, l4",
+                value=", ".join(str(scene.given(f"mechanism.{name}")) for name in ("l1", "l2", "l3", "l4")),
+                remedy="Correct the lengths: the crank l1 must be the shortest link, and shortest + longest link must "
+                "be less than the sum of the other two.",
+            )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the crank-rocker with the effects the scene calls for."""
-        return programs.model(scene, self.numbers(scene), design)
-
-    def program(self, scene: Scene, target: str) -> Program:
-        """Return a target as a task. Raises BadInput."""
-        return programs.program(scene, target)
-
-    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
-        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
-        return programs.held(scene, target, traded)
+        return model(scene, self.numbers(scene), design)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""
-        programs.demand(scene, target)
+        if not any(isinstance(effect, Load) and effect.acts == "output" for effect in scene.active):
+            raise BadInput(
+                f"target {target} needs a reed torque, and no effect in the scene makes one",
+                file=scene.origin,
+                key="effects",
+                allowed=", ".join(scene.schema.effects),
+                remedy="Add the table [effects.inertia] with J4, or another effect.",
+            )
+        base.demand(scene, target)
+        resisted = "M0" in scene.operation and RESISTED[0] in scene.effects
+        if target == "torque" and scene.table(TorqueTarget).M3_tolerance is None and not resisted:
+            raise BadInput(
+                "target torque needs a tolerance for the reed torque",
+                file=scene.origin,
+                key="targets.torque.M3_tolerance",
+                remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of M0.',
+            )
+        for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
+            if name not in VARIABLES:
+                raise BadInput(
+                    f"{name} is no design variable",
+                    file=scene.origin,
+                    key=f"targets.retrofit.weights.{name}",
+                    allowed=", ".join(VARIABLES),
+                    remedy="Name a design variable.",
+                )
 
     def today(self, scene: Scene) -> dict[str, float]:
         """Return today's design with every other number that the scene bounds."""
@@ -49,34 +82,81 @@ class Beatup(Job):
         others = [scene.full(name) for name in scene.bounds if name not in variables]
         return {name: known[name] for name in (*variables, *others)}
 
-    def numbers(self, scene: Scene) -> dict[str, float]:
-        """Return every number of the scene, today's lengths also as today.*."""
-        return programs.numbers(scene)
-
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design of NLP variables."""
-        return designs.design(program, x)
+        """Return the design, SI, of NLP variables: m4e is s/r4e² where the NLP was solved in s."""
+        values = {**program.parameters, **x}
+        if "s" in x:
+            masses = _masses(program)
+            mass = x["s"] / x["r4e"] ** 2 if x["r4e"] else min(masses)
+            nearest = min(masses, key=lambda limit: abs(limit - mass))
+            most = next(v.range[1] for v in program.variables if v.name == "s")
+            close = abs(nearest - mass) * x["r4e"] ** 2 <= NO_MASS * most
+            values["m4e"] = nearest if close else min(max(mass, min(masses)), max(masses))
+        extra = [name for name in x if name not in (*VARIABLES, "s")]
+        return {name: values[name] for name in (*VARIABLES, *extra)}
 
     def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """Return the NLP variables of a design."""
-        return designs.values(program, design)
+        """Return the NLP's variables, SI, of a design; a counterweight without mass stands at its largest radius.
+
+        Where m4e = 0 the radius says nothing, unless it is asked for, and r4e = 0 would hide how s = m4e r4e² can grow.
+        """
+        found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
+        asked = {row for objective in program.objectives for row in objective.rows}
+        asked |= {limit.row for limit in program.row_limits}
+        if design["m4e"] == 0.0 and asked.isdisjoint({"change", "r4e", opposite("r4e")}):
+            found |= {v.name: v.upper for v in program.variables if v.name == "r4e"}
+        return {v.name: found[v.name] for v in program.variables}
 
     def tidy(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return NLP variables with a negligible counterweight taken for none."""
-        return designs.tidy(program, x)
+        """Return NLP variables with a negligible counterweight taken for none, so that mass or radius can settle."""
+        known = {v.name: v for v in program.variables}
+        radius, masses = known.get("r4e"), _masses(program)
+        if "s" not in known or radius is None or x["s"] > NO_MASS * known["s"].range[1]:
+            return dict(x)
+        if min(masses) == 0.0:
+            return {**x, "s": 0.0}
+        return {**x, "s": min(masses) * radius.lower**2, "r4e": radius.lower}
 
     def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of a design."""
-        limited = bounds(scene, self.numbers(scene))
-        return designs.figures(scene, self.sampler(scene, design), design, self.today(scene), limited)
+        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
+        sampled, limited = self.sampler(scene, design), self.task(scene).limited
+        static = sampled.figures
+        found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
+        found["mu_min"] = min(static["mu_near"], static["mu_far"])
+        found |= {name: sampled.peak(name) for name in sampled.model.quantities}
+        found |= {name: -sampled.peak(name) for name in sampled.model.least}
+        weights = scene.table(RetrofitTarget).weights
+        widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
+        changes = [
+            weights.get(name, 1.0) * ((design[name] - old) / widths[name]) ** 2
+            for name, old in self.today(scene).items()
+            if widths.get(name, 0.0) > 0.0
+        ]
+        found["change"] = math.fsum(changes)
+        return found
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""
         return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return one sentence on what an optimum is worth."""
-        return designs.say(scene, target, figures)
+        """Say in one sentence what an optimum of the target reached; figures in SI."""
+        front, peak, rms = (
+            scene.show(figures[name] or 0.0, "torque") for name in ("M3_fdc", "peak_torque", "pulse_rms")
+        )
+        jumps = any(FRONT in effect.reads for effect in scene.active)
+        where = "just before front dead centre" if jumps else "at front dead centre"
+        peak_text = f"the least peak crank torque over the whole cycle is {peak}"
+        if target == "balance" and BALANCE.reached(figures):
+            return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
+        if target == "balance":
+            nearest = f"the reed torque nearest to zero found {where} is {front}"
+            return f"Balance is out of reach: {nearest}, and then {peak_text}."
+        return {
+            "pulse": f"The least reed torque over the pulse is {rms} rms ({front} {where}).",
+            "torque": f"With the reed torque at {front} {where}, {peak_text}.",
+            "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
+        }[target]
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""
@@ -98,6 +178,11 @@ class Beatup(Job):
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: the balance, the peak torque, the reed torque at front dead centre."""
         return Studied(("balance",), {"peak_torque": ("peak_torque", False)}, ("M3_fdc",), "psi_2")
+
+
+def _masses(program: Program) -> list[float]:
+    """Return the limits of the counterweight's mass, kg."""
+    return [limit.value for limit in program.limits if limit.name == "m4e"]
 
 
 JOB = Beatup()

@@ -1,30 +1,32 @@
 """From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
-import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping
+from typing import final
 
 from loomopt.base.errors import BadInput
-from loomopt.jobs import base
+from loomopt.base.records import Frozen, lazy
 from loomopt.jobs.beatup import model as beatup
-from loomopt.jobs.beatup.design import BALANCE
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
-from loomopt.model import numbers as scene_numbers
+from loomopt.jobs.task import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.model.drive import TORQUE
-from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
-from loomopt.model.model import JobModel
-from loomopt.model.moves import AxisMove, Move, Wish
-from loomopt.model.numbers import Bounds, bound_limits, demand_figures, demanded, ends
+from loomopt.model.limits import Limit, RatioLimit
+from loomopt.model.model import JobModel, with_words_fixed
+from loomopt.model.moves import Move, Wish
+from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Numbers, Program, Variable, goals
+from loomopt.model.program import Goal, Numbers, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.effects.kinds import Check, Load
+from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
 from loomopt.physics.tolerances import NO_MASS
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.tables import Limit as Limited
 
 COUNTERWEIGHT = ("m4e", "r4e")
+BALANCED = 1e-8
+"""|M3| at front dead centre below this share of the peak torque is called zero (words of the beat-up only)."""
+BALANCE = Goal("M3_fdc", 0.0, 0.0, BALANCED, "peak_torque")
+"""What target balance asks, and may find out of reach."""
 AMPLE, LONG = 10.0, 3.0
 """Inertia beyond which no counterweight is of use, in those of the reed; radius beyond which none is built, in l4."""
 
@@ -38,9 +40,7 @@ def counterweight_holding(reed: float, front: float, resistance: float) -> float
     return reed * abs(resistance / (front - resistance)) if front != resistance else 0.0
 
 
-def counterweight_room(
-    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], inertia: float
-) -> dict[str, tuple[float, float]]:
+def counterweight_room(known: Mapping[str, float], bounds: Mapping[str, Ends], inertia: float) -> dict[str, Ends]:
     """Return the bounds of mass, kg, and radius, m, as far as they are of use: generous ones say nothing of a machine.
 
     known: today's m4e, r4e and l4; inertia: of the reed or of what holds the resistance, kg·m²; 0 where there is none
@@ -55,8 +55,6 @@ def counterweight_room(
     return found
 
 
-ROWS = {"mu_min": ("mu_near", "mu_far")}
-"""Figures that are the least of several smooth rows."""
 USED = {"s": 0.4, "m4e": 0.5, "r4e": 0.9}
 MUCH = {"m4e": 0.98, "r4e": 0.9}
 """Shares of the counterweight's room that a solve starts from."""
@@ -66,92 +64,228 @@ MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 
 
-def model(scene: Scene, known: Mapping[str, float], design: Numbers | None = None, changes: bool = False) -> JobModel:
-    """Return the mechanism with the effects the scene calls for; known: its numbers; design: what is not today's.
+def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: bool = False) -> JobModel:
+    """Return the mechanism with the effects the scene calls for, as its states need it. Raises BadInput.
 
-    changes: whether the change from today is read.
+    known: the scene's numbers; design: what is not today's; changes: whether the change from today is read.
     """
     changing = tuple(VARIABLES) if changes else ()
-    found = beatup.model(scene.active, scene_numbers.words(scene), frozenset(known), RESISTED, changing)
-    return scene_numbers.settled(scene, found, known, design)
+    found = beatup.model(scene.active, words(scene), frozenset(known), RESISTED, changing)
+    if not found.states:
+        return found
+    try:
+        return with_words_fixed(found, {**known, **{scene.full(name): value for name, value in (design or {}).items()}})
+    except UnsteadyError as error:
+        names = ", ".join(f"effects.{state.name}" for state in found.states)
+        raise BadInput(error.problem, file=scene.origin, key=names, remedy=f"{error.remedy}.") from None
 
 
-def numbers(scene: Scene) -> dict[str, float]:
-    """Return every number of the scene by name, SI, today's lengths also as today.*."""
-    return scene_numbers.numbers(scene) | {f"today.{name}": scene.mechanism[name] for name in LENGTHS}
+@final
+class BeatupTask(Task):
+    """The crank-rocker with its counterweight: s = m4e r4e² is a variable where mass and radius do not matter apart."""
 
+    read_from = Frozen(mu_min=("mu_near", "mu_far"))
 
-def program(scene: Scene, target: str) -> Program:
-    """Return the program of a target: all that a solve needs to know of the scene."""
-    return held(scene, target, None)[0]
+    @lazy
+    def known(self) -> dict[str, float]:
+        """Every number of the scene, today's lengths also as today.*."""
+        return numbers(self.scene) | {f"today.{name}": self.scene.mechanism[name] for name in LENGTHS}
 
+    @lazy
+    def model(self) -> JobModel:
+        """The mechanism, with the change from today where that is sought."""
+        return model(self.scene, self.known, changes=self.changes)
 
-def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Program, Callable[[str], float]]:
-    """Return the program of a target, or what it ("" for none) demands of all that is traded; natural sizes of axes."""
-    known = numbers(scene)
-    limited = scene_numbers.bounds(scene, known)
-    changes = target == "retrofit" or "change" in (traded or ())
-    physics = model(scene, known, changes=changes)
-    sizes = _Sizes(scene, known, limited)
-    direct = traded is not None or _reads_counterweight(scene, target, limited)
-    variables = _variables(scene, sizes, limited, direct)
-    demand_figures(scene, physics, ROWS, "Take the limit off, or add what {name} needs.")
-    limits = [limit for v in variables if v.called in scene.bounds for limit in bound_limits(v, False)]
-    limits += [] if direct else _mass_limits(limited["m4e"], sizes)
-    limits += [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sizes)]
-    limits += demanded(scene, physics.checks, known, {})
-    margins = physics.kinematics.groups[""].margins
-    limits += [DesignLimit(row, -1, row, 0.0, sizes.length, relaxable=False) for row in margins]
-    fallen = "M3_fdc" in (traded or ())
-    asked = [] if fallen else _target_limits(scene, target, sizes)
-    limits += asked
-    taken = {variable.name for variable in variables} | {"m4e"}
-    parameters = {name: value for name, value in known.items() if name not in taken}
-    if changes:
-        parameters |= _change_parameters(scene, known, limited)
-    starts = _starts(variables, known, direct, target == "retrofit")
-    moves = (*_moves(variables, known, limited, sizes.most), *scene_numbers.axis_moves(scene, known, limited))
-    objectives = (*_objectives(target, sizes), *scene_numbers.least(sizes.sampler))
-    if traded is not None:
-        objectives = objectives[:1] if target == "balance" and not fallen else ()
-    task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, moves
-    reached = goals(asked) if target != "balance" else () if fallen else (BALANCE,)
-    return Program(*task, goals=reached), functools.partial(_axis_size, sizes, variables)
+    @property
+    def changes(self) -> bool:
+        """Whether the change from today is read."""
+        return self.target == "retrofit" or "change" in self.traded
 
+    @property
+    def fallen(self) -> bool:
+        """Whether the reed torque at front dead centre is an axis, and what the target asks of it falls away."""
+        return "M3_fdc" in self.traded
 
-def _axis_size(sizes: "_Sizes", variables: Sequence[Variable], name: str) -> float:
-    """Return the natural size, SI, of what of an axis is sought the least of."""
-    if name not in sizes.scene.schema.figures:
-        return next(v.scale for v in variables if name in (v.name, v.called))
-    return {"change": 1.0, "pulse_rms": sizes.mean_square}.get(name) or sizes.figure(name)
+    @lazy
+    def direct(self) -> bool:
+        """Whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
+        asked = set(self.scene.limits)
+        read = bool(self.traded) or self.target == "retrofit" or "r4" in asked
+        for effect in self.scene.active:
+            judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.quantities, *effect.rows})
+            read = read or bool(set(effect.reads) & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
+        fixed = all(self.limited[name][0] == self.limited[name][1] for name in COUNTERWEIGHT)
+        return read or fixed or self.limited["r4e"][1] == 0.0
 
+    # Variables.
 
-class _Sizes:
-    """Natural sizes of this machine, SI, from today's design: what the NLP is scaled by."""
+    @lazy
+    def bounded(self) -> tuple[Variable, ...]:
+        """The lengths, every bounded number, and the counterweight: by mass and radius, or by s and radius."""
+        ends = {name: found for name, found in self.limited.items() if self.direct or name != "m4e"}
+        own = tuple(self.variable(name, found) for name, found in ends.items())
+        return own if self.direct else (*own, Variable("s", -math.inf, math.inf, self.inertia, (0.0, self.most)))
 
-    def __init__(self, scene: Scene, known: Mapping[str, float], limited: Bounds) -> None:
-        physics = model(scene, known)
-        sampler = sampled(physics, known, SAMPLES)
-        resistance = known.get("M0", 0.0) if RESISTED[0] in scene.effects else 0.0
-        front = sampler.static.get("M3_fdc", 0.0)
-        self.scene, self.known, self.limited, self.sampler = scene, known, limited, sampler
-        self.length = known["l4"]
-        reed = max((float(own) for own in _reed(sampler)), default=0.0)
-        self.room = counterweight_room(known, limited, max(reed, counterweight_holding(reed, front, resistance)))
-        self.most = self.room["m4e"][1] * self.room["r4e"][1] ** 2
-        self.inertia = max(reed, self.most) or 1.0
-        self.peak = (sampler.peak(TORQUE) if physics.loads else 0.0) or 1.0
-        # What a design can change of the reed torque is its share beside the resistance.
-        self.torque = max(abs(front - resistance), MASKED * resistance) or self.peak
-        self.mean_square = self.torque * max(self.torque, resistance)
-
-    def variable(self, name: str) -> float:
+    def scale(self, name: str, ends: Ends) -> float:
         """Return the size of a variable: its kind's, or its own largest value that is of use."""
         if name in LENGTHS:
             return self.length
-        return max(abs(self.known[name]), *map(abs, self.room.get(name, self.limited[name]))) or self.length
+        return max(abs(self.known[name]), *map(abs, self.room(name, ends))) or self.length
 
-    def figure(self, name: str) -> float:
+    def room(self, name: str, ends: Ends) -> Ends:
+        """Return where random starts lie: where a counterweight is of use."""
+        return self.counterweight.get(name, ends)
+
+    def parameters(self) -> dict[str, float]:
+        """Return every known number that is no variable; m4e follows from s where that is one."""
+        taken = {variable.name for variable in self.variables} | {"m4e"}
+        found = {name: value for name, value in self.known.items() if name not in taken}
+        if not self.changes:
+            return found
+        # Today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing.
+        weights = self.scene.table(RetrofitTarget).weights
+        for name in VARIABLES:
+            width = self.limited[name][1] - self.limited[name][0]
+            found |= {f"today.{name}": self.known[name], f"width.{name}": width or 1.0}
+            found[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
+        return found
+
+    # Limits.
+
+    def bounds(self) -> list[Limit]:
+        """Return the bounds of variables; the mass's as limits on s against r4e² where that is a variable."""
+        found = [each for v in self.variables if v.called in self.scene.bounds for each in bound_limits(v, False)]
+        if self.direct:
+            return found
+        return found + [
+            RatioLimit("m4e", sign, "s", value, self.inertia, "r4e_square", relaxable=sign >= 0 or value > 0.0)
+            for sign, value in ends(*self.limited["m4e"])
+        ]
+
+    def wanted(self) -> list[Limit]:
+        """Return what the target itself demands of the reed torque at front dead centre."""
+        if self.fallen or self.target not in ("retrofit", "torque"):
+            return []
+        tolerance = self.scene.table(TorqueTarget).M3_tolerance if self.target == "torque" else 0.0
+        tolerance = 0.01 * self.scene.operation["M0"] if tolerance is None else tolerance
+        sides = [(0, 0.0)] if tolerance == 0.0 else [(-1, -tolerance), (1, tolerance)]
+        return [self.row_limit("M3_fdc", sign, "M3_fdc", value, self.torque) for sign, value in sides]
+
+    def goals(self) -> tuple[Goal, ...]:
+        """Return what the target asks of the reed torque; of balance, to what it is called zero."""
+        if self.target != "balance":
+            return goals(self.wanted())
+        return () if self.fallen else (BALANCE,)
+
+    # Levels, starts and moves.
+
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the target's levels in order."""
+        peak = Peak(TORQUE, TORQUE, self.peak)
+        own = {
+            "balance": (Magnitude("M3_fdc", "M3_fdc", self.torque), peak),
+            "torque": (peak,),
+            "pulse": (Value("pulse_rms", "pulse_mean_square", self.mean_square, power=2),),
+            "retrofit": (Value("change", "change", 1.0),),
+        }
+        return *own[self.target], *self.least()
+
+    def held(self) -> tuple[Objective, ...]:
+        """Return the reed torque of target balance, unless that is an axis."""
+        return self.objectives()[:1] if self.target == "balance" and not self.fallen else ()
+
+    def starts(self) -> tuple[dict[str, float], ...]:
+        """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
+
+        Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and
+        radius matter by themselves, little and much of it are optima of their own: then there is a second start.
+        """
+        first = self.inside({v.name: self.known.get(v.name, 0.0) for v in self.variables})
+
+        def using(shares: Mapping[str, float]) -> dict[str, float]:
+            given = {v.name: v.range for v in self.variables if v.name in shares}
+            return first | {name: low + shares[name] * (high - low) for name, (low, high) in given.items()}
+
+        retrofit = self.target == "retrofit"
+        return distinct([using(USED), *([first] if retrofit else [using(MUCH)] if self.direct else [])])
+
+    def moves(self) -> list[Move]:
+        """Return the directions that may leave every figure unchanged: the counterweight's, then a common scale."""
+        names = {variable.name for variable in self.variables}
+        used, above = ("s", NO_MASS * self.most) if "s" in names else ("m4e", 0.0)
+        wishes = {
+            "m4e": (Wish("least", "least added mass"),),
+            "r4e": (
+                Wish("most", "least added mass, so the largest radius", used, above),
+                Wish("today", "no mass, so the radius nearest today's"),
+            ),
+        }
+        room = [name for name in COUNTERWEIGHT if name in names and self.limited[name][0] < self.limited[name][1]]
+        own = [self.move("counterweight", name, wishes[name]) for name in room]
+        return [*own, self.scale_move("scale", LENGTHS), *self.axis_moves()]
+
+    # Natural sizes, from today's machine without the change from today.
+
+    @lazy
+    def sampler(self) -> Sampler:
+        """Today's machine."""
+        return sampled(model(self.scene, self.known), self.known, SAMPLES)
+
+    @property
+    def length(self) -> float:
+        """The frame's, m."""
+        return self.known["l4"]
+
+    @lazy
+    def resistance(self) -> float:
+        """The cloth's, N·m."""
+        return self.known.get("M0", 0.0) if RESISTED[0] in self.scene.effects else 0.0
+
+    @lazy
+    def front(self) -> float:
+        """The reed torque at front dead centre, N·m."""
+        return self.sampler.static.get("M3_fdc", 0.0)
+
+    @lazy
+    def reed(self) -> float:
+        """Inertia of the reed without a counterweight, kg·m²: the largest that a load reads s for."""
+        given = self.sampler.given
+        loads = [load for load in self.sampler.model.loads if isinstance(load, Load)]
+        own = [(load.moved, given.own[load.name]) for load in loads if load.moved and "s" in load.reads]
+        return max((float(moved({**given.values, "s": 0.0}, values)) for moved, values in own), default=0.0)
+
+    @lazy
+    def counterweight(self) -> dict[str, Ends]:
+        """Bounds of mass and radius, as far as they are of use."""
+        holding = counterweight_holding(self.reed, self.front, self.resistance)
+        return counterweight_room(self.known, self.limited, max(self.reed, holding))
+
+    @lazy
+    def most(self) -> float:
+        """The largest inertia of a counterweight that is of use, kg·m²."""
+        return self.counterweight["m4e"][1] * self.counterweight["r4e"][1] ** 2
+
+    @lazy
+    def inertia(self) -> float:
+        """Of the reed, or of the counterweight, kg·m²."""
+        return max(self.reed, self.most) or 1.0
+
+    @lazy
+    def peak(self) -> float:
+        """The peak crank torque, N·m."""
+        return (self.sampler.peak(TORQUE) if self.sampler.model.loads else 0.0) or 1.0
+
+    @lazy
+    def torque(self) -> float:
+        """What a design can change of the reed torque, N·m: its share beside the resistance."""
+        return max(abs(self.front - self.resistance), MASKED * self.resistance) or self.peak
+
+    @lazy
+    def mean_square(self) -> float:
+        """Of the reed torque over the pulse, (N·m)²."""
+        return self.torque * max(self.torque, self.resistance)
+
+    def figure_size(self, name: str) -> float:
         """Return the size of a figure."""
         if name == TORQUE:
             return self.peak
@@ -159,149 +293,10 @@ class _Sizes:
             return abs(self.sampler.peak(name)) or 1.0
         kind = self.scene.schema.figures[name].kind
         fixed = {"torque": self.torque, "length": self.length, "inertia": self.inertia, "angle": 1.0}
-        return fixed.get(kind) or scene_numbers.figure_size(self.sampler, name)
+        return fixed.get(kind) or size_read(self.sampler, name)
 
-
-def _reed(sampler: Sampler) -> list[float]:
-    """Return today's inertia of the reed without a counterweight, kg·m², by each load that reads s."""
-    given, loads = sampler.given, [load for load in sampler.model.loads if isinstance(load, Load)]
-    own = [(load.moved, given.own[load.name]) for load in loads if load.moved and "s" in load.reads]
-    return [moved({**given.values, "s": 0.0}, values) for moved, values in own]
-
-
-def _variables(scene: Scene, sizes: _Sizes, limited: Bounds, direct: bool) -> list[Variable]:
-    """Return the variables; where mass and radius of the counterweight do not matter apart, s = m4e r4e² is one."""
-    labels = scene_numbers.labels(scene)
-    names = [name for name in limited if direct or name != "m4e"]
-    rooms = {**limited, **sizes.room}
-    found = [Variable(n, *limited[n], sizes.variable(n), rooms[n], labels.get(n, "")) for n in names]
-    if not direct:
-        found.append(Variable("s", -math.inf, math.inf, sizes.inertia, (0.0, sizes.most)))
-    return found
-
-
-def demand(scene: Scene, target: str) -> None:
-    """Raise BadInput where a target speaks of what the scene does not have."""
-    if not any(isinstance(effect, Load) and effect.acts == "output" for effect in scene.active):
-        raise BadInput(
-            f"target {target} needs a reed torque, and no effect in the scene makes one",
-            file=scene.origin,
-            key="effects",
-            allowed=", ".join(scene.schema.effects),
-            remedy="Add the table [effects.inertia] with J4, or another effect.",
-        )
-    base.demand(scene, target)
-    resisted = "M0" in scene.operation and RESISTED[0] in scene.effects
-    if target == "torque" and scene.table(TorqueTarget).M3_tolerance is None and not resisted:
-        raise BadInput(
-            "target torque needs a tolerance for the reed torque",
-            file=scene.origin,
-            key="targets.torque.M3_tolerance",
-            remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of M0.',
-        )
-    for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
-        if name not in VARIABLES:
-            raise BadInput(
-                f"{name} is no design variable",
-                file=scene.origin,
-                key=f"targets.retrofit.weights.{name}",
-                allowed=", ".join(VARIABLES),
-                remedy="Name a design variable.",
-            )
-
-
-def _reads_counterweight(scene: Scene, target: str, limited: Bounds) -> bool:
-    """Say whether m4e and r4e matter apart from s = m4e r4e², or leave no room for s."""
-    asked = set(scene.limits)
-    read = target == "retrofit" or "r4" in asked
-    for effect in scene.active:
-        judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.quantities, *effect.rows})
-        read = read or bool(set(effect.reads) & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
-    fixed = all(limited[name][0] == limited[name][1] for name in COUNTERWEIGHT)
-    return read or fixed or limited["r4e"][1] == 0.0
-
-
-def _starts(
-    variables: Sequence[Variable], known: Mapping[str, float], direct: bool, retrofit: bool
-) -> tuple[dict[str, float], ...]:
-    """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
-
-    Never today's own m4e = r4e = 0 alone, where a gradient sees no way to use a counterweight. Where mass and radius
-    matter by themselves, little and much of it are optima of their own: then there is a second start.
-    """
-    first = scene_numbers.inside(variables, {v.name: known.get(v.name, 0.0) for v in variables})
-
-    def using(shares: Mapping[str, float]) -> dict[str, float]:
-        given = {v.name: v.range for v in variables if v.name in shares}
-        return first | {name: low + shares[name] * (high - low) for name, (low, high) in given.items()}
-
-    return scene_numbers.distinct([using(USED), *([first] if retrofit else [using(MUCH)] if direct else [])])
-
-
-def _moves(variables: Sequence[Variable], known: Mapping[str, float], limited: Bounds, most: float) -> tuple[Move, ...]:
-    """Return the directions that may leave every figure unchanged: first the counterweight's, then a common scale."""
-    names = {variable.name for variable in variables}
-    used, above = ("s", NO_MASS * most) if "s" in names else ("m4e", 0.0)
-    wishes = {
-        "m4e": (Wish("least", "least added mass"),),
-        "r4e": (
-            Wish("most", "least added mass, so the largest radius", used, above),
-            Wish("today", "no mass, so the radius nearest today's"),
-        ),
-    }
-    axes = tuple(
-        AxisMove("counterweight", (name,), wishes[name], {name: known[name]}, {name: limited[name]})
-        for name in COUNTERWEIGHT
-        if name in names and limited[name][0] < limited[name][1]
-    )
-    return (*axes, scene_numbers.scale_move("scale", LENGTHS, known, limited))
-
-
-def _mass_limits(mass: tuple[float, float], sizes: _Sizes) -> list[Limit]:
-    """Return the counterweight's mass bounds as limits on s against r4e²."""
-    return [
-        RatioLimit("m4e", sign, "s", value, sizes.inertia, "r4e_square", relaxable=sign >= 0 or value > 0.0)
-        for sign, value in ends(*mass)
-    ]
-
-
-def _figure_limits(name: str, limit: Limited, sizes: _Sizes) -> list[Limit]:
-    """Return the limits on one figure, row by row."""
-    kind = CycleLimit if sizes.sampler.model.has_quantity(name) else DesignLimit
-    sides = ends(limit.min, limit.max)
-    rows = ROWS.get(name, (name,)) if sides[0][0] else (name,)
-    return [kind(name, sign, row, value, sizes.figure(name)) for sign, value in sides for row in rows]
-
-
-def _target_limits(scene: Scene, target: str, sizes: _Sizes) -> list[Limit]:
-    """Return what the target itself demands of the reed torque at front dead centre."""
-    if target == "retrofit":
-        return [DesignLimit("M3_fdc", 0, "M3_fdc", 0.0, sizes.torque)]
-    if target != "torque":
-        return []
-    tolerance = scene.table(TorqueTarget).M3_tolerance
-    tolerance = 0.01 * scene.operation["M0"] if tolerance is None else tolerance
-    sides = [(0, 0.0)] if tolerance == 0.0 else [(-1, -tolerance), (1, tolerance)]
-    return [DesignLimit("M3_fdc", sign, "M3_fdc", value, sizes.torque) for sign, value in sides]
-
-
-def _change_parameters(scene: Scene, known: Mapping[str, float], limited: Bounds) -> dict[str, float]:
-    """Return today's values, bound widths and weights of the retrofit's norm; a fixed variable weighs nothing."""
-    weights = scene.table(RetrofitTarget).weights
-    found: dict[str, float] = {}
-    for name in VARIABLES:
-        width = limited[name][1] - limited[name][0]
-        found |= {f"today.{name}": known[name], f"width.{name}": width or 1.0}
-        found[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
-    return found
-
-
-def _objectives(target: str, sizes: _Sizes) -> tuple[Objective, ...]:
-    """Return the target's levels in order."""
-    peak = Peak(TORQUE, TORQUE, sizes.peak)
-    return {
-        "balance": (Magnitude("M3_fdc", "M3_fdc", sizes.torque), peak),
-        "torque": (peak,),
-        "pulse": (Value("pulse_rms", "pulse_mean_square", sizes.mean_square, power=2),),
-        "retrofit": (Value("change", "change", 1.0),),
-    }.get(target, ())
+    def size(self, axis: str) -> float:
+        """Return the size of what of an axis is sought the least of."""
+        if axis not in self.scene.schema.figures:
+            return next(v.scale for v in self.variables if axis in (v.name, v.called))
+        return {"change": 1.0, "pulse_rms": self.mean_square}.get(axis) or self.figure_size(axis)

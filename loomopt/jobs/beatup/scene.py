@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import Field
 
-from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
 from loomopt.base.units import Shown, usual
 from loomopt.jobs.beatup.model import CrankRocker
@@ -13,7 +12,6 @@ from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
 
 
@@ -102,20 +100,6 @@ def fault(design: Mapping[str, float], shown: Shown = usual) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
     return crank_rocker.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""
-
-
-def check(scene: Scene) -> None:
-    """Raise BadInput, with the inequality and the crank angle, when today's machine is no crank-rocker."""
-    reason = fault(scene.mechanism, scene.show)
-    if reason:
-        raise BadInput(
-            f"today's machine is not a crank-rocker: {reason}",
-            file=scene.origin,
-            key="mechanism.l1, l2, l3, l4",
-            value=", ".join(str(scene.given(f"mechanism.{name}")) for name in ("l1", "l2", "l3", "l4")),
-            remedy="Correct the lengths: the crank l1 must be the shortest link, and shortest + longest link must be "
-            "less than the sum of the other two.",
-        )
 
 
 SCHEMA = SceneSchema(

@@ -9,7 +9,7 @@ from loomopt.maths.systems import FLOAT
 from loomopt.model.curves import tops
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import State
-from loomopt.picture.job_views import JobViews
+from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -41,14 +41,13 @@ class BeatupViews(JobViews):
 
         return equations.equations(registry.of(scene).model(scene))
 
-    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
         """Return both dead centres, rad, and where the cloth begins and ceases to resist."""
         sampler = registry.of(scene).sampler(scene, design)
         model, given = sampler.model, sampler.given
-        found = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
+        found: dict[str, float | Span] = {name: float(model.event(FLOAT, given, name)) % TURN for name in (FRONT, REAR)}
         for pulse in model.integrals:
-            begins, ends = sampler.cycle.stretch(pulse.where)
-            found |= {"pulse begins": begins, "pulse ends": ends}
+            found["pulse"] = Span(*sampler.cycle.stretch(pulse.where))
         return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:

@@ -1,66 +1,106 @@
 """The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17]."""
 
 import math
-from collections.abc import Callable, Collection
+from typing import final
 
+from loomopt.base.errors import BadInput
+from loomopt.base.refusals import refusal
+from loomopt.jobs import base
 from loomopt.jobs.base import Crossing, Figures, Job, Studied
-from loomopt.jobs.rapier import design as designs
-from loomopt.jobs.rapier import program as programs
-from loomopt.jobs.rapier.scene import SCHEMA, check
+from loomopt.jobs.rapier.model import jerk_mean, match_mean, read
+from loomopt.jobs.rapier.program import RapierTask, model
+from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table
 from loomopt.maths.systems import FLOAT
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
 from loomopt.model.sampling import Sampler
+from loomopt.physics.mechanisms import rapier_drive
 from loomopt.scenes.scene import Scene
 
 
+@final
 class Rapier(Job):
     """A five-bar rapier drive on the sley of a four-bar, with one 2:1 gear."""
 
     name = "rapier"
     own_schema = SCHEMA
+    task = RapierTask
     open_boxes = "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
 
     def check(self, scene: Scene) -> None:
-        """Raise BadInput where today's machine is not one that this job can work on."""
-        check(scene)
+        """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
+        fault = rapier_drive.fault_of(scene.mechanism, scene.show)
+        if fault:
+            raise BadInput(
+                f"today's drive does not turn all round: {fault}",
+                file=scene.origin,
+                key="mechanism",
+                remedy="Correct its dimensions: today's machine must assemble at every crank angle.",
+            )
+        for name in ("dwell", *STROKE[2:]):
+            least = scene.limits[name].min if name in scene.limits else None
+            if least is None:
+                continue
+            if "s_dwell" not in scene.operation:
+                raise refusal("a dwell needs s_dwell", scene.origin, "operation.s_dwell", remedy="Give it")
+            if not 0.0 < least < math.pi:
+                key, allowed = f"limits.{name}.min", "more than 0 deg and less than 180 deg"
+                raise refusal("it is no dwell", scene.origin, key, scene.given(key), allowed, "Correct the value")
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the drive with the effects the scene calls for."""
-        return programs.model(scene)
-
-    def program(self, scene: Scene, target: str) -> Program:
-        """Return a target as a task. Raises BadInput."""
-        return programs.program(scene, target)
-
-    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
-        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
-        return programs.held(scene, target, traded)
+        return model(scene)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have."""
-        programs.demand(scene, target)
+        base.demand(scene, target)
+        if target == "match":
+            match_table(scene)
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design of NLP variables."""
-        return designs.design(program, x)
-
-    def values(self, program: Program, design: Numbers) -> dict[str, float]:
-        """Return the NLP variables of a design."""
-        return program.completed(design)
+        """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""
+        fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0} - set(STROKE)
+        own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
+        values = {**program.parameters, **x}
+        return {
+            name: values[name] for name in (*VARIABLES, *(name for name in x if name in own and name not in VARIABLES))
+        }
 
     def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of a design."""
-        return designs.figures(scene, self.sampler(scene, design))
+        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
+        sampled = self.sampler(scene, design)
+        reading, static = read(sampled), sampled.static
+        found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
+        found |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
+        if "s_dwell" in scene.operation:
+            found |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
+            found["dwell"] = min(reading.dwell_after, reading.dwell_before)
+        found |= {name: sampled.peak(name) for name in sampled.model.quantities}
+        found["mu_min"] = math.pi / 2 - sampled.peak("obliquity")
+        found["sley_mu_min"] = min(static["sley_mu_near"], static["sley_mu_far"])
+        found["rms_jerk"] = math.sqrt(sampled.mean(jerk_mean()))
+        if scene.table(MatchTarget).table is not None:
+            found["match_rms"] = math.sqrt(sampled.mean(match_mean(*match_table(scene))))
+        return found
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""
         return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return one sentence on what an optimum is worth."""
-        return designs.say(scene, target, figures)
+        """Say in one sentence what an optimum of the target reached; figures in SI."""
+
+        def told(name: str, digits: int = 9) -> str:
+            return scene.show(figures.get(name) or 0.0, FIGURES[name].kind, digits)
+
+        kept = f"stroke {told('stroke')} and {told('dwell', 4)} of dwell"
+        return {
+            "stroke-dwell": f"With {kept}, the least peak head acceleration is {told('peak_acceleration')}.",
+            "dwell": f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}.",
+            "smooth": f"With {kept}, the least rms head jerk is {told('rms_jerk')}.",
+            "match": f"The head travel comes within {told('match_rms', 6)} rms of the table.",
+        }[target]
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
@@ -82,7 +122,7 @@ class Rapier(Job):
             "N",
             ("Q [N]", lambda at: at.force),
             ("Md [N*m]", lambda at: at.crank_torque),
-            also=(designs.read(sampler).phi_stroke, rear),
+            also=(read(sampler).phi_stroke, rear),
         )
 
     def studied(self, scene: Scene) -> Studied:

@@ -10,14 +10,18 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from loomopt.base.records import lazy
 from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Maths, Number
+from loomopt.maths.turning_points import crossing
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Group, four_bar
 from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
-from loomopt.physics.cycle import Floats, Node
+from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.effects.kinds import Effect, Motion
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector, dot
@@ -263,3 +267,73 @@ def model(
 SLEY_MARGINS = RapierDrive().groups["sley_"].margins
 CLOSES = RapierDrive().groups[""].closes
 """Margins of the sley's dyad, and those of the five-bar's by phrase, each with its whole-cycle row: at most 1."""
+
+# What is read off the head's travel, refined, never off a grid: stroke, dwells, turning points.
+
+STEPS, FARTHEST, LAST = 6, 1e-3, 1e-15
+"""Newton's steps from a sampled extreme, which is right to 1e-8; rad beyond which a step leads elsewhere, and that end
+them."""
+
+
+def settled_turn(sampler: Sampler, derivatives: tuple[str, str], angle: float) -> float:
+    """Return the crank angle, rad, of a turning point after Newton's method from nearby.
+
+    derivatives: quantities that are the first and the second derivative in the crank angle.
+    """
+    for _ in range(STEPS):
+        slope, bend = sampler.at_angle(derivatives, angle)
+        step = slope / bend if bend else 0.0
+        if abs(step) > FARTHEST:
+            return angle
+        angle -= step
+        if abs(step) < LAST:
+            break
+    return angle
+
+
+SAMPLES = 720
+TOUCHES = 1e-9
+"""Share of s_dwell by which a travel that only touches it may exceed it: less than any limit's tolerance."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """stroke, m, reached at crank angle phi_stroke; dwells after and before front dead centre, rad."""
+
+    stroke: float
+    phi_stroke: float
+    dwell_after: float
+    dwell_before: float
+
+
+def read(sampler: Sampler) -> Reading:
+    """Return stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
+    found = sampler.extremes("S")
+    if not found or not all(math.isfinite(extreme.value) for extreme in found):
+        raise ValueError("the drive does not assemble all round")
+    outward = max(found, key=lambda extreme: extreme.value)
+    stroke, phi = 0.0, 0.0
+    if outward.value > 0.0:
+        phi = settled_turn(sampler, ("S_1", "peak_acceleration"), sampler.angle(outward))
+        stroke = sampler.at_angle(("S",), phi)[0]
+    room = sampler.given.values.get("s_dwell")
+    if room is None:
+        return Reading(stroke, phi % TURN, math.nan, math.nan)
+    extremes = [sampler.angle(extreme) for extreme in found]
+    after, before = (_dwell(sampler, extremes, float(room), side) for side in (1, -1))
+    return Reading(stroke, phi % TURN, after, before)
+
+
+def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:
+    """Return how far the crank turns from front dead centre, on one side, before |S| leaves `room` (m)."""
+    even = np.linspace(0.0, TURN, SAMPLES + 1)
+    angles = np.unique(np.concatenate([even, np.mod(side * np.array(extremes), TURN)]))
+
+    (travels,) = sampler.quantities(("S",), Node(side * angles, {}))
+    sizes = np.abs(travels)
+    out = np.flatnonzero(sizes > room * (1 + TOUCHES))
+    if not out.size:
+        return TURN
+    inside = np.flatnonzero(sizes[: out[0]] <= room)
+    low, high = float(angles[inside[-1]]) if inside.size else 0.0, float(angles[out[0]])
+    return crossing(lambda turned: abs(sampler.at_angle(("S",), side * turned)[0]) - room, low, high)

@@ -1,254 +1,302 @@
 """From a rapier scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
-import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
+from typing import final
 
 from loomopt.base.errors import BadInput
-from loomopt.base.records import Frozen
+from loomopt.base.records import Frozen, lazy
 from loomopt.base.refusals import refusal
-from loomopt.jobs import base
 from loomopt.jobs.rapier import model as rapier
-from loomopt.jobs.rapier.design import follow, read
-from loomopt.jobs.rapier.model import AFTER, BEFORE, CLOSES, DWELL, LOADED, SLEY, SLEY_MARGINS, jerk_mean, match_mean
+from loomopt.jobs.rapier.model import (
+    AFTER,
+    BEFORE,
+    CLOSES,
+    DWELL,
+    LOADED,
+    SLEY,
+    SLEY_MARGINS,
+    Reading,
+    jerk_mean,
+    match_mean,
+    read,
+)
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
+from loomopt.jobs.task import Asked, Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.maths.systems import FLOAT
-from loomopt.model import numbers as scene_numbers
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.moves import Move
-from loomopt.model.numbers import Asked, bound_limits, demanded, distinct, ends, floored, implied, inside, numbers
+from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Objective, Peak, Value
-from loomopt.model.program import Program, Variable, goals
+from loomopt.model.program import Numbers, Variable
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.tables import Limit as Limited
 
 FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 REQUIRED = {"stroke": 0, "s_dwell": 1, "dwell_after": -1, "dwell_before": -1}
 """Numbers of the operation that targets keep, and on which side a designer could give way."""
-ROWS = {"sley_mu_min": ("sley_mu_near", "sley_mu_far"), "stroke": ("reach",)}
-"""Figures that are the least of several smooth rows, or a row of another name."""
 SIDES = {"dwell_before": BEFORE, "dwell_after": AFTER}
 LOOSE = frozenset((DWELL, *SIDES, "stroke"))
 """What is a number of its own where it is sought."""
-TOPS = Frozen(phi_stroke="S")
+ANGLES = ("alpha", "phi40", "phi30", *SIDES)
 S_DWELL = 0.005
 """Share of the stroke that the head may move in a usual dwell."""
+TURN = (0.0, 2 * math.pi)
 
 
 def model(
-    scene: Scene, asked: Collection[str] = (), read: bool = True, dwelt: Collection[str] | None = None
+    scene: Scene, sought: Collection[str] = (), read: bool = True, dwelt: Collection[str] | None = None
 ) -> JobModel:
-    """Return the drive with the effects the scene calls for and what is asked; read: whether effects are.
+    """Return the drive with the effects the scene calls for and what is sought; read: whether effects are.
 
-    asked: the target, or what is traded; dwelt: dwells that are asked for, those of the operation without.
+    sought: the target, or what is traded; dwelt: dwells that are asked for, those of the operation without.
     """
-    read_too = {*asked, *scene.limits}
+    read_too = {*sought, *scene.limits}
     means = [jerk_mean()] if {"smooth", "rms_jerk"} & read_too else []
     means += [match_mean(*match_table(scene))] if {"match", "match_rms"} & read_too else []
-    known = {*numbers(scene), *(("phi_stroke",) if asked else ()), *((DWELL,) if DWELL in asked else ())}
+    known = {*numbers(scene), *(("phi_stroke",) if sought else ()), *((DWELL,) if DWELL in sought else ())}
     effects = scene.active if read else ()
-    arcs = _arcs(asked, scene.operation if dwelt is None else dwelt)
-    return rapier.model(effects, scene_numbers.words(scene), frozenset(known), arcs, tuple(means))
+    arcs = dwell_arcs(sought, scene.operation if dwelt is None else dwelt)
+    return rapier.model(effects, words(scene), frozenset(known), arcs, tuple(means))
 
 
-def _arcs(asked: Collection[str], dwelt: Collection[str]) -> tuple[tuple[float, str], ...]:
+def dwell_arcs(sought: Collection[str], dwelt: Collection[str]) -> tuple[tuple[float, str], ...]:
     """Return the sides on which there is a dwell, each with the value that it is."""
-    if DWELL in asked:
+    if DWELL in sought:
         return tuple((side, DWELL) for side in SIDES.values())
     return tuple((side, name) for name, side in SIDES.items() if name in dwelt)
 
 
-def _dwells(scene: Scene, asked: Collection[str], kept: Collection[str]) -> Asked:
-    """Return what is asked of each dwell, rad, by name: by the operation, then by limits. Raises BadInput."""
-    least = {name: limit.min for name, limit in scene.limits.items() if name in (DWELL, *SIDES) and limit.min}
-    if DWELL in asked:
-        for name in (name for name in least if name in SIDES):
-            problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
-            raise refusal(problem, scene.origin, f"limits.{name}", remedy=remedy)
-        return {DWELL: [(DWELL, least[DWELL])]} if least else {}
-    found = {name: [(name, scene.operation[name])] if name in kept else [] for name in REQUIRED if name in SIDES}
-    for name, each in found.items():
-        each += [(by, least[by]) for by in (name, DWELL) if by in least]
-    return {name: each for name, each in found.items() if each}
+def hand_over(model: JobModel, values: Numbers) -> Numbers:
+    """Return the angle of the stroke and the least dwell; raises ValueError where the drive does not turn."""
+    reading = read(sampled(model, values))
+    found = {"phi_stroke": reading.phi_stroke}
+    return found | ({"dwell": min(reading.dwell_after, reading.dwell_before, math.pi)} if "s_dwell" in values else {})
 
 
-def demand(scene: Scene, target: str) -> None:
-    """Raise BadInput where a target speaks of what the scene does not have."""
-    base.demand(scene, target)
-    if target == "match":
-        match_table(scene)
+@final
+class RapierTask(Task):
+    """The drive with its stroke and dwells: kept as variables without room, which gives them a price, or sought."""
+
+    read_from = Frozen(sley_mu_min=("sley_mu_near", "sley_mu_far"), stroke=("reach",))
+    tops = Frozen(phi_stroke="S")
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        """The target, or what is traded."""
+        return self.traded or (self.target,)
+
+    @lazy
+    def free(self) -> dict[str, Ends]:
+        """Bounds of the numbers that the scene frees, by full name."""
+        free = {self.scene.full(name) for name, bound in self.scene.bounds.items() if bound.free}
+        return {name: ends for name, ends in self.limited.items() if name in free}
+
+    @lazy
+    def kept(self) -> list[str]:
+        """What the target keeps of the operation, and nobody trades."""
+        traded = {end for name in self.traded for end in {DWELL: tuple(SIDES)}.get(name, (name,))}
+        needs = self.scene.schema.targets[self.target].needs if self.target else ()
+        return [name for name in needs if name in self.known and name not in traded]
+
+    @lazy
+    def asked(self) -> Asked:
+        """What is asked of each dwell, rad, by name: by the operation, then by limits. Raises BadInput."""
+        limits = self.scene.limits
+        least = {name: limit.min for name, limit in limits.items() if name in (DWELL, *SIDES) and limit.min}
+        if DWELL in self.sought:
+            for name in (name for name in least if name in SIDES):
+                problem, remedy = "the lesser of both dwells is sought, on one angle for both sides", f"Limit {DWELL}."
+                raise refusal(problem, self.scene.origin, f"limits.{name}", remedy=remedy)
+            return {DWELL: [(DWELL, least[DWELL])]} if least else {}
+        kept = [name for name in self.kept if name not in self.free]
+        found = {n: [(n, self.scene.operation[n])] if n in kept else [] for n in REQUIRED if n in SIDES}
+        for name, each in found.items():
+            each += [(by, least[by]) for by in (name, DWELL) if by in least]
+        return {name: each for name, each in found.items() if each}
+
+    @property
+    def dwelt(self) -> Collection[str]:
+        """Numbers that are known or asked for, dwells among them."""
+        return {*self.known, *self.asked}
+
+    @lazy
+    def model(self) -> JobModel:
+        """The drive with what is sought; with the effects where anything that they give is read."""
+        checks = [effect for effect in self.scene.active if isinstance(effect, Check)]
+        given = {name for check in checks for name in (*check.quantities, *check.rows)}
+        read = bool((given | set(LOADED)) & {*self.scene.limits, *self.sought})
+        return model(self.scene, self.sought, read or any(check.demands or check.least for check in checks), self.dwelt)
+
+    @lazy
+    def sampler(self) -> Sampler:
+        """Today's drive; of a dwell that is not there yet, any angle."""
+        return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.asked, 1.0), **self.known})
+
+    @lazy
+    def reading(self) -> Reading:
+        """Today's stroke and dwells."""
+        return read(self.sampler)
+
+    def demand_figures(self) -> None:
+        """Raise BadInput for a limit on a figure, or a dwell to trade, that nothing in the scene gives."""
+        operation, traded = self.scene.operation, self.traded
+        absent = [name for name in (*STROKE[1:2], *traded) if name in STROKE and name not in operation]
+        if set(traded) & LOOSE and absent:
+            raise refusal(
+                f"to trade {', '.join(traded)} needs {absent[0]}", self.scene.origin, f"operation.{absent[0]}"
+            )
+        full = model(self.scene)
+        missing = [name for name in LOADED if name in self.scene.limits and not full.has_quantity(name)]
+        if missing:
+            raise BadInput(
+                "peak_power needs the speed" if full.loads else "no effect in the scene makes a tape force",
+                file=self.scene.origin,
+                key="limits",
+                remedy=f"{'Give operation.speed' if full.loads else 'Put on head_inertia or tape_friction'}, or take "
+                f"the limit on {missing[0]} out.",
+            )
+
+    # Variables.
+
+    @lazy
+    def bounded(self) -> tuple[Variable, ...]:
+        """What the scene frees, what the target keeps, the hand-over, and what is sought as a number of its own."""
+        found = [self.variable(name, ends) for name, ends in self.free.items()]
+        found += [self.operated(name, (self.known[name],) * 2) for name in self.kept if name not in self.free]
+        found.append(Variable("phi_stroke", *TURN, 1.0, TURN))
+        return *found, *(self.loose(name) for name in self.sought if name in LOOSE and name not in self.free)
+
+    def scale(self, name: str, ends: Ends) -> float:
+        """Return the size of a variable: angles 1 rad, lengths the largest they may be."""
+        return 1.0 if name in ANGLES else max(abs(self.known[name]), *map(abs, ends)) or 1.0
+
+    def loose(self, name: str) -> Variable:
+        """Return a number of the operation that is free."""
+        if name == "stroke":
+            return self.operated(name, (0.0, math.inf), (0.5 * self.known[name], 1.5 * self.known[name]))
+        return self.operated(name, (1e-3, math.pi))
+
+    def operated(self, name: str, ends: Ends, around: Ends | None = None) -> Variable:
+        """Return a number of the operation as a variable; around: where random starts lie."""
+        return Variable(name, *ends, self.operated_size(name), around or ends)
+
+    def operated_size(self, name: str) -> float:
+        """Return the natural size of a number of the operation."""
+        stroke = float(self.known.get("stroke", 0.0))
+        if name == "stroke":
+            return stroke
+        return max(float(self.known[name]), S_DWELL * stroke) if name == "s_dwell" else 1.0
+
+    # Limits.
+
+    def limits(self) -> list[Limit]:
+        """Return all limits: figures that a variable's bounds imply are not limited twice."""
+        figures = [each for each in self.figures() if not self.implied(each)]
+        required = [each for each in self.required() if each.name not in self.asked]
+        return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
+
+    def bounds(self) -> list[Limit]:
+        """Return the bounds of what the scene frees."""
+        return [each for v in self.bounded if v.name in self.free for each in bound_limits(v)]
+
+    def required(self) -> list[Limit]:
+        """Return what the target keeps, each on the side where a designer could give way."""
+        known = self.known
+        kept = [name for name in self.kept if name not in self.free]
+        return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in kept]
+
+    def wanted(self) -> list[Limit]:
+        """Return what of the bounds and of what is kept the target asks of figures."""
+        return [each for each in (*self.bounds(), *self.required()) if each.name in self.kept and each.name in FIGURES]
+
+    def implied(self, limit: Limit) -> bool:
+        """Say whether the bounds of the variable that a limit is named after say as much."""
+        own = next((v for v in self.variables if v.name == limit.name), None)
+        if own is None:
+            return False
+        return (limit.sign > 0 or own.lower >= limit.value) and (limit.sign < 0 or own.upper <= limit.value)
+
+    def meant(self) -> list[Limit]:
+        """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
+        reached = {*self.kept, *self.asked, *(name for name in self.sought if name in LOOSE)}
+        size, rows = 1.0, {"head at rest at phi_stroke": "rest"}
+        if "stroke" in reached:
+            size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}
+        firm = {"relaxable": False, "hidden": True}
+        found: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
+        for side, name in dwell_arcs(self.sought, self.dwelt):
+            if name in reached or name == DWELL:
+                text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
+                where = (DWELL, side)
+                found.append(CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, where=where, **firm))
+        return found
+
+    def margins(self) -> list[Limit]:
+        """Return the margins by which every dyad closes over the whole turn; the sley's where it may change."""
+        found = [self.row_limit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
+        rows = SLEY_MARGINS if set(SLEY) & set(self.free) else ()
+        return found + [self.row_limit(row, -1, row, 0.0, self.known["l71"], relaxable=False) for row in rows]
+
+    def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
+        """Return the limits on one figure, row by row; a dwell is a variable's."""
+        if name == "mu_min" and low is not None:
+            return [CycleLimit(name, -1, "obliquity", low, 1.0, complement=math.pi / 2)]
+        if name in (DWELL, *SIDES):
+            return []
+        sides, rows = ends(low, high), self.read_from.get(name, (name,))
+        size = self.limit_size(name, sides)
+        return [self.row_limit(name, sign, row, value, size) for sign, value in sides for row in rows]
+
+    def limit_size(self, name: str, sides: Sequence[tuple[int, float]]) -> float:
+        """Return what a limit on a figure is measured by; sides: of the limit."""
+        if self.model.has_quantity(name):
+            return self.sampler.peak(name) or 1.0
+        if any(name in check.rows for check in self.model.checks):
+            return max(abs(value) for _, value in sides) or 1.0
+        if name == "rms_jerk":
+            return self.sampler.single(name)
+        return self.reading.stroke if name == "stroke" else 1.0
+
+    # Levels, starts and moves.
+
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the target's levels in order."""
+        peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
+        own = {
+            "stroke-dwell": Peak("peak_acceleration", "peak_acceleration", peak),
+            "dwell": Value("dwell", "dwell_rest", 1.0),
+            "smooth": Value("rms_jerk", "jerk_mean_square", peak**2, power=2),
+            "match": Value("match_rms", "match_mean_square", stroke**2, power=2),
+        }
+        return own[self.target], *self.least()
+
+    def starts(self) -> tuple[dict[str, float], ...]:
+        """Return today's drive moved just inside its bounds, and the paper's own construction where it closes."""
+        built = constructed(self.known)
+        return distinct([self.inside(self.known), *([self.inside({**self.known, **built})] if built else [])])
+
+    def moves(self) -> list[Move]:
+        """Return the scales of five-bar and sley, where all of their lengths are free, and numbers of checks."""
+        taken = {variable.name for variable in self.variables}
+        scales = (("five-bar scale", FIVE_BAR), ("sley scale", SLEY))
+        return [*(self.scale_move(name, along) for name, along in scales if taken >= set(along)), *self.axis_moves()]
+
+    def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
+        """Return what gives the hand-over and the least dwell."""
+        return hand_over
+
+    def figure_size(self, name: str) -> float:
+        """Return the size of a figure, of a mean its square's."""
+        peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
+        own = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
+        return own.get(name) or size_read(self.sampler, name)
 
 
-def program(scene: Scene, target: str) -> Program:
-    """Return the program of a target: all that a solve needs to know of the scene."""
-    return held(scene, target, None)[0]
-
-
-def held(scene: Scene, target: str, traded: Collection[str] | None) -> tuple[Program, Callable[[str], float]]:
-    """Return the program of a target, or what it ("" for none) demands of all that is traded; natural sizes of axes."""
-    known = numbers(scene)
-    limited = scene_numbers.bounds(scene, known)
-    _demand_figures(scene, traded or ())
-    asked = (target,) if traded is None else tuple(traded)
-    fallen = {DWELL: ("dwell_after", "dwell_before")}
-    free_ends = {end for name in traded or () for end in fallen.get(name, (name,))}
-    kept = [n for n in (scene.schema.targets[target].needs if target else ()) if n in known and n not in free_ends]
-    free = {scene.full(name): bound.free for name, bound in scene.bounds.items()}
-    dwells = _dwells(scene, asked, [name for name in kept if not free.get(name)])
-    dwelt = {*known, *dwells}
-    physics = model(scene, asked, _reads_effects(scene, asked), dwelt)
-    sampler = sampled(physics, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(dwells, 1.0), **known})
-    labels = scene_numbers.labels(scene)
-    variables = [_variable(name, limited[name], known, labels.get(name, "")) for name in limited if free.get(name)]
-    named = {variable.name for variable in variables}
-    limits = [limit for variable in variables for limit in bound_limits(variable)]
-    own = []
-    for name in (name for name in kept if name not in named):
-        variables.append(Variable(name, known[name], known[name], _size(name, known), (known[name],) * 2))
-        own.append(BoundLimit(name, REQUIRED[name], name, known[name], _size(name, known)))
-    wanted = [limit for limit in (*limits, *own) if limit.name in kept and limit.name in FIGURES]
-    turn = (0.0, 2 * math.pi)
-    variables.append(Variable("phi_stroke", *turn, 1.0, turn))
-    variables += [_loose(name, known) for name in asked if name in LOOSE and name not in named]
-    variables, dwelling = floored(variables, dwells)
-    limits += [*(limit for limit in own if limit.name not in dwells), *dwelling]
-    reached = [*kept, *dwells, *(name for name in asked if name in LOOSE)]
-    limits += _kept_limits(_arcs(asked, dwelt), reached, known)
-    limits += _margins(bool(set(SLEY) & named), known)
-    figures = [each for name, limit in scene.limits.items() for each in _figure_limits(name, limit, sampler)]
-    limits += [each for each in figures if not implied(each, variables)]
-    limits += demanded(scene, physics.checks, known, {})
-    taken = {variable.name for variable in variables}
-    parameters = {name: value for name, value in known.items() if name not in taken}
-    scales = (("five-bar scale", FIVE_BAR), ("sley scale", SLEY))
-    moves: list[Move] = [
-        scene_numbers.scale_move(name, along, known, limited) for name, along in scales if taken >= set(along)
-    ]
-    moves += scene_numbers.axis_moves(scene, known, limited)
-    levels = () if traded is not None else _objectives(target, sampler, read(sampler).stroke)
-    objectives = (*levels, *(scene_numbers.least(sampler) if traded is None else ()))
-    starts = _starts(variables, known)
-    task = physics, tuple(variables), parameters, tuple(limits), objectives, starts, tuple(moves), follow, TOPS
-    found = Program(*task, goals=goals(wanted))
-    return found, functools.partial(_axis_size, found, sampler)
-
-
-def _loose(name: str, known: Mapping[str, float]) -> Variable:
-    """Return a number of the operation that is free."""
-    ends = {"stroke": (0.0, math.inf)}.get(name, (1e-3, math.pi))
-    around = (0.5 * known[name], 1.5 * known[name]) if name == "stroke" else ends
-    return Variable(name, *ends, _size(name, known), around)
-
-
-def _axis_size(program: Program, today: Sampler, name: str) -> float:
-    """Return the natural size, SI, of what of an axis is sought the least of."""
-    peak, stroke = today.peak("peak_acceleration") or 1.0, read(today).stroke or 1.0
-    known = {"rms_jerk": peak**2, "match_rms": stroke**2, "mu_min": 1.0, "sley_mu_min": 1.0}
-    return known.get(name) or scene_numbers.size(program, today, name)
-
-
-def _reads_effects(scene: Scene, asked: Collection[str]) -> bool:
-    """Say whether the program reads anything that effects give: then they are in it, else they are not."""
-    checks = [effect for effect in scene.active if isinstance(effect, Check)]
-    given = {name for check in checks for name in (*check.quantities, *check.rows)}
-    return bool((given | set(LOADED)) & {*scene.limits, *asked}) or any(
-        check.demands or check.least for check in checks
-    )
-
-
-def _demand_figures(scene: Scene, traded: Collection[str]) -> None:
-    """Raise BadInput for a limit on a figure, or a dwell to trade, that nothing in the scene gives."""
-    absent = [name for name in (*STROKE[1:2], *traded) if name in STROKE and name not in scene.operation]
-    if set(traded) & LOOSE and absent:
-        raise refusal(f"to trade {', '.join(traded)} needs {absent[0]}", scene.origin, f"operation.{absent[0]}")
-    full = model(scene)
-    missing = [name for name in LOADED if name in scene.limits and not full.has_quantity(name)]
-    if missing:
-        raise BadInput(
-            "peak_power needs the speed" if full.loads else "no effect in the scene makes a tape force",
-            file=scene.origin,
-            key="limits",
-            remedy=f"{'Give operation.speed' if full.loads else 'Put on head_inertia or tape_friction'}, or take the "
-            f"limit on {missing[0]} out.",
-        )
-
-
-def _size(name: str, known: Mapping[str, float]) -> float:
-    """Return the natural size of a number that targets keep."""
-    stroke = float(known.get("stroke", 0.0))
-    if name == "stroke":
-        return stroke
-    return max(float(known[name]), S_DWELL * stroke) if name == "s_dwell" else 1.0
-
-
-def _variable(name: str, ends: tuple[float, float], known: Mapping[str, float], label: str) -> Variable:
-    """Return a variable of natural size: angles 1 rad, lengths the largest they may be."""
-    angle = name in ("alpha", "phi40", "phi30", "dwell_after", "dwell_before")
-    size = 1.0 if angle else max(abs(known[name]), *map(abs, ends)) or 1.0
-    return Variable(name, *ends, size, ends, label)
-
-
-def _kept_limits(arcs: Sequence[tuple[float, str]], kept: Sequence[str], known: Mapping[str, float]) -> list[Limit]:
-    """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
-    size = known["stroke"] if "stroke" in kept else 1.0
-    rows = {"head at rest at phi_stroke": "rest"} | ({"stroke is reached": "stroke_short"} if "stroke" in kept else {})
-    found: list[Limit] = [
-        DesignLimit(name, 0, row, 0.0, size, relaxable=False, hidden=True) for name, row in rows.items()
-    ]
-    for side, name in arcs:
-        if name in (*kept, DWELL):
-            text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
-            where = (DWELL, side)
-            row = CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, relaxable=False, where=where, hidden=True)
-            found.append(row)
-    return found
-
-
-def _margins(sley: bool, known: Mapping[str, float]) -> list[Limit]:
-    """Return the margins by which every dyad closes over the whole turn; the sley's where it may change."""
-    found: list[Limit] = [CycleLimit(name, 1, row, 1.0, 1.0, relaxable=False) for name, row in CLOSES.items()]
-    rows = SLEY_MARGINS if sley else ()
-    return found + [DesignLimit(row, -1, row, 0.0, known["l71"], relaxable=False) for row in rows]
-
-
-def _figure_limits(name: str, limit: Limited, sampler: Sampler) -> list[Limit]:
-    """Return the limits on one figure, row by row."""
-    if name == "mu_min" and limit.min is not None:
-        return [CycleLimit(name, -1, "obliquity", limit.min, 1.0, complement=math.pi / 2)]
-    if name in (DWELL, *SIDES):
-        return []
-    sides = ends(limit.min, limit.max)
-    if sampler.model.has_quantity(name):
-        size = sampler.peak(name) or 1.0
-        return [CycleLimit(name, sign, name, value, size) for sign, value in sides]
-    rows = ROWS.get(name, (name,)) if sides[0][0] else ROWS.get(name, (name,))[:1]
-    size = sampler.single(name) if name == "rms_jerk" else read(sampler).stroke if name == "stroke" else 1.0
-    if any(name in check.rows for check in sampler.model.checks):
-        size = max(abs(value) for _, value in sides) or 1.0
-    return [DesignLimit(name, sign, row, value, size) for sign, value in sides for row in rows]
-
-
-def _objectives(target: str, sampler: Sampler, stroke: float) -> tuple[Objective, ...]:
-    peak = sampler.peak("peak_acceleration") or 1.0
-    return {
-        "stroke-dwell": (Peak("peak_acceleration", "peak_acceleration", peak),),
-        "dwell": (Value("dwell", "dwell_rest", 1.0),),
-        "smooth": (Value("rms_jerk", "jerk_mean_square", peak**2, power=2),),
-        "match": (Value("match_rms", "match_mean_square", (stroke or 1.0) ** 2, power=2),),
-    }[target]
-
-
-def _starts(variables: Sequence[Variable], known: Mapping[str, float]) -> tuple[dict[str, float], ...]:
-    """Return today's drive moved just inside its bounds, and the paper's own construction where it closes."""
-    built = constructed(known)
-    return distinct([inside(variables, known), *([inside(variables, {**known, **built})] if built else [])])
-
-
-def constructed(known: Mapping[str, float]) -> dict[str, float] | None:
+def constructed(known: Numbers) -> dict[str, float] | None:
     """Return C0, l5 and φ40 by the paper's construction [Hong17] for a scene's stroke; None where it does not close."""
     if "stroke" not in known:
         return None

@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import Field
 
-from loomopt.base.errors import BadInput
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.base.refusals import refusal
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
@@ -121,27 +120,6 @@ TARGETS = {
         Target("match", "head travel nearest to a table", MatchTarget),
     )
 }
-
-
-def check(scene: Scene) -> None:
-    """Raise BadInput when today's drive does not turn, or the dwells leave no time to travel."""
-    fault = rapier_drive.fault_of(scene.mechanism, scene.show)
-    if fault:
-        raise BadInput(
-            f"today's drive does not turn all round: {fault}",
-            file=scene.origin,
-            key="mechanism",
-            remedy="Correct its dimensions: today's machine must assemble at every crank angle.",
-        )
-    for name in ("dwell", *STROKE[2:]):
-        least = scene.limits[name].min if name in scene.limits else None
-        if least is None:
-            continue
-        if "s_dwell" not in scene.operation:
-            raise refusal("a dwell needs s_dwell", scene.origin, "operation.s_dwell", remedy="Give it")
-        if not 0.0 < least < math.pi:
-            key, allowed = f"limits.{name}.min", "more than 0 deg and less than 180 deg"
-            raise refusal("it is no dwell", scene.origin, key, scene.given(key), allowed, "Correct the value")
 
 
 def match_table(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:

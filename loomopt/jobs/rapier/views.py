@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.rapier.design import read
+from loomopt.jobs.rapier.model import read
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.cycle import TURN
-from loomopt.picture.job_views import JobViews
+from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -41,14 +41,14 @@ class RapierViews(JobViews):
 
         return equations.equations(registry.of(scene).model(scene))
 
-    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
         """Return the sley's dead centres, rad, the hand-over and the dwell."""
         sampler = registry.of(scene).sampler(scene, design)
         events, reading = sampler.model.kinematics.events(FLOAT, sampler.given), read(sampler)
         found = {name: float(angle) % TURN for name, angle in events.items()} | {"hand-over": reading.phi_stroke}
-        if "s_dwell" in scene.operation:
-            found |= {"dwell begins": TURN - reading.dwell_before, "dwell ends": reading.dwell_after}
-        return found
+        if "s_dwell" not in scene.operation:
+            return found
+        return {**found, "dwell": Span(TURN - reading.dwell_before, reading.dwell_after)}
 
     def words(self) -> "Mapping[str, Curve]":
         """Return what the curves are called."""

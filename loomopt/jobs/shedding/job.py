@@ -1,56 +1,136 @@
-"""The shedding job: the least return spring that keeps the roller on the cam [Qiu21]."""
+"""The shedding job: the least return spring that keeps the roller on the cam [Qiu21].
 
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+What target law tends to with ever more intervals stands here too, where it is known in closed form
+(mechanisms/cam_limit.py). Which loads act is not asked, only whether their sum is what the closed form knows: a steady
+force, one in proportion to the shed on either side of its middle, and inertia.
+"""
 
-from loomopt.jobs.base import Figures, Job, Studied
-from loomopt.jobs.shedding import design as designs
-from loomopt.jobs.shedding import program as programs
-from loomopt.jobs.shedding.model import contact, moving
-from loomopt.jobs.shedding.scene import SCHEMA, LawTarget, check
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, final
+
+from loomopt.base.errors import BadInput
+from loomopt.base.quantities import NARROWEST
+from loomopt.base.refusals import refusal
+from loomopt.jobs import base
+from loomopt.jobs.base import Family, Figures, Job, Studied
+from loomopt.jobs.shedding.model import (
+    CYCLE,
+    DWELLS,
+    RETURN,
+    RETURN_SPRING,
+    RISE,
+    SEGMENT,
+    FramePose,
+    contact,
+    frame,
+    moving,
+)
+from loomopt.jobs.shedding.program import (
+    CONTACT_SPEED,
+    SheddingTask,
+    contact_speed,
+    demand_moving,
+    model,
+)
+from loomopt.jobs.shedding.scene import (
+    SCHEMA,
+    SEGMENTS,
+    VARIABLES,
+    LawTarget,
+    check_known,
+    check_law,
+    dwelt,
+    unfollowed,
+)
+from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, JobModel
-from loomopt.model.program import Numbers, Program
-from loomopt.model.sampling import Sampler
-from loomopt.physics.mechanisms.cam_motion import Spline, knots
+from loomopt.model.program import Numbers, Program, Variable
+from loomopt.model.sampling import Extreme, Sampler
+from loomopt.physics import balance
+from loomopt.physics.mechanisms import cam_limit, cam_spline
+from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_motion import Spline, knots, named_knots
 from loomopt.scenes.scene import Scene
 
+SAME_TURN = 1e-9
+"""rad; the segments' angles may miss a whole turn by this much: decimals."""
+CLOSE = 1e-9
+"""Share of the largest cam force below which contact just holds."""
+GAVE_WAY = 1e-7
+"""A number that a target keeps has given way when it is off by this, in its natural size."""
+SAME = 1e-12
+"""Share of the largest |N| by which two least values are one: rise and return mirror each other."""
+MOVES = " The moves, where not every force is known, are not judged."
+LIMIT = "law_acceleration"
+PROBES = ((RISE, 0.25, 0.125, 0.0, 0.0), (RISE, 0.75, 0.5, 1.5, -2.0), (RETURN, 0.125, 0.375, 2.0, 3.0))
+"""Segment, s, u, s' and s'' at which the sum of the loads is asked whether it is that of the closed form."""
+ALIKE = 1e-30
+"""Share of the forces by which it may differ: rounding in these digits."""
+Force = Callable[[int, float, float, float, float], Number]
 
+
+@final
 class Shedding(Job):
     """A heald frame between its cam and its return spring."""
 
     name = "shedding"
     own_schema = SCHEMA
+    task = SheddingTask
 
     def check(self, scene: Scene) -> None:
-        """Raise BadInput where today's machine is not one that this job can work on."""
-        check(scene)
+        """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
+        total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
+        for name in ("rise", "return"):
+            if not scene.mechanism[name] >= NARROWEST:
+                least = f"{scene.show(NARROWEST, 'angle')} and more"
+                raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
+        if abs(total - 2 * math.pi) > SAME_TURN:
+            given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
+            problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
+            turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
+            raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
+        if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
+            dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
+            check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
+        check_law(scene)
+        reason = unfollowed(scene.mechanism, scene.show)
+        if reason:
+            raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the frame with the effects the scene calls for, and a design's own law where it has one."""
         own = knots(design or {})
-        return programs.model(scene, Spline(len(own) - 1) if own else None)
-
-    def program(self, scene: Scene, target: str) -> Program:
-        """Return a target as a task. Raises BadInput."""
-        return programs.program(scene, target)
-
-    def held(self, scene: Scene, target: str, traded: Collection[str]) -> tuple[Program, Callable[[str], float]]:
-        """Return what a target demands of all that is traded, and natural sizes of axes. Raises BadInput."""
-        return programs.held(scene, target, traded)
+        return model(scene, Spline(len(own) - 1) if own else None)
 
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have, or today's frame cannot be followed."""
-        programs.demand(scene, target)
+        base.demand(scene, target)
+        if target == "speed":
+            demand_moving(scene, "choose another target")
+        own = scene.table(LawTarget)
+        fewest, most = cam_spline.FEWEST, cam_spline.MOST
+        if target == "law" and (not fewest <= own.intervals <= most or (own.symmetric and own.intervals % 2)):
+            problem, key = "a law cannot have so many intervals", "targets.law.intervals"
+            allowed = f"{fewest} to {most}, an even number for a symmetric law"
+            raise refusal(problem, scene.origin, key, own.intervals, allowed, "Write intervals = 16.")
         self.parted(scene, self.sampler(scene, self.today(scene)))
 
-    def numbers(self, scene: Scene) -> dict[str, float]:
-        """Return every number of the scene, the knots of a spline law included."""
-        return programs.numbers(scene)
-
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
-        """Return the design of NLP variables."""
-        return designs.design(program, x)
+        """Return the design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""
+        values, law = {**program.parameters, **x}, frame(program.model).law
+        knots = set(law.names) if isinstance(law, Spline) else set()
+        fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0}
+        chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
+        free = [name for name in chosen if name not in {*VARIABLES, *knots, CONTACT_SPEED}]
+        found = {name: values[name] for name in (*VARIABLES, *free)}
+        if set(SEGMENTS) & set(found):
+            found["near_dwell"] = 2 * math.pi - sum(values[name] for name in SEGMENTS[:3])
+        if isinstance(law, Spline) and knots & {v.name for v in program.variables}:
+            found |= named_knots(map(float, law.accelerations(values)))
+        return found
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
         """Return the scene with a design's own cam law, and the target whose limits it keeps.
@@ -67,19 +147,33 @@ class Shedding(Job):
         return changed, "stiffness" if target == "law" else target
 
     def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of a design."""
+        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
         sampler = self.sampler(scene, design)
+        found: dict[str, float | None] = {name: sampler.static.get(name) for name in scene.schema.figures}
+        for name, quantity in self.peaks(sampler.model).items():
+            found[name] = sampler.peak(quantity) * (-1 if quantity == "concavity" else 1)
         parted = self.parted(scene, sampler)
-        return designs.figures(scene, sampler) | (parted.figures if parted else {})
+        return found | contact_figures(scene, sampler) | (parted.figures if parted else {})
 
     def peaks(self, model: JobModel) -> dict[str, str]:
-        """Return the figures that are extremes over the cycle."""
-        return designs.peaks(model)
+        """Return the figures that are extremes over the cycle, with their quantities."""
+        found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
+        return found | {name: name for check in model.checks for name in check.quantities}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
-        """Return one sentence on what an optimum is worth, and one on today's spring."""
-        now = designs.contact(scene, self.sampler(scene, self.today(scene)))
-        return designs.say(scene, now, designs.judged(self.model(scene)), target, figures)
+        """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
+        now, dwells = contact_figures(scene, self.sampler(scene, self.today(scene))), judged(self.model(scene))
+        size = {name: value or 0.0 for name, value in figures.items()}
+        stiffness, speed = scene.show(size["K1"], "stiffness", 9), scene.show(size["speed"], "angular speed", 9)
+        kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
+        peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {scene.show(size['contact_max'], 'force')}"
+        said = {
+            "stiffness": f"The least return spring that {kept} has {stiffness}.",
+            "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
+            "force": f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}",
+            "speed": f"Today's spring {kept} up to {speed}.",
+        }[target]
+        return said if target == "speed" else f"{said} {_today(scene, now)}".strip()
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
@@ -108,7 +202,112 @@ class Shedding(Job):
         """Return what studies read: least springs, the cam force, and what a free law tends to."""
         # Points over the whole turn would read a force that is known in the dwells only.
         peaks = {} if self.model(scene).known_in else {"contact_max": ("cam_force", False)}
-        return Studied(("stiffness", "law"), peaks, motion="X_2", family=designs.FAMILY)
+        family = Family("spline intervals", "law", "targets.law.intervals", self.law_limit)
+        return Studied(("stiffness", "law"), peaks, motion="X_2", family=family)
+
+    def law_limit(self, scene: Scene, x: Mapping[str, Number]) -> Number | None:
+        """Return the limit of K1, N/m, for target law, in 40 digits; None where the closed form does not hold.
+
+        x: with a stiffness, N/m, for which some law keeps contact, such as a spline law's least one. The frame must
+        rise and fall alike, and nothing but N_min and the law's acceleration be limited.
+        """
+        known, law, model = scene.mechanism, scene.table(LawTarget), self.model(scene)
+        free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
+        alike = known["rise"] == known["return"] and not free and not law.symmetric
+        if not alike or set(scene.limits) - {LIMIT} or model.known_in or model.demands:
+            return None
+        frame, start = (
+            _frame(scene, model, self.numbers(scene)),
+            systems.mpmath(cam_limit.DIGITS).number(float(x["K1"])),
+        )
+        return None if frame is None else cam_limit.least_stiffness(frame, start)
+
+
+def _refused(scene: Scene, key: str, problem: str, allowed: str, remedy: str = "Correct it.") -> BadInput:
+    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy=remedy)
+
+
+def _chosen(variable: Variable, value: float) -> bool:
+    """Say whether a variable is a choice: it has room, or it had to give way."""
+    return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
+
+
+def contact_figures(scene: Scene, sampler: Sampler) -> dict[str, float | None]:
+    """Return the figures of the cam force, SI, and the speed up to which the roller stays on the cam."""
+    found: dict[str, float | None] = {"contact_max": sampler.peak("cam_force")}
+    found["contact_min"], found["contact_angle"] = _least(sampler.extremes("lift"), sampler)
+    found[CONTACT_SPEED] = contact_speed(scene, sampler)
+    return found
+
+
+def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
+    """Return the least cam force, N, and the first cam angle where it is reached, rad."""
+    highest = max(extreme.height for extreme in found)
+    size = max(abs(extreme.value) for extreme in found)
+    alike = [extreme for extreme in found if extreme.height >= highest - SAME * size]
+    return -highest, min(sampled.angle(extreme) % (2 * math.pi) for extreme in alike)
+
+
+def judged(model: JobModel) -> str:
+    """Return the dwells, in words, that the cam force is judged in; "" where it is known all round."""
+    names = [SEGMENTS[int(value)] for _, value in model.known_in if int(value) in frame(model).segments]
+    known = [name.replace("_", " ") for name in names]
+    return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
+
+
+def _today(scene: Scene, found: Figures) -> str:
+    """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
+    least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
+    wanted, force = scene.operation["N_min"], scene.show(least, "force")
+    spring = f"Today's spring ({scene.show(scene.mechanism['K1'], 'stiffness', 9)})"
+    if least >= wanted - CLOSE * max(most, 1.0):
+        return f"{spring} holds: the cam force is never less than {force}."
+    lost = f"the cam force would be {force} at {scene.show(found['contact_angle'] or 0.0, 'angle')}"
+    speed = found[CONTACT_SPEED]
+    if speed:
+        lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
+    return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."
+
+
+def _frame(scene: Scene, model: JobModel, numbers: Numbers) -> cam_limit.Frame | None:
+    """Return the frame that the loads make of it; None where their sum is another."""
+    number, known = systems.mpmath(cam_limit.DIGITS).number, scene.mechanism
+    force = _force(model, numbers)
+    middle, inertia = force(RISE, 0.5, 0.5, 0.0, 0.0), force(RISE, 0.5, 0.5, 0.0, 1.0)
+    limit = scene.limits.get(LIMIT)
+    found = cam_limit.Frame(
+        most=number(limit.max if limit and limit.max else scene.table(LawTarget).acceleration),
+        travel=number(known["travel"]),
+        preload=number(scene.bounds["X0"].max if "X0" in scene.bounds else known["X0"]),
+        steady=number(scene.operation["N_min"]) - middle,
+        before=middle - force(RISE, 0.0, 0.0, 0.0, 0.0),
+        after=force(RISE, 1.0, 1.0, 0.0, 0.0) - middle,
+        inertia=inertia - middle,
+    )
+    size = abs(middle) + abs(found.before) + abs(found.after) + abs(found.inertia)
+    for segment, s, u, slope, bend in PROBES:
+        pull = (found.before if s < 0.5 else found.after) * (2 * s - 1)
+        if abs(force(segment, s, u, slope, bend) - (middle + pull + found.inertia * bend)) > ALIKE * size:
+            return None
+    return found if found.inertia > 0 else None
+
+
+def _force(model: JobModel, numbers: Numbers) -> Force:
+    """Return the sum of all loads but the return spring at a segment, s, u, s' and s''."""
+    system = systems.mpmath(cam_limit.DIGITS)
+    given = model.given(system, {name: system.number(value) for name, value in numbers.items()})
+    loads = [load for load in model.loads if load is not RETURN_SPRING]
+    values, zero = given.values, system.number(0.0)
+
+    def force(segment: int, s: float, u: float, slope: float, bend: float) -> Number:
+        law = Derivatives(*map(system.number, (s, slope, bend, 0.0)))
+        rate = {RISE: 1 / values["rise"], RETURN: -1 / values["return"]}[segment]
+        omega = values.get("speed", zero)
+        pose = FramePose(system, zero, values["travel"], segment, system.number(u), rate, law, -1, omega)
+        past = {load.name: float(s > 0.5) for load in loads}
+        return zero + balance.output_force(system, loads, pose, given, past)
+
+    return force
 
 
 JOB = Shedding()

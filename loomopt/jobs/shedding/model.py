@@ -268,6 +268,16 @@ ROWS: dict[str, Row] = {
     "cam_period": Row(lambda at: 1 / at.values["speed"], ("speed",)),
 }
 """Figures and rows of the design alone, SI."""
+CYCLE = {
+    "contact_min": "lift",
+    "contact_max": "cam_force",
+    "law_acceleration": "law_acceleration",
+    "pressure_angle_max": "pressure_angle",
+    "curvature_min": "concavity",
+    "curvature_max": "curvature",
+    **{figure.name: figure.name for figure in drive.FIGURES},
+}
+"""Figures that are extremes over the cycle, with their quantities."""
 
 
 def law_rows(law: CamLaw) -> dict[str, Row]:

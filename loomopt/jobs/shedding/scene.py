@@ -1,7 +1,7 @@
 """What a shedding scene may hold: its tables, design variables, figures and targets."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 from pydantic import Field, create_model
@@ -21,10 +21,12 @@ from loomopt.base.quantities import (
 )
 from loomopt.base.refusals import refusal
 from loomopt.base.units import Shown, usual
-from loomopt.jobs.shedding.model import DWELLS, FOLLOWER, SEGMENT
+from loomopt.jobs.shedding.model import FOLLOWER
 from loomopt.model import drive
-from loomopt.model.numbers import check_known
+from loomopt.model.numbers import words
+from loomopt.physics.cycle import Where
 from loomopt.physics.effects import declared
+from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
@@ -34,8 +36,6 @@ from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
-SAME_TURN = 1e-9
-"""rad; the segments' angles may miss a whole turn by this much: decimals."""
 CYCLOID = 2 * math.pi
 """Peak s'' of the cycloidal law, which bounds a free law where the scene says nothing else."""
 LAW = Literal[
@@ -148,35 +148,10 @@ TARGETS = {
 }
 
 
-def check(scene: Scene) -> None:
-    """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
-    total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
-    for name in ("rise", "return"):
-        if not scene.mechanism[name] >= NARROWEST:
-            least = f"{scene.show(NARROWEST, 'angle')} and more"
-            raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
-    if abs(total - 2 * math.pi) > SAME_TURN:
-        given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-        problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
-        turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
-        raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
-    if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
-        dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
-        check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
-    check_law(scene)
-    reason = _follower(scene.mechanism, scene.show)
-    if reason:
-        raise _refused(scene, "mechanism", f"the cam's follower cannot work: {reason}", "")
-
-
 def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
     """Say whether there is a far dwell, and a near one in what the others leave of the turn: rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
-
-
-def _refused(scene: Scene, key: str, problem: str, allowed: str, remedy: str = "Correct it.") -> BadInput:
-    return BadInput(problem, file=scene.origin, key=key, allowed=allowed, remedy=remedy)
 
 
 def chosen(scene: Scene) -> CamLaw:
@@ -185,6 +160,21 @@ def chosen(scene: Scene) -> CamLaw:
     if name == "spline":
         return Spline(len(_coefficients(scene)) - 1)
     return Tabulated(_table(scene)) if name == "table" else Named(name)
+
+
+def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
+    """Raise BadInput where a load is known on pieces of the cycle only, and none of them is there; called: these."""
+    for effect in (effect for effect in scene.active if isinstance(effect, Load)):
+        own = {key: word for name, key, word in words(scene) if name == effect.name}
+        places = effect.known_in(own)
+        if places and not set(places) & set(there):
+            raise BadInput(
+                f"{effect.name} is known in the {called} only, and there are none",
+                file=scene.origin,
+                key=", ".join(f"effects.{effect.name}.{key}" for key in own),
+                allowed=f"another word, or {called} in which it is known",
+                remedy="Correct it.",
+            )
 
 
 def check_law(scene: Scene) -> None:
@@ -227,7 +217,7 @@ def _table(scene: Scene) -> cam_spline.Table:
         raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
 
 
-def _follower(numbers: Mapping[str, Any], shown: Shown) -> str:
+def unfollowed(numbers: Mapping[str, Any], shown: Shown) -> str:
     """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
@@ -244,7 +234,7 @@ def fault(numbers: Mapping[str, Any], shown: Shown = usual) -> str:
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"
     short = [name for name in ("rise", "return") if not numbers[name] >= NARROWEST]
-    return f"the {short[0]} takes no cam angle" if short else _follower(numbers, shown)
+    return f"the {short[0]} takes no cam angle" if short else unfollowed(numbers, shown)
 
 
 SCHEMA = SceneSchema(

@@ -11,7 +11,7 @@ from loomopt.model.curves import POWER
 from loomopt.model.sampling import Sampler, near_zero
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load
-from loomopt.picture.job_views import JobViews
+from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
 from loomopt.scenes.scene import Scene
 
@@ -57,19 +57,19 @@ class SheddingViews(JobViews):
 
         return equations.equations(registry.of(scene).model(scene))
 
-    def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
         """Return the dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
         job = registry.of(scene)
         values = job.sampler(scene, design).given.values
-        found: dict[str, float] = {}
+        found: dict[str, float | Span] = {}
         if float(values["far_dwell"]) > 0.0:
-            found |= {"far dwell begins": float(values["begin.far"]), "far dwell ends": float(values["begin.return"])}
+            found["far dwell"] = Span(float(values["begin.far"]), float(values["begin.return"]))
         if float(values["near_dwell"]) > 0.0:
-            found |= {"near dwell begins": float(values["begin.near"]), "near dwell ends": 0.0}
+            found["near dwell"] = Span(float(values["begin.near"]), 0.0)
         parted = job.parted(scene, job.sampler(scene, design))
         if parted is None or not parted.course.parted:
             angle = job.figures(scene, design)["contact_angle"]
-            found |= {"least cam force": math.nan if angle is None else angle}
+            found["least cam force"] = math.nan if angle is None else angle
         if parted is None:
             return found
 

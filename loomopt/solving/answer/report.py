@@ -1,77 +1,107 @@
-"""From a judged design to what a person and a script read."""
+"""From a search to what a person and a script read: what was reached, what stops it, what stands in the way."""
 
-import math
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from loomopt.base.units import factor
 from loomopt.jobs.base import Job
-from loomopt.model import numbers
-from loomopt.model.limits import CycleLimit
-from loomopt.model.program import Program
-from loomopt.model.sampling import Sampler
-from loomopt.physics.tolerances import FEASIBLE
-from loomopt.scenes import designs
+from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Finding, Price, Relaxation, Solution, remedies
+from loomopt.solving.answer.evaluation import evaluated, evaluation
+from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Price, Relaxation, Solution, remedies
 from loomopt.solving.answer.words import Words
-from loomopt.solving.certificate.verdict import Certificate
+from loomopt.solving.certificate.verdict import Certificate, GlobalBound
+from loomopt.solving.nlp.point import sampler_at
+from loomopt.solving.search.search import Candidate, Search, compared
 
 Today = Callable[[], Evaluation]
 """Evaluates today's machine."""
+NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
+"""What is said of the solver where no start assembles."""
 
 
-def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
-    """Return a design's figures and limits, each limit judged from the figures alone."""
-    figures = job.figures(scene, design)
-    words = Words(scene)
-    labels = numbers.labels(scene)
-    named = {labels.get(name, name): value for name, value in design.items()}
-    shown = designs.packed(named, scene.schema.lists)
-    return Evaluation(
-        problem=scene.name,
-        effects=tuple(scene.effects),
-        design=shown,
-        figures=figures,
-        units={name: words.si(name) for name in (*shown, *figures)},
-        limits=_findings(program, figures, named, job.sampler(scene, design)),
-        reached={goal.figure: goal.reached(figures) for goal in program.goals},
-        scene=scene,
-    )
+def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
+    """Return the answer of a search: of the best design that was reached, or why there is none.
+
+    clash: the limits that cannot all be kept, where that is the reason.
+    """
+    if search.best is None:
+        return _without(scene, target, search, clash)
+    return _with(scene, target, search, search.best)
 
 
-def _findings(
-    program: Program, figures: Mapping[str, float | None], design: Mapping[str, float], sampler: Sampler
-) -> tuple[Finding, ...]:
-    """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
-    sides: dict[tuple[str, bool], dict[int, float]] = {}
-    sizes: dict[tuple[str, bool], float] = {}
-    values: dict[str, float | None] = {**design, **figures, **sampler.static}
-    for limit in program.limits:
-        if limit.hidden:
-            continue
-        if isinstance(limit, CycleLimit):
-            if not sampler.model.has_quantity(limit.row):
-                # A row of the program alone: what it limits is told by the figure that it is read for.
-                continue
-            values[limit.name] = limit.figure(sampler)
-        elif limit.name not in values:
-            continue
-        chosen = limit.name in design and limit.is_of_variable
-        key = limit.name, chosen
-        for sign in (limit.sign,) if limit.sign else (-1, 1):
-            other = sides.setdefault(key, {}).setdefault(sign, limit.value)
-            sides[key][sign] = min(other, limit.value) if sign > 0 else max(other, limit.value)
-        size = abs(limit.value) if chosen and limit.value else limit.named_scale
-        sizes[key] = max(sizes.get(key, 0.0), size)
-    found = []
-    for (name, chosen), ends in sides.items():
-        value, slack = (design if chosen else values)[name], FEASIBLE * sizes[name, chosen]
-        low, high = ends.get(-1), ends.get(1)
-        ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
-        found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
-    return tuple(found)
+def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solution:
+    """Return the answer of the best design that was reached."""
+    job, program, point = search.job, search.program, best.point
+    solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
+    today = functools.partial(evaluated, scene, job, target, {})
+    here = evaluation(scene, job, program, job.design(program, best.x))
+    made = with_optimum(job, scene, target, here, best.certificate, solver, today, _sought(search))
+    return replace(made, point=point, optima=_optima(search))
+
+
+def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
+    """Return the answer where no design was reached."""
+    job, program, points = search.job, search.program, [each.point for each in search.candidates]
+    solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search)}
+    if points:
+        solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
+    today = functools.partial(evaluated, scene, job, target, {})
+    here = evaluation(scene, job, program, job.design(program, clash.x) if clash.x else job.today(scene))
+    return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
+
+
+def _counts(search: Search) -> dict[str, Any]:
+    """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
+    best = search.best
+    same = [c for c in search.candidates if _is_there(c, best)] if best else []
+    accuracy = search.settings.accuracy
+    counts = {
+        "starts": len(search.candidates) + search.sought,
+        "starts_at_best": len(same),
+        "basins": len(_optima(search)),
+    }
+    return {**counts, "designs": search.designs, "accuracy": accuracy}
+
+
+def _optima(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
+    """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
+    groups: list[list[Candidate]] = []
+    for candidate in search.ranked:
+        if groups and compared(groups[-1][0], candidate) == 0:
+            groups[-1].append(candidate)
+        else:
+            groups.append([candidate])
+    return tuple((_figures(search, group[0]), len(group)) for group in groups)
+
+
+def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
+    """Return the figures of the objectives at a candidate, SI."""
+    sampler = sampler_at(search.program, candidate.point.x)
+    if sampler is None:
+        return {}
+    return {objective.figure: objective.figure_of(sampler) for objective in search.program.objectives}
+
+
+def _is_there(candidate: Candidate, best: Candidate) -> bool:
+    """Say whether a solve ended in the best, or was left where it could only have ended there."""
+    if candidate.point.reached:
+        return compared(candidate, best) == 0
+    return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
+
+
+def _sought(search: Search) -> str:
+    """Return how far the best was sought, as a sentence that claims no more than was done."""
+    if search.stayed:
+        return "Solved again near the answer given; other basins were not looked at."
+    if search.program.single:
+        return f"No other basin was looked for: {search.program.single}."
+    solves, found = len(search.candidates), len(_optima(search))
+    reached = f"{solves} solve{'s' if solves > 1 else ''}"
+    ended = f"Best of {found} optima" if found > 1 else "The only optimum"
+    looked = f", {search.designs} designs sampled" if search.designs else ""
+    return f"{ended} reached by {reached}{looked}."
 
 
 def with_optimum(
@@ -171,74 +201,9 @@ def without_optimum(
     )
 
 
-LEAST_DIGITS, MOST_DIGITS = 4, 14
-"""Significant digits of a rounded design: numbers of fewer are nominal ones, such as 155 mm, meant as they stand; those
-of more are a computer's."""
-CONVERTED = 1e-15
-"""Relative; what a float of few digits may be off after its unit was converted: a few roundings."""
-
-Evaluate = Callable[[Mapping[str, float]], Evaluation]
-
-
-def told_apart(found: Evaluation, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluation:
-    """Return an evaluation that is not admissible with limits that say whether rounding alone exceeds them.
-
-    design: all of it by full names, SI; evaluate(design): the same evaluation of another design.
-    The reach of rounding is the sum of what half a unit of each number's last digit moves, the worst case.
-    """
-    reach = [0.0] * len(found.limits)
-    for name, step in roundings(scene, design).items():
-        moved = [_values(evaluate, {**design, name: design[name] + side * step}) for side in (1.0, -1.0)]
-        for k, limit in enumerate(found.limits):
-            changes = [abs(values[k] - limit.value) for values in moved if values]
-            reach[k] += max((change for change in changes if math.isfinite(change)), default=0.0)
-    pairs = zip(found.limits, reach, strict=True)
-    limits = tuple(replace(each, rounding=not each.ok and _excess(each) <= most) for each, most in pairs)
-    return replace(found, limits=limits)
-
-
-def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
-    """Return half a unit of each number's last digit, SI: all numbers have as many as the one that has the most.
-
-    Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
-    """
-    words, labels = Words(scene), numbers.labels(scene)
-    known = {name: words.kind(labels.get(name, name)) for name in design if _single(scene, name)}
-    sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in known.items()}
-    given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in known if design[name]}
-    most = max((count for count, _ in given.values()), default=0)
-    if most > MOST_DIGITS:
-        return {}
-    count = max(most, LEAST_DIGITS)
-    return {name: size * _half(design[name] / size, count) for name, (_, size) in given.items()}
-
-
-def digits(value: float) -> int:
-    """Return with how many significant digits a number was written, whatever zeros ended it; 17 for any float."""
-    few = range(1, MOST_DIGITS + 1)
-    return next((n for n in few if abs(float(f"{value:.{n}g}") - value) <= CONVERTED * abs(value)), 17)
-
-
-def _half(value: float, count: int) -> float:
-    """Return half a unit of the last of `count` significant digits."""
-    return 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - count + 1)
-
-
-def _single(scene: Scene, name: str) -> bool:
-    """Say whether a number of a design stands by itself, and is none of a list."""
-    return not any(name.startswith(f"{each}_") for each in scene.schema.lists)
-
-
-def _values(evaluate: Evaluate, design: Mapping[str, float]) -> list[float]:
-    """Return each limit's value of a design; none where it cannot move."""
-    try:
-        return [limit.value for limit in evaluate(design).limits]
-    except (ValueError, ZeroDivisionError, FloatingPointError):
-        return []
-
-
-def _excess(limit: Finding) -> float:
-    """Return by how much a limit is exceeded, SI; infinite where it has no value."""
-    low = -math.inf if limit.min is None else limit.min
-    high = math.inf if limit.max is None else limit.max
-    return max(low - limit.value, limit.value - high) if math.isfinite(limit.value) else math.inf
+def completed(answer: Solution, bound: GlobalBound | None, evaluations: int, seconds: Mapping[str, float]) -> Solution:
+    """Return an answer with what is proven of all designs, and what it cost: positions evaluated, and seconds."""
+    solver = {**answer.solver, "evaluations": evaluations}
+    if answer.certificate:
+        solver["error_estimate"] = answer.certificate.error
+    return replace(answer, solver=solver, time=seconds, global_bound=bound)

@@ -63,7 +63,7 @@ class Words:
         """Return an SI value with its unit, as the designer writes it."""
         return show(value, self.unit(name), digits)
 
-    def bounded(self, name: str, value: float, side: int) -> str:
+    def outward(self, name: str, value: float, side: int) -> str:
         """Return an SI value that something never passes on a side, rounded outward, with its unit."""
         unit = self.unit(name)
         return show(outward(value / factor(unit), side) * factor(unit), unit)

@@ -30,7 +30,7 @@ from loomopt.solving.certificate.derivatives import Derivatives
 from loomopt.solving.certificate.feasible_curve import FeasibleCurve, Lagrangian, Verdict
 from loomopt.solving.certificate.kkt import Multipliers, System
 from loomopt.solving.certificate.valley import Closed
-from loomopt.solving.search import settle
+from loomopt.solving.search import tie_break
 
 FAINT = 1e-4
 """Curvature up to which a direction is looked along at PROBES, for what higher orders do there: at a step of 1e-2 a
@@ -254,7 +254,7 @@ def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Flo
         way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
         return np.asarray(way / np.linalg.norm(way))
 
-    moves = settle.unchanging(local.program, local.x, lambda move: _is_open(basis, along(move)))
+    moves = tie_break.unchanging(local.program, local.x, lambda move: _is_open(basis, along(move)))
     inside = [basis.T @ along(move) for move in moves]
     if not inside:
         return False

@@ -19,7 +19,7 @@ from loomopt.maths.systems import Number
 from loomopt.model.model import Integral
 from loomopt.model.program import Program
 from loomopt.model.reading import Reading
-from loomopt.model.sampling import Sampler, Tally
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Where
 
 MOST_BOXES, MEAN_BOXES = 20_000, 2048
@@ -111,7 +111,7 @@ class Boxes(Reading):
             self._read, self._read_of = {}, name
         ball = piece, centre, half
         if ball not in self._read:
-            Tally.positions += 1
+            self.sampler.session.positions += 1
             self._read[ball] = self._series(name, *ball)
         return sign * self._read[ball]
 

@@ -152,7 +152,7 @@ class Calls:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.ways:
             beside = self.ways.beside
-            return np.array(beside.excesses) if beside else np.ones(nlp.rows.extras)
+            return beside.extra if beside else np.ones(nlp.rows.extras)
         levels = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
         first = np.array([level.merit(sampler) / level.scale for level in levels])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)

@@ -182,7 +182,6 @@ def _ended(calls: Calls, result: _Round) -> Point:
             point,
             reached=result.violation <= STANDS,
             relaxed=_relaxed(program, answer.extra),
-            excesses=tuple(answer.extra.tolist()),
             binding=_binding(here),
         )
     x, touching = polish(calls, here.x, answer.extra, answer.multipliers, here.peaks)

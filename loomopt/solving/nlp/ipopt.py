@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from loomopt.model.sampling import Extreme, Sampler, Tally
+from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.rows import Multipliers
@@ -56,7 +56,7 @@ def run(
     if status in STOPPED:
         raise KeyboardInterrupt
     evaluated = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
-    Tally.positions += evaluated * max(1, sum(map(len, nodes)))
+    sampler.session.positions += evaluated * max(1, sum(map(len, nodes)))
     flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
     design, reached = nlp.rows.parted(flat)
     multipliers = Multipliers(nlp.rows, lam_x, lam_g)

@@ -1,6 +1,5 @@
 """From a program's structure to one parametric NLP: built once, solved for any numbers."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
@@ -73,8 +72,8 @@ def graph_size(program: Program, x: Mapping[str, float]) -> int | None:
     return int(ca.n_nodes(ca.vertcat(made.f, made.g)))
 
 
-CACHE_SIZE = 32
-"""NLPs that are kept; a study of many scenes meets no more structures at a time."""
+NLPS, CACHE_SIZE = "NLPs", 32
+"""What a session calls built NLPs, and how many it keeps; a study of many scenes meets no more structures at a time."""
 
 
 class Transcription:
@@ -134,9 +133,6 @@ class Transcription:
         return self._eliminated.curvature if self._eliminated else self._derivatives["hess_lag"]
 
 
-_cache: OrderedDict[Hashable, Transcription] = OrderedDict()
-
-
 def transcribe(
     program: Program,
     sampler: Sampler,
@@ -146,12 +142,11 @@ def transcribe(
 ) -> tuple[Transcription, bool]:
     """Return the NLP of a program's structure, and whether it had to be built; before: called where it has to be."""
     wanted = structure(program, sampler, slots, elastic)
-    if wanted.key in _cache:
-        _cache.move_to_end(wanted.key)
-        return _cache[wanted.key], False
-    if before:
-        before()
-    _cache[wanted.key] = Transcription(wanted)
-    if len(_cache) > CACHE_SIZE:
-        _cache.popitem(last=False)
-    return _cache[wanted.key], True
+
+    def built() -> Transcription:
+        if before:
+            before()
+        return Transcription(wanted)
+
+    nlp = sampler.session.kept(NLPS, CACHE_SIZE, wanted.key, built)
+    return nlp, nlp.structure is wanted

@@ -15,7 +15,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel
-from loomopt.solving.options import Everywhere
+from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
 from loomopt.solving.proof.rows import OpenError
 from loomopt.solving.proof.task import Task, reduced, silent
@@ -206,7 +206,7 @@ FIRST = 0.5
 """Share of the time after which a local solve is tried from the most promising open box."""
 
 
-def claimed(search: Search, asked: Everywhere, refused: str = "") -> tuple[Search, GlobalBound]:
+def claimed(search: Search, asked: GlobalProof, refused: str = "") -> tuple[Search, GlobalBound]:
     """Return what is proven of a search's best, and the search: with a better best where boxes led to one.
 
     refused: why nothing can be, "" where that is not known.
@@ -236,7 +236,7 @@ def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
     found = judged(tried(search, start))
     if not found.passed or found.best is None or search.best is None:
         return None
-    return found if compared(found.best.candidate, search.best.candidate) < 0 else None
+    return found if compared(found.best, search.best) < 0 else None
 
 
 def _bound(outcome: Outcome, boxes: int, began: float) -> GlobalBound:

@@ -19,6 +19,7 @@ from loomopt.model import model
 from loomopt.model.limits import CycleLimit, Limit
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
+from loomopt.model.session import working
 from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
@@ -32,6 +33,7 @@ RANK = {"proven": 0, "undecided": 1, "violated": 2}
 """Statuses from best to worst."""
 
 
+@working()
 def prove(
     scene: Scene,
     design: Mapping[str, float],

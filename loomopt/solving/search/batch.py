@@ -15,12 +15,12 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral
 from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, Reading, quadrature
-from loomopt.model.sampling import Sampler, Tally
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats, Node, Pieces, Where
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
 """A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
-steps, and starts kept of these and of those as drawn (benchmarks/attack.py)."""
+steps, and starts kept of these and of those as drawn (benchmarks/adversarial/attack.py)."""
 
 
 class BatchReading(Reading):
@@ -108,7 +108,7 @@ class Batch:
 
     def judged(self, x: Floats, directions: Floats | None = None) -> Judged:
         """Return what designs x, (designs, variables) SI, are worth; directions: (variables, n) for jets, SI."""
-        Tally.positions += len(x) * len(self.u)
+        self.like.session.positions += len(x) * len(self.u)
         with np.errstate(all="ignore"):
             reading = self._reading(x, directions)
             objectives = self.program.objectives if directions is None else ()

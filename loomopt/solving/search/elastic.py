@@ -17,6 +17,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
 from loomopt.solving.nlp.stations import families
+from loomopt.solving.search.search import Search
 
 
 def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Settings) -> Point | None:
@@ -26,7 +27,7 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     """
     best = None
     for start in starts:
-        known = Known(best.binding, sum(best.excesses) - NEEDED) if best else Known()
+        known = Known(best.binding, sum(best.extra.tolist()) - NEEDED) if best else Known()
         point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
         best = point if point.reached else best
         if best and not best.relaxed:
@@ -34,12 +35,14 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     return best
 
 
-def clash(program: Program, nearest: Point, settings: Settings, words: Words) -> Clash:
-    """Return the limits that clash and the least relaxations that make a design possible.
+def clash(search: Search, words: Words) -> Clash:
+    """Return the limits that clash and the least relaxations that make a design possible; none where one was reached.
 
-    nearest: where the sum of all excesses is least. First that sum's limits; then each other limit by itself, where
-    that suffices.
+    First the limits of the least sum of all excesses; then each other limit by itself, where that suffices.
     """
+    program, nearest, settings = search.program, search.nearest, search.settings
+    if search.best or nearest is None or not nearest.relaxed:
+        return Clash()
     needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
     known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
@@ -58,7 +61,7 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     With this limit all but free, the others' excesses fall to nothing exactly where it suffices; only then is its own
     least sought, with the others firm.
     """
-    count = len(nearest.excesses)
+    count = len(nearest.extra)
     free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
     screened = exchange.solve(program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(most=SCREENED))
     if not screened.reached:

@@ -4,14 +4,17 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from loomopt.model.model import with_words_fixed
+from loomopt.model.program import Program
+from loomopt.model.session import working
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
 from loomopt.solving.search.batch import SCREENED_STARTS
 from loomopt.solving.search.elastic import least
-from loomopt.solving.search.search import Candidate, OnStart, Search, at, compared, judged, tried
+from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 if TYPE_CHECKING:
     from loomopt.solving.search.screening import Screening
@@ -28,6 +31,47 @@ flips."""
 
 ELSEWHERE = 1e-3
 """Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
+
+
+RESOLVED = 5
+"""Times a search begins again with what its best needs of a steady state: each doubles it, from the fewest to the most.
+"""
+
+
+@working()
+def resolved(
+    search: Search,
+    starts: int | None = None,
+    seed: int = 0,
+    near: Sequence[Point] = (),
+    on_start: OnStart | None = None,
+) -> Search:
+    """Return how far a search comes, begun again as long as its best needs a finer steady state.
+
+    No scene is read, nothing is said in words. starts: so many, the job's own first, then random ones from `seed`; None
+    for a search of the best basin; near: where neighbours' solves ended, to start warm from; one of another structure
+    is left alone. Raises KeyboardInterrupt on Ctrl-C.
+    """
+    same = [point for point in near if point.structure == search.program.structure]
+    search = searched(search, starts, seed, same, on_start)
+    for _ in range(RESOLVED if search.best else 0):
+        finer = _finer(search)
+        if finer is search.program:
+            break
+        search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
+    return search
+
+
+def _finer(search: Search) -> Program:
+    """Return the program with what the steady state of a search's best needs; itself where it has that, or cannot."""
+    program, best = search.program, search.best
+    if not program.model.states or best is None:
+        return program
+    try:
+        model = with_words_fixed(program.model, {**program.parameters, **best.x})
+    except ArithmeticError:
+        return program
+    return program if model is program.model else replace(program, model=model)
 
 
 def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
@@ -171,55 +215,3 @@ def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
     nearest = least(search.program, places, search.settings)
     search = replace(search, nearest=nearest, sought=len(places), solved=search.solved + time.perf_counter() - began)
     return search if nearest is None or nearest.relaxed else tried(search, nearest.x)
-
-
-def search_counts(search: Search) -> dict[str, Any]:
-    """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
-    best = search.best
-    same = [c for c in search.candidates if _is_there(c, best.candidate)] if best else []
-    accuracy = search.settings.accuracy
-    counts = {
-        "starts": len(search.candidates) + search.sought,
-        "starts_at_best": len(same),
-        "basins": len(optima_found(search)),
-    }
-    return {**counts, "designs": search.designs, "accuracy": accuracy}
-
-
-def optima_found(search: Search) -> tuple[tuple[Mapping[str, float | None], int], ...]:
-    """Return figures of the distinct optima the starts ended in, best first, with how many starts did."""
-    groups: list[list[Candidate]] = []
-    for candidate in search.ranked:
-        if groups and compared(groups[-1][0], candidate) == 0:
-            groups[-1].append(candidate)
-        else:
-            groups.append([candidate])
-    return tuple((_figures(search, group[0]), len(group)) for group in groups)
-
-
-def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
-    """Return the figures of the objectives at a candidate, SI."""
-    sampler = sampler_at(search.program, candidate.point.x)
-    if sampler is None:
-        return {}
-    return {objective.figure: objective.figure_of(sampler) for objective in search.program.objectives}
-
-
-def _is_there(candidate: Candidate, best: Candidate) -> bool:
-    """Say whether a solve ended in the best, or was left where it could only have ended there."""
-    if candidate.point.reached:
-        return compared(candidate, best) == 0
-    return abs(candidate.point.value - best.value) <= SAME_OBJECTIVE
-
-
-def search_report(search: Search) -> str:
-    """Return how far the best was sought, as a sentence that claims no more than was done."""
-    if search.stayed:
-        return "Solved again near the answer given; other basins were not looked at."
-    if search.program.single:
-        return f"No other basin was looked for: {search.program.single}."
-    solves, found = len(search.candidates), len(optima_found(search))
-    reached = f"{solves} solve{'s' if solves > 1 else ''}"
-    ended = f"Best of {found} optima" if found > 1 else "The only optimum"
-    looked = f", {search.designs} designs sampled" if search.designs else ""
-    return f"{ended} reached by {reached}{looked}."

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.jobs import registry
 from loomopt.model import model
+from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.options import check_sought
@@ -92,7 +93,9 @@ def climbs(
     subject = Subject(scene)
     for make in ladders:
         for ladder in make(subject, full):
-            yield ladder, tuple(climbed(ladder, FULL_REPEATS if full else QUICK_REPEATS, on_run))
+            with working():
+                rows = tuple(climbed(ladder, FULL_REPEATS if full else QUICK_REPEATS, on_run))
+            yield ladder, rows
 
 
 def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Study:

@@ -15,7 +15,7 @@ import numpy as np
 
 from loomopt.base.errors import BadInput
 from loomopt.maths.systems import Number
-from loomopt.model.sampling import Tally
+from loomopt.model.session import current
 
 TIGHTER, NO_ORDER, STILL, ONE_ORDER, LEAST_ORDER = 100.0, 100 * 2.0**-52, 2.0, 1.25, 0.25
 """Work-precision rows: how many times better a reference is known than the error it judges; errors that are rounding;
@@ -107,13 +107,13 @@ def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None =
     for setting in ladder.settings:
         if on_run:
             on_run(f"{ladder.method} {told(setting)}")
-        before = Tally.positions
+        before = current().positions
         try:
             result = ladder.run(setting)
             seconds, evaluations = _cost(ladder, setting, repeats)
             outcome = ladder.read(setting, result)
         except FAILURES as error:
-            spent = Tally.positions - before
+            spent = current().positions - before
             words = " ".join(str(error).split()) or type(error).__name__
             for quantity in ladder.quantities:
                 yield Row(quantity, ladder.method, setting, None, None, spent, f"failed: {words}")
@@ -127,9 +127,9 @@ def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
     """Return the least time of the repeats, which end where they have taken long enough, and a run's evaluations."""
     least, spent, evaluations = math.inf, 0.0, 0
     for _ in range(repeats):
-        before, began = Tally.positions, time.perf_counter()
+        before, began = current().positions, time.perf_counter()
         result = ladder.run(setting)
-        took, evaluations = time.perf_counter() - began, Tally.positions - before
+        took, evaluations = time.perf_counter() - began, current().positions - before
         evaluations = ladder.counted(result) if ladder.counted else evaluations
         least, spent = min(least, took), spent + took
         if spent > BUDGET:

@@ -9,7 +9,7 @@ import numpy as np
 from loomopt.jobs.base import Crossing
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
-from loomopt.model.sampling import Sampler, Tally
+from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.solving.nlp import expressions
@@ -138,11 +138,11 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
     cycle = subject.sampler.cycle
 
     def displaced(moved: Floats) -> Floats:
-        Tally.positions += POSITIONS
+        subject.sampler.session.positions += POSITIONS
         return _each(subject.output(systems.numpy(), given, Node(moved, cycle.switch(pieces))).q, moved)
 
     def closed(_: str) -> dict[str, Any]:
-        Tally.positions += POSITIONS
+        subject.sampler.session.positions += POSITIONS
         return {name: _each(subject.output(systems.numpy(), given, Node(angles, cycle.switch(pieces))).q2, angles)}
 
     def formula(system: Maths, phi: Number, places: Sequence[Number]) -> Number:
@@ -154,7 +154,7 @@ def _derivatives(subject: Subject) -> Iterator[Ladder]:
         return expressions.second_derivative(formula, len(cycle.names))
 
     def differentiated(_: str) -> dict[str, Any]:
-        Tally.positions += POSITIONS
+        subject.sampler.session.positions += POSITIONS
         return {name: automatic()(angles, cycle.switches[pieces].T)}
 
     def differences(step: float) -> dict[str, Any]:
@@ -178,7 +178,7 @@ def _numbers(subject: Subject) -> Ladder:
     pieces, angles = subject.positions
 
     def run(system: str) -> dict[str, Any]:
-        Tally.positions += POSITIONS + len(known)
+        subject.sampler.session.positions += POSITIONS + len(known)
         exact = reference_digits.precise(sampler) if system == "mpmath 40" else sampler.read(systems.FLOAT)
         single = {figure: exact.single(figure) for figure in known}
         if system != "NumPy":

@@ -11,7 +11,7 @@ from loomopt.jobs import registry
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
+from loomopt.solving.answer import evaluation
 from loomopt.solving.answer.solution import Evaluation, Finding
 from loomopt.studies.run.rows import Row
 
@@ -221,4 +221,4 @@ def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evalua
     numbers = registry.of(scene).numbers(scene)
     lists = tuple(f"{name}_" for name in scene.schema.lists)
     own = {name: value for name, value in design.items() if scene.full(name) in numbers or name.startswith(lists)}
-    return engine.evaluate(scene, own, target)
+    return evaluation.evaluate(scene, own, target)

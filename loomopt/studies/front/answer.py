@@ -14,14 +14,15 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.answer import report
+from loomopt.solving.answer import evaluation, report
 from loomopt.solving.answer.solution import Clash, Evaluation, Finding, Solution
 from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp.point import Settings
-from loomopt.studies.front.solver import CAPPED, Asking, Reached, Solver
+from loomopt.solving.search import elastic, multistart
+from loomopt.solving.search.search import Search
+from loomopt.studies.front.solver import Asking, Reached, Solver, capped
 from loomopt.studies.run import warm
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Terms:
 
     def whole(self, design: Mapping[str, float]) -> Evaluation:
         """Return figures and limits of a design by full names, SI."""
-        found = report.evaluation(self.scene, self.job, self.base, design)
+        found = evaluation.evaluation(self.scene, self.job, self.base, design)
         limits = list(found.limits)
         for finding in (self._finding(cap, found, design) for cap in self.caps):
             same = next((k for k, limit in enumerate(limits) if limit.name == finding.name), len(limits))
@@ -111,7 +112,7 @@ def _tightest(one: Finding, *others: Finding) -> Finding:
 
 def _named(terms: Terms) -> tuple[Limit, ...]:
     """Return all limits, those on axes under the axis' own name where their row is the figure itself."""
-    plain = {axis.axis.name + CAPPED: axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
+    plain = {capped(axis): axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
     return tuple(replace(limit, name=plain.get(limit.name, limit.name)) for limit in terms.program.limits)
 
 
@@ -132,7 +133,7 @@ def answer(solver: Solver, target: str | None, found: Reached, asking: Asking, b
         if point:
             terms = Terms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))
-            certificate = certify(program, _exact(solver.job, program, point.x), solver.accuracy)
+            certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
             made = _certified(solver, terms, here, certificate, found, asking)
             return replace(made, point=point, time=_time(began, solved))
     terms = Terms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
@@ -153,14 +154,10 @@ def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
 
 def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
-    from loomopt.solving.search import elastic
-
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}
-    search = engine.solve_program(program, job, Settings(solver.accuracy), today=today)
-    if search.best or not (search.nearest and search.nearest.relaxed):
-        return Clash()
-    return elastic.clash(program, search.nearest, search.settings, Words(scene))
+    search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
+    return elastic.clash(search, Words(scene))
 
 
 def _certified(
@@ -182,14 +179,14 @@ def _certified(
     )
 
 
-def _exact(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return job.values(program, job.design(program, x))
 
 
 def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
     """Yield what binds, a limit on an axis as a limit of its figure."""
-    caps = {axis.axis.name + CAPPED: (axis, cap) for axis, cap in terms.caps}
+    caps = {capped(axis): (axis, cap) for axis, cap in terms.caps}
     for each in certificate.binding:
         if each.limit.name not in caps:
             yield each

@@ -7,10 +7,11 @@ is limited, a of the axis that is sought. A function of finished rows alone.
 import heapq
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.studies.run.rows import Row
+from loomopt.studies.run.findings import Change
+from loomopt.studies.run.rows import PEAK, Multiplier, Row, Side
 
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""
@@ -30,6 +31,23 @@ MOST_MORE = 3
 """Times the points asked for that rows may come to, with those that narrow changes down and those once dominated."""
 
 
+class Touched(NamedTuple):
+    """What is touched at a place in the cycle, so many times."""
+
+    side: Side
+    place: str
+    times: int
+
+    def written(self) -> tuple[str, str, int]:
+        """Return it as JSON data, from which `touched` makes it again."""
+        return self.side.text, self.place, self.times
+
+
+def touched(row: Row) -> tuple[Touched, ...]:
+    """Return what is touched at a certified row."""
+    return tuple(Touched(Side.read(side), place, times) for side, place, times in row.warm["active"])
+
+
 class Spot(NamedTuple):
     """A point of the front. point: its row's; b, a: its place; empty: up to where b may grow and nothing is better.
 
@@ -41,12 +59,7 @@ class Spot(NamedTuple):
     a: float
     empty: float
     slope: float
-    active: tuple[tuple[Any, ...], ...]
-
-    @property
-    def labels(self) -> set[str]:
-        """What is touched, by its own name."""
-        return {str(label) for label, *_ in self.active}
+    active: tuple[Touched, ...]
 
 
 class Scale(NamedTuple):
@@ -78,9 +91,19 @@ class Next(NamedTuple):
     fine: bool = False
 
 
+def sloped(axes: tuple[str, str]) -> Multiplier:
+    """Return what a row calls the slope of the first axis over the second."""
+    return Multiplier(axes[0], Side(axes[1]))
+
+
 def value(row: Row, axis: str) -> float:
     """Return an axis of a certified row, SI; of a magnitude without its sign."""
     return float(row.warm["axes"][axis])
+
+
+def values(rows: Sequence[Row], axis: str) -> list[float]:
+    """Return an axis of certified rows, SI."""
+    return [value(row, axis) for row in rows if row.certified]
 
 
 def spots(rows: Sequence[Row], scale: Scale) -> tuple[list[Spot], list[tuple[Row, int]]]:
@@ -104,8 +127,8 @@ def _spot(row: Row, scale: Scale) -> Spot:
     b, a = scale.position(1, value(row, scale.names[1])), scale.position(0, value(row, scale.names[0]))
     asked = row.place.get(scale.names[1])
     empty = b if asked is None else max(b, scale.position(1, asked))
-    slope = row.multipliers.get(" per ".join(scale.names), 0.0) * scale.width[1] / scale.width[0]
-    return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], tuple(map(tuple, row.warm["active"])))
+    slope = row.multipliers.get(sloped(scale.names), 0.0) * scale.width[1] / scale.width[0]
+    return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], touched(row))
 
 
 def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
@@ -188,7 +211,7 @@ def _narrowed(front: Sequence[Spot], missed: Sequence[float]) -> list[float]:
 
 def _changing(left: Spot, right: Spot) -> set[str]:
     """Return the names of what is touched at one of two points only, or elsewhere or otherwise often."""
-    return {str(label).rsplit(" ", 1)[0] for label, *_ in set(left.active) ^ set(right.active)}
+    return {each.side.limit for each in set(left.active) ^ set(right.active)}
 
 
 def _between(front: Sequence[Spot], b: float) -> Next:
@@ -207,10 +230,9 @@ def crossing(left: Spot, right: Spot) -> float | None:
     return found if left.b < found < right.b else None
 
 
-def told(front: Sequence[Spot], scale: Scale) -> tuple[list[dict[str, Any]], list[tuple[float, float]]]:
+def told(front: Sequence[Spot], scale: Scale) -> tuple[list[Change], list[tuple[float, float]]]:
     """Return what changes along the front, and the stretches of b where nothing is better, SI, in the order of b."""
-    changes, gaps = [], []
-    ends = set(scale.names)
+    changes, gaps = list[Change](), list[tuple[float, float]]()
     for left, right in itertools.pairwise(front):
         jumps = right.b - left.b > NARROW and right.b - left.empty <= 2 * NARROW and left.empty > left.b + NARROW
         jumps = jumps or (right.b - left.b <= 2 * NARROW and _sheer(left, right))
@@ -218,16 +240,16 @@ def told(front: Sequence[Spot], scale: Scale) -> tuple[list[dict[str, Any]], lis
             gaps.append((scale.figure(1, left.b), scale.figure(1, right.b)))
         if left is front[0] and len(_changing(left, right)) == 1:
             continue
-        moved = {str(label) for label, *_ in set(left.active) ^ set(right.active)}
-        limits = sorted(label for label in moved if label.rsplit(" ", 1)[0] not in ends or label.endswith(" peak"))
+        moved = {each.side for each in set(left.active) ^ set(right.active)}
+        limits = [side for side in moved if side.limit not in scale.names or side.end == PEAK]
         if not jumps and not limits:
             continue
         at = right.b if right is front[-1] and len(_changing(left, right)) == 1 else crossing(left, right)
         narrow = right.b - left.b <= 2 * NARROW
         kind = "jump" if jumps else "kink" if (narrow and at is not None) or _stops(left, right, at) else "active set"
         place = right.b if jumps else (left.b + right.b) / 2 if at is None else at
-        between = [scale.figure(1, left.b), scale.figure(1, right.b)]
-        changes.append({"at": scale.figure(1, place), "kind": kind, "limits": limits, "between": between})
+        between = scale.figure(1, left.b), scale.figure(1, right.b)
+        changes.append(Change(between, kind, tuple(sorted(limits, key=lambda side: side.text)), scale.figure(1, place)))
     return changes, gaps
 
 

@@ -12,21 +12,26 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import report
-from loomopt.solving.certificate.active_set import Row as Touched
+from loomopt.solving.answer import evaluation
+from loomopt.solving.certificate.active_set import Row as ActiveRow
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import least_change
 from loomopt.solving.search.multistart import searched, spread, tied
-from loomopt.solving.search.search import Judged, Search, judged, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
+from loomopt.studies.front.plan import Touched, sloped
 from loomopt.studies.run import warm
+from loomopt.studies.run.rows import PEAK, Multiplier, Side
 
-CAPPED = " at most as asked"
-"""What the limit on an axis is called, after the axis."""
 RUNAWAY = 100.0
 """Natural sizes beyond which a variable without a bound has no end: no machine is so far from today's."""
-SIDES = {-1: "min", 0: "fixed", 1: "max"}
+ENDS = {-1: "min", 0: "fixed", 1: "max"}
+
+
+def capped(axis: Traded) -> str:
+    """Return what the limit on an axis is called."""
+    return f"{axis.axis.name} at most as asked"
 
 
 class Asking(NamedTuple):
@@ -49,7 +54,7 @@ class Reached:
     reason: str | None
     design: Mapping[str, Any] = field(default_factory=dict)
     figures: Mapping[str, float | None] = field(default_factory=dict)
-    multipliers: Mapping[str, float] = field(default_factory=dict)
+    multipliers: Mapping[Multiplier, float] = field(default_factory=dict)
     reached: Mapping[str, bool] = field(default_factory=dict)
     warm: Mapping[str, Any] = field(default_factory=dict)
 
@@ -68,9 +73,9 @@ class Solver:
         self.axes: tuple[Traded, Traded] = (axes[0], axes[1])
 
     @property
-    def slope(self) -> str:
+    def slope(self) -> Multiplier:
         """What a row calls the slope of the first axis over the second."""
-        return f"{self.axes[0].axis.name} per {self.axes[1].axis.name}"
+        return sloped((self.axes[0].axis.name, self.axes[1].axis.name))
 
     @property
     def held(self) -> int:
@@ -90,7 +95,7 @@ class Solver:
             limit
             for axis, cap in zip(self.axes, asking.caps, strict=True)
             if cap is not None
-            for limit in axis.limits(axis.axis.name + CAPPED, cap)
+            for limit in axis.limits(capped(axis), cap)
         ]
         levels = (*levels[:-2], *pair[: asking.levels])
         # What is traded is not left to the least change from today.
@@ -147,7 +152,7 @@ class Solver:
         """Say whether the limit on the other axis has a price at the level of the first."""
         sought, paid = self.axes[asking.first], self.axes[1 - asking.first]
         prices = search.best.certificate.binding if search.best else ()
-        cap, figure = paid.axis.name + CAPPED, sought.axis.name
+        cap, figure = capped(paid), sought.axis.name
         return any(price.limit.name == cap and price.objective.figure == figure for price in prices)
 
     def _told(self, search: Search, asking: Asking) -> Reached:
@@ -157,14 +162,14 @@ class Solver:
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        here = evaluation.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
         status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
-            "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
+            "point": warm.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
@@ -179,7 +184,7 @@ class Solver:
             told,
         )
 
-    def _held(self, search: Search, best: Judged, asking: Asking) -> str:
+    def _held(self, search: Search, best: Candidate, asking: Asking) -> str:
         """Return why the point does not count, though one may be there: an axis is above its cap; "" where it does."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, asking.caps, strict=True):
@@ -192,37 +197,37 @@ class Solver:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
         return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
-    def _multipliers(self, best: Judged, figures: Mapping[str, float], asking: Asking) -> dict[str, float]:
+    def _multipliers(self, best: Candidate, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
         sought, paid = self.axes
-        found: dict[str, float] = {}
-        slope, cap = 0.0, paid.axis.name + CAPPED
+        found: dict[Multiplier, float] = {}
+        slope, caps = 0.0, [capped(axis) for axis in self.axes]
         for price in best.certificate.binding:
-            if price.limit.name == cap:
+            if price.limit.name == capped(paid):
                 slope -= price.worth if price.objective.figure == sought.axis.name else 0.0
-            elif not price.limit.name.endswith(CAPPED):
-                name = f"{price.objective.figure} per {price.limit.name} {SIDES[price.side]}"
-                found[name] = found.get(name, 0.0) + price.worth
+            elif price.limit.name not in caps:
+                each = Multiplier(price.objective.figure, Side(price.limit.name, ENDS[price.side]))
+                found[each] = found.get(each, 0.0) + price.worth
         here = figures[paid.axis.name]
         told = {self.slope: sought.sign * slope * paid.slope(here) + 0.0} if asking.first == 0 else {}
         return {**told, **found}
 
-    def _active(self, program: Program, x: Mapping[str, float]) -> list[list[Any]]:
-        """Return what is touched, and where the first axis stands highest: label, place, how often."""
+    def _active(self, program: Program, x: Mapping[str, float]) -> list[tuple[str, str, int]]:
+        """Return what is touched, and where the first axis stands highest, as JSON data."""
         sampler = sampled(program.model, {**program.parameters, **x})
         found = active_set(replace(program, objectives=(self.axes[0].objective,)), sampler)
-        own = {f"{axis.axis.name}{more}" for axis in self.axes for more in (CAPPED, "")}
-        count: Counter[tuple[str, str]] = Counter()
+        own = {name for axis in self.axes for name in (axis.axis.name, capped(axis))}
+        count: Counter[tuple[Side, str]] = Counter()
         for row in found.rows[: found.limits]:
             limit = row.limit
             if limit and limit.name not in own and limit.row not in program.fixed:
-                count[f"{limit.name} {SIDES[limit.sign]}", _place(sampler, row)] += 1
+                count[Side(limit.name, ENDS[limit.sign]), _place(sampler, row)] += 1
         for k in found.levels[0]:
-            count[f"{self.axes[0].axis.name} peak", _place(sampler, found.rows[k])] += 1
-        return sorted([label, place, times] for (label, place), times in count.items())
+            count[Side(self.axes[0].axis.name, PEAK), _place(sampler, found.rows[k])] += 1
+        return sorted(Touched(side, place, times).written() for (side, place), times in count.items())
 
 
-def _place(sampler: Sampler, row: Touched) -> str:
+def _place(sampler: Sampler, row: ActiveRow) -> str:
     """Return where in the cycle a row stands, by the switches there and its sign; "" for a row of no angle."""
     if row.node is None:
         return f"{row.reads} {row.sign:+g}"

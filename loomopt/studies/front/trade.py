@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from loomopt.base.errors import BadInput
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
+from loomopt.model.session import working
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
 from loomopt.scenes import designs
@@ -24,7 +25,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.studies.front import answer, plan
 from loomopt.studies.front.plan import ENDS, Next, Scale
 from loomopt.studies.front.solver import Asking, Reached, Solver
-from loomopt.studies.run.findings import Change, Findings
+from loomopt.studies.run.findings import Findings
 from loomopt.studies.run.rows import Row, Task
 
 PLAN = 4
@@ -89,7 +90,7 @@ class Trade:
     @property
     def shown(self) -> list[str]:
         """The slope of the front."""
-        return [self.solver.slope]
+        return [self.solver.slope.text]
 
     @property
     def size(self) -> None:
@@ -216,15 +217,15 @@ class Trade:
     def read(self, rows: Sequence[Row]) -> Findings:
         """Return the points of the front in the order of the second axis, then those without a design."""
         found = read_front(self, rows)
-        changes = (Change(each["between"], each["kind"], tuple(each["limits"]), each["at"]) for each in found.changes)
-        slope = f"{self.solver.slope} is the slope of the front."
-        message = f"{found.message} {slope}" if len(found.values(self.axes[1])) > 1 else found.message
-        return Findings(found.rows, message, tuple(changes), found.gaps)
+        slope = f"{self.solver.slope.text} is the slope of the front."
+        several = len(plan.values(found.rows, self.axes[1])) > 1
+        return found._replace(message=f"{found.message} {slope}") if several else found
 
     def scene_at(self, point: int) -> Scene:
         """Return the scene: all designs of the front stand in it."""
         return self.scene
 
+    @working()
     def solve(self, task: Task, parent: Row | None) -> Solution:
         """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()
@@ -319,38 +320,20 @@ UNSEEN = 1e-6
 """Share of an axis' natural size that shown digits do not tell: six of them."""
 
 
-@dataclass(frozen=True)
-class Front:
-    """A front: its rows in the order of the second axis, then those without a design; SI.
-
-    message: what it comes to in a sentence; changes, gaps: of contract.
-    """
-
-    trade: "Trade"
-    rows: tuple[Row, ...]
-    message: str
-    changes: tuple[Mapping[str, Any], ...] = ()
-    gaps: tuple[tuple[float, float], ...] = ()
-
-    def values(self, axis: str) -> list[float]:
-        """Return an axis of the certified rows, SI."""
-        return [plan.value(row, axis) for row in self.rows if row.certified]
-
-
-def read_front(study: "Trade", rows: Sequence[Row]) -> Front:
-    """Return the front that finished rows make."""
+def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
+    """Return the front that finished rows make: in the order of the second axis, then those without a design."""
     by_point = {row.point: row for row in rows}
     failed = tuple(row for row in rows if not row.certified)
     if not all(end in by_point for end in ENDS):
-        return Front(study, tuple(rows), "No front yet: an end is not solved.")
+        return Findings(tuple(rows), "No front yet: an end is not solved.")
     if not all(by_point[end].certified for end in ENDS):
         found = [row for row in rows if row.certified]
-        return Front(study, (*found, *failed), "No front: an end has no certified design.")
+        return Findings((*found, *failed), "No front: an end has no certified design.")
     scale = study.scale(rows)
     first, second = study.labels
     if not all(scale.width):
         said = f"{first} and {second} do not conflict: one design is best in both."
-        return Front(study, (by_point[ENDS[0]],), said + _apart(study, rows))
+        return Findings((by_point[ENDS[0]],), said + _apart(study, rows))
     spots, _ = plan.spots(rows, scale)
     changes, gaps = plan.told(spots, scale)
     best = tuple(by_point[spot.point] for spot in spots)
@@ -358,8 +341,8 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Front:
     message += _apart(study, rows)
     # In the order of the figure itself, whichever way is sought.
     order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
-    changes.sort(key=lambda change: change["at"])
-    return Front(study, (*order, *failed), message, tuple(changes), tuple(sorted(gaps)))
+    changes.sort(key=lambda change: change.at or 0.0)
+    return Findings((*order, *failed), message, tuple(changes), tuple(sorted(gaps)))
 
 
 def _apart(study: "Trade", rows: Sequence[Row]) -> str:

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution
-from loomopt.studies.run.rows import Row, Study, Task
+from loomopt.studies.run.rows import Row, Side, Study, Task
 
 
 class Change(NamedTuple):
@@ -16,13 +16,13 @@ class Change(NamedTuple):
 
     between: tuple[float, float]
     kind: str
-    limits: tuple[str, ...]
+    limits: tuple[Side, ...]
     at: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         """Return it as JSON data."""
         at = self.between if self.at is None else self.at
-        found: dict[str, object] = {"at": at, "kind": self.kind, "limits": self.limits}
+        found: dict[str, object] = {"at": at, "kind": self.kind, "limits": tuple(side.text for side in self.limits)}
         return found if self.at is None else {**found, "between": self.between}
 
 

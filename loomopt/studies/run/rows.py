@@ -2,12 +2,51 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from loomopt.base.records import freeze
 
 UNTIMED = "seconds"
 """The one part of a row that is not the same each time."""
+PEAK = "peak"
+"""The end at which a figure is touched where it stands highest in the cycle."""
+ENDS = frozenset({"min", "max", "fixed", PEAK})
+
+
+class Side(NamedTuple):
+    """One side of a limit or figure; end: one of `ENDS`, "" for the limit alone."""
+
+    limit: str
+    end: str = ""
+
+    @property
+    def text(self) -> str:
+        """What JSON data call it."""
+        return f"{self.limit} {self.end}" if self.end else self.limit
+
+    @classmethod
+    def read(cls, text: str) -> "Side":
+        """Return the side that a text names."""
+        limit, _, end = text.rpartition(" ")
+        return cls(limit, end) if end in ENDS else cls(text)
+
+
+class Multiplier(NamedTuple):
+    """Fall of a figure per unit that a side of a limit is loosened; along a front a slope, the limit another figure."""
+
+    figure: str
+    side: Side
+
+    @property
+    def text(self) -> str:
+        """What JSON data and the heads of columns call it."""
+        return f"{self.figure} per {self.side.text}"
+
+    @classmethod
+    def read(cls, text: str) -> "Multiplier":
+        """Return the multiplier that a text names."""
+        figure, _, side = text.partition(" per ")
+        return cls(figure, Side.read(side))
 
 
 @dataclass(frozen=True)
@@ -15,9 +54,8 @@ class Row:
     """What came of one point of a study; numbers SI.
 
     point: its number in the plan; place: what was asked, by scene key or axis; parent: the point that it started warm
-    from, None for one that started cold; status: as of a solve; reason: why it is not optimal; multipliers: "FIGURE per
-    LIMIT SIDE" → fall of the figure per unit the limit is loosened, along a front "FIGURE per OTHER" → its slope;
-    reached: goals of the target, met or not; warm: JSON data from which a neighbour can start.
+    from, None for one that started cold; status: as of a solve; reason: why it is not optimal; reached: goals of the
+    target, met or not; warm: JSON data from which a neighbour can start.
     """
 
     point: int
@@ -27,7 +65,7 @@ class Row:
     reason: str | None
     design: Mapping[str, float] = field(default_factory=dict)
     figures: Mapping[str, float | None] = field(default_factory=dict)
-    multipliers: Mapping[str, float] = field(default_factory=dict)
+    multipliers: Mapping[Multiplier, float] = field(default_factory=dict)
     reached: Mapping[str, bool] = field(default_factory=dict)
     certified: bool = False
     seconds: float = 0.0
@@ -39,28 +77,17 @@ class Row:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data from which `from_dict` makes the same row, bit by bit."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
+        told = {each.text: value for each, value in self.multipliers.items()}
+        return {each.name: getattr(self, each.name) for each in fields(self)} | {"multipliers": told}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Row":
         """Return the row that JSON data say."""
-        return cls(**data)
+        return cls(**{**data, "multipliers": {Multiplier.read(each): v for each, v in data["multipliers"].items()}})
 
     def told(self) -> dict[str, Any]:
         """Return what `--json` prints of it: all but what only a neighbour needs."""
         return {name: value for name, value in self.as_dict().items() if name != "warm"}
-
-
-def priced(figure: str, limit: str, side: str) -> str:
-    """Return the name of a multiplier."""
-    return f"{figure} per {limit} {side}"
-
-
-def parts(multiplier: str) -> tuple[str, str, str]:
-    """Return figure, limit and side of a multiplier's name; of a slope the other figure, and no side."""
-    figure, _, limit = multiplier.partition(" per ")
-    name, _, side = limit.rpartition(" ")
-    return (figure, name, side) if name else (figure, side, "")
 
 
 def digest(rows: Iterable[Row]) -> str:

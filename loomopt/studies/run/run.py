@@ -2,7 +2,6 @@
 
 import functools
 import pickle
-import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from loomopt.base.refusals import refusal
+from loomopt.model.session import working
 from loomopt.studies.run.rows import Row, Study, Task
 
 if TYPE_CHECKING:
@@ -76,15 +76,12 @@ KILLED = "KilledWorker"
 """What Dask raises for a task of which worker after worker has died."""
 DIED = f"the process that solved it died {MOST_DEATHS} times: out of memory?"
 
-_ALONE = threading.Lock()
-"""Solvers and samples are kept for the next solve, so that one process does one at a time."""
-
 
 def solved(study: bytes, task: "Task", parent: "Row | None") -> str:
     """Return the row of a task as JSON text; what goes wrong is a failed row with its reason."""
     import json
 
-    with _ALONE:
+    with working():
         began = time.perf_counter()
         try:
             row = _unpickled(study).solved(task, parent)

@@ -15,10 +15,11 @@ from loomopt.interface import tables
 from loomopt.interface.figures import curves
 from loomopt.interface.files import outputs
 from loomopt.jobs import registry
+from loomopt.picture.job_views import Marks, Span
 from loomopt.picture.panels import Panel
 from loomopt.scenes import packaged
 
-MARKS = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse begins": 0.89, "pulse ends": 1.41}
+MARKS: Marks = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse": Span(0.89, 1.41)}
 JOBS = ("beatup", "rapier", "shedding")
 EFFECTS = {
     "beatup": ("rocker_inertia", "gravity", "bearing_friction", "centrifugal", "rod_inertia", "counterweight_inertia"),
@@ -219,14 +220,13 @@ def test_marks_and_pulse_are_found_a_turn_later_on_an_axis_that_starts_late(fram
 
 def test_a_stretch_through_zero_is_shaded_on_both_sides_and_undefined_marks_are_left_out(frame):
     marks = {"front dead centre": 0.0, "hand-over": np.radians(182.5), "lost": float("nan")}
-    marks |= {"dwell begins": np.radians(323.4), "dwell ends": np.radians(35.9), "pause before begins": 5.0}
+    marks |= {"dwell": Span(np.radians(323.4), np.radians(35.9))}
     axes = curves.curves(frame, None, "t", marks).axes[0]
     spans = sorted((patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches)
     assert spans == [pytest.approx((0, 35.9)), pytest.approx((323.4, 360))]
     upright = sorted(line.get_xdata()[0] for line in axes.lines if np.ptp(line.get_xdata()) == 0)
-    assert upright == pytest.approx([0, 182.5, np.degrees(5.0), 360])
-    names = {"front dead centre", "hand-over", "dwell", "pause before begins"}
-    assert {text.get_text() for text in axes.texts} == names
+    assert upright == pytest.approx([0, 182.5, 360])
+    assert {text.get_text() for text in axes.texts} == {"front dead centre", "hand-over", "dwell"}
 
 
 def test_a_level_far_from_the_curves_is_said_not_drawn(frame):

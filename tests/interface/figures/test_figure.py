@@ -11,9 +11,10 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.figures import curves, figure
 from loomopt.interface.files import svg
 from loomopt.jobs.beatup import drawing as crank_rocker_drawing
+from loomopt.picture.job_views import Marks, Span
 
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}
-MARKS = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse begins": 0.89, "pulse ends": 1.41}
+MARKS: Marks = {"front dead centre": 1.15, "rear dead centre": 4.25, "pulse": Span(0.89, 1.41)}
 MAGIC = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<"}
 
 

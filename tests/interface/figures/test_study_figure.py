@@ -12,6 +12,7 @@ from loomopt.base.errors import BadInput
 from loomopt.interface.figures import study
 from loomopt.studies import sweep
 from loomopt.studies.front import front
+from loomopt.studies.front.plan import sloped
 from loomopt.studies.run.rows import Row
 
 PLAN = sweep.planned(lo.load("beatup"), {"operation.M0": "700:740:10 N*m"}, "torque")
@@ -67,7 +68,7 @@ def spot(point, asked, mass, peak, active):
     touched = [[f"{name}", "", 1] for name in active]
     warm = {"axes": {"m4e": mass, "peak_torque": peak}, "active": touched, "again": None, "near": None, "fine": None}
     place = {} if asked is None else {"m4e": asked}
-    slope = {"peak_torque per m4e": -1.0}
+    slope = {sloped(("peak_torque", "m4e")): -1.0}
     design = dict(TODAY.design) | {"m4e": mass}
     return Row(point, place, None, "optimal", None, design, {"peak_torque": peak}, slope, {}, True, 0.0, warm)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference import crank_rocker_synthesis
 from support import clear
 
 import loomopt as lo
@@ -17,6 +16,7 @@ from loomopt.jobs.beatup import drawing as crank_rocker_drawing
 from loomopt.picture import shapes
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Arc, Circle, Line, Point, Text
+from reference import crank_rocker_synthesis
 
 few = settings(max_examples=30, deadline=None, database=None)
 PAPER = {"l1": 0.031, "l2": 0.065, "l3": 0.155, "l4": 0.167}

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import pytest
-from reference.beatup import DESIGN, Machine
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.objectives import Value
 from loomopt.solving.nlp import exchange
+from reference.beatup import DESIGN, Machine
 
 BEST = {600: (-76.9811021, 82.3371385326), 745: (0.0, 88.6894134918), 800: (0.0, 96.8757999181)}
 BEST[900] = (28.4966062, 122.3346355196)

@@ -10,9 +10,9 @@ import sys
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference.beatup import LENGTHS
 
 import loomopt as lo
+from reference.beatup import LENGTHS
 
 PER_METRE = {"mm": 1e3, "m": 1.0, "km": 1e-3, "inch": 1 / 0.0254, "ft": 1 / 0.3048}
 PER_KILOGRAM = {"kg": 1.0, "g": 1e3, "lb": 1 / 0.45359237}

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference.beatup import DESIGN, LENGTHS, Machine, dead_centres, least, least_peak, motion, random_designs
 
 import loomopt as lo
+from reference.beatup import DESIGN, LENGTHS, Machine, dead_centres, least, least_peak, motion, random_designs
 
 TARGETS = ("balance", "pulse", "torque", "retrofit")
 each_draw = pytest.mark.parametrize(

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.integrate
-from reference.beatup import DESIGN, Machine, dead_centres, least, least_peak, random_designs
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings, sampler_at
+from reference.beatup import DESIGN, Machine, dead_centres, least, least_peak, random_designs
 
 RESISTANCES = (600, 745, 800, 900)
 OPTIMAL = [(M0, target) for M0 in RESISTANCES for target in ("balance", "pulse")]

@@ -4,9 +4,9 @@ import itertools
 import math
 
 import pytest
-from reference.rapier import Drive
 
 import loomopt as lo
+from reference.rapier import Drive
 
 TABLE = range(25, 46, 2)
 

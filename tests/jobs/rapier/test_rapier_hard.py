@@ -4,10 +4,10 @@ import math
 import warnings
 
 import pytest
-from reference.rapier import LENGTHS, OPERATION
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from reference.rapier import LENGTHS, OPERATION
 
 HARD: dict[str, dict[str, object]] = {
     "second crank of no length": {"mechanism.l4": "1e-6 mm", "bounds.l4": "1e-6 mm"},

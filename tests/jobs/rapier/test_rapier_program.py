@@ -6,7 +6,7 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.jobs.rapier.design import read
+from loomopt.jobs.rapier.model import read
 from loomopt.jobs.rapier.program import constructed
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.objectives import Peak, Value

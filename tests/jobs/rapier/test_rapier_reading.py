@@ -10,7 +10,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.rapier import design as rapier_design
+from loomopt.jobs.rapier import model as rapier_model
 from loomopt.maths import systems, turning_points
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
@@ -119,7 +119,7 @@ def drive(which):
 
 def read(design, s_dwell=None):
     scene = SCENE if s_dwell is None else SCENE.set("operation.s_dwell", f"{s_dwell!r} m")
-    return rapier_design.read(JOB.sampler(scene, design))
+    return rapier_model.read(JOB.sampler(scene, design))
 
 
 @pytest.mark.parametrize("which", designs())
@@ -189,7 +189,7 @@ def test_the_scene_without_s_dwell_has_a_stroke_and_no_dwell():
     values = {name: value for name, value in sampled.given.values.items() if isinstance(value, float)}
     del values["s_dwell"]
     model = dataclasses.replace(sampled.model, arcs=())
-    found = rapier_design.read(Sampler(model, values))
+    found = rapier_model.read(Sampler(model, values))
     assert found.stroke == read({}).stroke
     assert math.isnan(found.dwell_after)
     assert math.isnan(found.dwell_before)

@@ -3,9 +3,9 @@
 import math
 
 import pytest
-from reference.rapier import Drive, times
 
 import loomopt as lo
+from reference.rapier import Drive, times
 
 PAPER_PEAK = 0.879135
 """Peak |S''| of the paper's own layout, m/rad² [Hong17, recomputed from its printed dimensions]."""

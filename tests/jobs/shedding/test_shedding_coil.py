@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from coil_by_hand import Contact, Steel, hook, length, lightest, mass, rate, shear, softest, surge, tensile, winding
 from support.shedding_cases import plain, product
 
 import loomopt as lo
 from loomopt.physics.mechanisms.tension_spring import WIRES
-from loomopt.solving.engine import evaluate
+from loomopt.solving.answer.evaluation import evaluate
+from reference.coils import Contact, Steel, hook, length, lightest, mass, rate, shear, softest, surge, tensile, winding
 
 STEEL = Steel()
 SOLD = [wire for wire in WIRES if 0.002 <= wire <= 0.0095]

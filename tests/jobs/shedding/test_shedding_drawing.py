@@ -1,5 +1,6 @@
 """The cam for the workshop: DXF and CSV read back and compared with a cam made of plain rotated vectors."""
 
+import functools
 import importlib
 import io
 import math
@@ -9,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from reference import cam as plain_cam
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
@@ -21,11 +21,14 @@ from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 from loomopt.scenes import designs
+from reference import cam as plain_cam
+from reference import shedding
 
 ezdxf: Any = importlib.import_module("ezdxf")
 
 FOLLOWER = ("arm", "centre_distance", "base_radius", "roller_radius", "arm_swing")
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
+CYCLOIDAL, HARMONIC = (functools.partial(law, np) for law in (shedding.cycloidal, shedding.harmonic))
 PACKAGED = ("shedding", "shedding-static", "shedding-printed-travel")
 MICROMETRE = 1e-3
 """mm."""
@@ -43,12 +46,12 @@ def knots():
 
 
 CAMS = {
-    "packaged": ({}, {}, plain_cam.cycloidal),
-    "harmonic": ({"mechanism.law": "harmonic"} | angles(100, 70, 130, 60), {}, plain_cam.harmonic),
-    "undercut": ({"mechanism.roller_radius": "20 mm"} | angles(40, 20, 30, 270), {}, plain_cam.cycloidal),
-    "no dwell": (angles(150, 0, 210, 0), {}, plain_cam.cycloidal),
+    "packaged": ({}, {}, CYCLOIDAL),
+    "harmonic": ({"mechanism.law": "harmonic"} | angles(100, 70, 130, 60), {}, HARMONIC),
+    "undercut": ({"mechanism.roller_radius": "20 mm"} | angles(40, 20, 30, 270), {}, CYCLOIDAL),
+    "no dwell": (angles(150, 0, 210, 0), {}, CYCLOIDAL),
     "free law": ({}, {"law": knots()}, plain_cam.spline(knots())),
-    "narrow": ({"mechanism.base_radius": "90 mm"} | angles(170, 10, 8, 172), {}, plain_cam.harmonic),
+    "narrow": ({"mechanism.base_radius": "90 mm"} | angles(170, 10, 8, 172), {}, HARMONIC),
 }
 CAMS["narrow"][0]["mechanism.law"] = "harmonic"
 
@@ -142,7 +145,7 @@ def test_the_positions_are_the_dwells_and_the_least_cam_force():
         "far dwell": pytest.approx(math.radians(150)),
         "least cam force": least,
     }
-    _, centre, profile, *_ = plain(scene, plain_cam.cycloidal, np.array(list(found.theta.values())))
+    _, centre, profile, *_ = plain(scene, CYCLOIDAL, np.array(list(found.theta.values())))
     for at, middle, touched in zip(found.skeleton.joints.values(), centre, profile, strict=True):
         assert at["C"] == pytest.approx(tuple(middle / 1e3), abs=1e-12)
         assert at["T"] == pytest.approx(tuple(touched / 1e3), abs=1e-12)

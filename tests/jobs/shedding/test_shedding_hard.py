@@ -5,12 +5,14 @@ import warnings
 from dataclasses import replace
 
 import pytest
-from support.shedding_by_hand import peak, plain, product, softest
+from support.shedding_cases import framed
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import certify
+from reference import shedding as plain
+from reference.cam_force import peak, softest
 
 PAPER = plain.PAPER
 H, X0_MAX = PAPER.travel, PAPER.X0
@@ -102,7 +104,7 @@ def test_the_papers_spring_is_told_what_each_limit_by_itself_would_have_to_give(
 
 
 def test_a_limit_on_the_springs_length_takes_preload():
-    answer = solved(product(PAPER).set("limits.spring_stretch.max", "120 mm"))
+    answer = solved(framed(PAPER).set("limits.spring_stretch.max", "120 mm"))
     assert answer.figures["spring_stretch"] == pytest.approx(0.12, rel=1e-9)
     assert answer.figures["K1"] == pytest.approx(softest(PAPER, 0.12 - H), rel=1e-9)
     price = next(price for price in answer.binding if price.limit == "spring_stretch")
@@ -121,14 +123,14 @@ def halved(above, low, high):
 def test_a_limit_on_the_cam_force_asks_for_a_stiffer_spring():
     """Less preload, more stiffness: the preload at which the softest spring has that peak, by bisection."""
     X0 = halved(lambda x: peak(PAPER, softest(PAPER, x), x) > 20e3, 0.003, X0_MAX)
-    answer = solved(product(PAPER).set("limits.contact_max.max", "20 kN"))
+    answer = solved(framed(PAPER).set("limits.contact_max.max", "20 kN"))
     assert answer.figures["contact_max"] == pytest.approx(20e3, rel=1e-9)
     assert [answer.design["K1"], answer.design["X0"]] == pytest.approx([softest(PAPER, X0), X0], rel=1e-8)
 
 
 def test_a_limit_on_the_spring_force_is_held_by_the_least_peak_force():
     X0 = halved(lambda x: softest(PAPER, x) * (x + H) < 15.8e3, 0.001, X0_MAX)
-    answer = solved(product(PAPER).set("limits.spring_force_max.max", "15.8 kN"), "force")
+    answer = solved(framed(PAPER).set("limits.spring_force_max.max", "15.8 kN"), "force")
     assert answer.figures["spring_force_max"] == pytest.approx(15.8e3, rel=1e-9)
     assert [answer.design["K1"], answer.design["X0"]] == pytest.approx([softest(PAPER, X0), X0], rel=1e-7)
     assert answer.figures["contact_max"] == pytest.approx(peak(PAPER, softest(PAPER, X0), X0), rel=1e-9)
@@ -136,7 +138,7 @@ def test_a_limit_on_the_spring_force_is_held_by_the_least_peak_force():
 
 @pytest.mark.parametrize("least", ["0 N", "100 N"])
 def test_a_limit_on_the_least_cam_force_is_a_demand(least):
-    answer = solved(product(PAPER).set("limits.contact_min.min", least))
+    answer = solved(framed(PAPER).set("limits.contact_min.min", least))
     demanded = replace(PAPER, N_min=float(least[:-2]))
     assert answer.figures["K1"] == pytest.approx(float(plain.least_stiffness(demanded)[0]), rel=1e-9)
 
@@ -174,7 +176,7 @@ def test_dwells_that_may_vanish_do(angles, damping):
     """Undamped a half turn each is best, 46819.0998 N/m; damped the return takes a little more."""
     bounds = {f"bounds.{name}": {"min": "0 deg", "max": "350 deg"} for name in ("far_dwell", "near_dwell")}
     bounds |= {f"bounds.{name}": {"min": "10 deg", "max": "350 deg"} for name in ("rise", "return")}
-    answer = solved(product(replace(PAPER, angles=angles, C=damping)).update(bounds))
+    answer = solved(framed(replace(PAPER, angles=angles, C=damping)).update(bounds))
     rise, far, back, near = (math.degrees(answer.design[f]) for f in ("rise", "far_dwell", "return", "near_dwell"))
     assert [far, near] == pytest.approx([0, 0], abs=1e-6)
     turn = replace(PAPER, angles=(180, 0, 180, 0))

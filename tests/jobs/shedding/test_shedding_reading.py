@@ -4,10 +4,10 @@ import dataclasses
 import math
 
 import pytest
-from reference import shedding as plain
 
 import loomopt as lo
 from loomopt.jobs import registry
+from reference import shedding as plain
 
 FULL = lo.load("shedding").with_effect("damping").with_effect("dry_friction")
 JOB = registry.of(FULL)

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.shedding_by_hand import LAWS, RPM, lopsided, plain, product, through
+from support.shedding_cases import framed
 
 import loomopt as lo
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
+from reference import shedding as plain
+from reference.cam_force import RPM, lopsided, through
 
 PAPER, PRINTED, PRESSED = plain.PAPER, plain.PRINTED, plain.PRESSED
 PACKAGED = {"65.6 mm": "shedding", "14.5 mm": "shedding-printed-travel"}
@@ -32,7 +34,7 @@ def solved(scene):
 def assert_least(reference, scene=None, rel=1e-9):
     """Assert that the product's least spring and where it is needed are the reference's; return the answer."""
     K1, _, degrees = plain.least_stiffness(reference)
-    answer = solved(scene or product(reference))
+    answer = solved(scene or framed(reference))
     assert answer.figures["K1"] == pytest.approx(float(K1), rel=rel)
     assert answer.design["X0"] == pytest.approx(reference.X0, rel=1e-12)
     assert abs(answer.figures["contact_min"] - reference.N_min) <= 1e-9 * answer.figures["spring_force_max"]
@@ -98,21 +100,21 @@ def test_a_weight_that_presses_the_roller_on():
 
 def test_equal_points_all_get_it_wrong():
     """Too soft by 3.4e-2, 2.3e-3, 6.7e-7 and 6.7e-7: from 180 to 3600 points the nearest one does not move."""
-    exact = solved(product(PRESSED)).figures["K1"]
+    exact = solved(framed(PRESSED)).figures["K1"]
     errors = {count: plain.uniform_grid(PRESSED, count) / exact - 1 for count in (36, 72, 180, 3600)}
     known = {36: -3.4e-2, 72: -2.3e-3, 180: -6.744e-7, 3600: -6.744e-7}
     assert errors == {count: pytest.approx(error, rel=0.03) for count, error in known.items()}
     assert errors[180] == errors[3600]
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", plain.LAWS)
 @pytest.mark.parametrize("shape", ["linear", "step"])
 def test_every_law_with_uneven_rise_and_return(law, shape):
     more = {"C": 35, "F": 20, "N_min": 60} if shape == "linear" else {}
     assert_least(replace(PAPER, law=law, shape=shape, angles=(100, 70, 130, 60), **more))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", plain.LAWS)
 @pytest.mark.parametrize(
     "angles", [(120, 60, 5, 175), (10, 173.5, 120, 56.5)], ids=["return of 5 deg", "rise of 10 deg"]
 )
@@ -150,7 +152,7 @@ def test_a_law_from_a_table(tmp_path):
     rows = [f"{120 * a!r},{80 * b!r}" for a, b in zip(u.tolist(), s.tolist(), strict=True)]
     (tmp_path / "law.csv").write_text("\n".join(["angle [deg],s [mm]", *rows]), encoding="utf-8")
     reference = replace(PAPER, law=through(u, s), C=35)
-    scene = product(replace(reference, law="cycloidal"))
+    scene = framed(replace(reference, law="cycloidal"))
     scene = scene.update({"mechanism.law": "table", "mechanism.law_table": str(tmp_path / "law.csv")})
     assert_least(reference, scene)
 
@@ -202,6 +204,6 @@ def test_a_demanded_cam_force_is_kept():
 
 def test_a_frame_that_needs_no_spring_gets_none():
     """The weight presses more than inertia lifts: K1 = 0, and today's preload stays."""
-    answer = solved(product(replace(PRESSED, rpm=60, N_min=5, F=1)))
+    answer = solved(framed(replace(PRESSED, rpm=60, N_min=5, F=1)))
     assert answer.figures["K1"] == pytest.approx(0, abs=1e-9)
     assert answer.design["X0"] == pytest.approx(0.020, rel=1e-12)

@@ -4,9 +4,11 @@ import math
 from dataclasses import replace
 
 import pytest
-from support.shedding_by_hand import LAWS, RPM, least_peak, lopsided, peak, plain, product, softest
+from support.shedding_cases import framed
 
 import loomopt as lo
+from reference import shedding as plain
+from reference.cam_force import RPM, least_peak, lopsided, peak, softest
 
 PAPER, PRINTED, PRESSED = plain.PAPER, plain.PRINTED, plain.PRESSED
 MUCH = replace(PAPER, C=35, F=20, N_min=60, angles=(100, 70, 130, 60))
@@ -20,7 +22,7 @@ FRAMES = {
     "printed travel": PRINTED,
     "much": MUCH,
     "pressed": PRESSED,
-    "4567": replace(MUCH, law=LAWS[5]),
+    "4567": replace(MUCH, law=plain.LAWS[5]),
 }
 
 
@@ -58,7 +60,7 @@ def test_prices_of_the_least_stiffness_are_its_derivatives_in_closed_form(name):
     """Envelope theorem: −dk/dX0, dk/dN_min, dk/dtravel, dk/dω, the term of the governing angle alone."""
     reference = FRAMES[name]
     expected = {key: abs(float(value)) for key, value in plain.worths(reference).items()}
-    found = worths(solved(product(reference)))
+    found = worths(solved(framed(reference)))
     assert found == {
         "X0": pytest.approx(expected["X0"], rel=1e-8),
         "N_min": pytest.approx(expected["N_min"], rel=1e-8),
@@ -80,7 +82,7 @@ def test_prices_of_the_packaged_scene_are_the_known_ones():
 
 @pytest.mark.parametrize("reference", [replace(PAPER, N_min=20), MUCH], ids=["paper, a demand", "much"])
 def test_prices_of_the_least_stiffness_are_confirmed_by_solving_again(reference):
-    confirmed(product(reference), "stiffness", "K1", ("X0", "N_min", "travel", "speed"), 1e-6)
+    confirmed(framed(reference), "stiffness", "K1", ("X0", "N_min", "travel", "speed"), 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +101,7 @@ def test_prices_of_the_least_stiffness_are_confirmed_by_solving_again(reference)
 def test_the_least_peak_force_is_that_of_a_search_over_preload_and_stiffness(reference, known):
     """Known values: the linear programme in K1 and K1 X0 of tests/reference/shedding.py."""
     force, K1, X0 = least_peak(reference, reference.X0)
-    answer = solved(product(reference), "force")
+    answer = solved(framed(reference), "force")
     assert answer.figures["contact_max"] == pytest.approx(force, rel=1e-9)
     assert answer.figures["contact_max"] == pytest.approx(
         peak(reference, answer.figures["K1"], answer.figures["X0"]), rel=1e-9
@@ -132,7 +134,7 @@ def test_a_bound_on_the_stiffness_binds_the_least_peak_force():
 
 def test_prices_of_the_least_peak_force_are_confirmed_by_solving_again():
     """Where the preload is free, a demand of one newton more shifts all of the force by one."""
-    scene = product(MUCH)
+    scene = framed(MUCH)
     assert worths(solved(scene, "force"))["N_min"] == pytest.approx(1, rel=1e-9)
     confirmed(scene, "force", "contact_max", ("N_min", "travel", "speed"), 1e-5)
 
@@ -151,7 +153,7 @@ def test_prices_of_the_least_peak_force_are_confirmed_by_solving_again():
     ids=["paper", "by statics", "printed travel", "much", "pressed", "harmonic", "spline"],
 )
 def test_the_highest_speed_is_where_the_spring_becomes_the_least(reference, K1):
-    answer = solved(product(reference).set("mechanism.K1", f"{K1} N/m"), "speed")
+    answer = solved(framed(reference).set("mechanism.K1", f"{K1} N/m"), "speed")
     speed = answer.figures["contact_speed"]
     assert answer.design["speed"] == pytest.approx(speed, rel=1e-9)
     assert answer.design["K1"] == K1
@@ -178,7 +180,7 @@ def test_a_speed_that_is_bounded_stops_at_its_bound():
 def test_prices_of_the_highest_speed_are_those_of_the_least_stiffness_turned_round():
     """dω/dp = −(dk/dp)/(dk/dω), and 1/(dk/dω) for the stiffness itself."""
     reference = replace(PAPER, N_min=20)
-    scene = product(reference)
+    scene = framed(reference)
     answer = solved(scene, "speed")
     slopes = plain.worths(replace(reference, rpm=answer.figures["contact_speed"] / RPM))
     expected = {"K1": 1 / slopes["w"]} | {name: -slopes[name] / slopes["w"] for name in ("X0", "travel", "N_min")}

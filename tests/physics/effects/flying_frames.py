@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from reference.flight import Frame
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.physics.effects.shedding import separation
+from reference.flight import Frame
 
 RPM = math.pi / 30
 ON = lo.load("shedding").with_effect("separation")

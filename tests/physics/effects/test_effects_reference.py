@@ -12,12 +12,12 @@ import math
 from pathlib import Path
 
 import pytest
-from reference import effects as plain_effects
 
 from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Check, Event, Speed
+from reference import effects as plain_effects
 
 ROWS = [tuple(row.values()) for row in csv.DictReader((Path(__file__).parents[2] / "reference" / "effects.csv").open())]
 EFFECTS = {

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from flying_frames import CASES, JOB, ON, RPM, RUBBED, SLOW, SOFT, every, figures, followed
-from reference.flight import MP, Frame, flown, landed
 
 import loomopt as lo
 from loomopt.physics.effects.shedding import inertia, separation
+from reference.flight import MP, Frame, flown, landed
 
 
 @every

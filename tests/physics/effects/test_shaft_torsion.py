@@ -6,7 +6,6 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from reference import turn as plain_turn
 from twisting_shafts import (
     CENTRES,
     HALF,
@@ -28,6 +27,7 @@ from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import FLOAT
 from loomopt.model import model
 from loomopt.physics.cycle import TURN, Node
+from reference import turn as plain_turn
 
 TABLE = {
     (2e4, one_percent(2e4), True): (-1651.261880486, -0.0820964270, 192.496773, 1707.20032),

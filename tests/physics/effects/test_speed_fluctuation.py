@@ -6,7 +6,6 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from reference import turn as plain_turn
 from support import inch
 
 import loomopt as lo
@@ -18,6 +17,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.studies.accuracy import accuracy
 from loomopt.studies.front import front
+from reference import turn as plain_turn
 
 BEATUP = lo.load("beatup")
 JOB = registry.of(BEATUP)

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from reference import crank_rocker_synthesis
 
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from reference import crank_rocker_synthesis
 
 EPS = 2.0**-52
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)

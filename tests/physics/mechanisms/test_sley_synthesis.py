@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from reference.sley_synthesis import sley
 
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
+from reference.sley_synthesis import sley
 
 
 def test_the_papers_time_ratio_and_swing_give_the_exact_lengths():

@@ -166,5 +166,5 @@ def test_what_is_out_of_proportion_is_told_last(relaxations, order):
 
 
 @pytest.mark.parametrize(("side", "text"), [(-1, "76.9041 N*m"), (1, "76.9042 N*m")])
-def test_what_is_never_passed_is_rounded_outward(side, text):
-    assert Words(lo.load("beatup")).bounded("M3_fdc", 76.90412098, side) == text
+def test_what_is_never_passed_is_outward(side, text):
+    assert Words(lo.load("beatup")).outward("M3_fdc", 76.90412098, side) == text

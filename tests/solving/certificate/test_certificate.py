@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from reference.beatup import DESIGN, Machine, least, random_designs
 from support import toy
 
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import certify
+from reference.beatup import DESIGN, Machine, least, random_designs
 
 JOB = registry.find("beatup")
 ACCURACY = 1e-8

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from support import toy
 
 from loomopt.model.model import Integral
-from loomopt.model.sampling import Sampler, Tally
+from loomopt.model.sampling import Sampler
+from loomopt.model.session import current
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
 
@@ -88,9 +89,9 @@ def test_a_lowest_value_is_judged_with_its_sign():
 def test_what_a_wider_box_knows_of_the_bend_may_do():
     """u² ≤ 0.36 on 0.4 to 0.6: with a bend of 1 one reading, at the middle; with a coarse one the box's own too."""
     for bend, readings in ((1.0, 1), (30.0, 2)):
-        before = Tally.positions
+        before = current().positions
         assert box_of("square", 0.4, 0.6, 0.5, 0.36 + 1e-12, bend=bend) is True
-        assert Tally.positions - before == readings
+        assert current().positions - before == readings
         assert box_of("square", 0.4, 0.6, 0.5, 0.25 - 1e-9, bend=bend) is False
     assert box_of("square", 0.4, 0.6, 0.5, 0.36 - 1e-6, bend=30.0) is None
 
@@ -191,14 +192,14 @@ def test_a_wrong_hint_changes_no_verdict(sign, hints):
 def test_readings_are_counted_and_kept_for_the_other_sign(blind):
     """Of the five boxes of u² ≤ 0.6 two are read themselves, the others by the bend of those around them."""
     made = boxes()
-    before = Tally.positions
+    before = current().positions
     assert made.bound("square", 1.0, 0.6).boxes == 5
-    assert Tally.positions - before == 7
+    assert current().positions - before == 7
     made.bound("square", -1.0, 0.6)
-    assert Tally.positions - before == 7
+    assert current().positions - before == 7
     made.bound("hill", 1.0, 2.0)
     made.bound("square", -1.0, 0.6)
-    assert Tally.positions - before == 9, "only the last quantity's are"
+    assert current().positions - before == 9, "only the last quantity's are"
 
 
 def test_a_bound_is_given_up_after_as_many_boxes_as_allowed(blind, monkeypatch):

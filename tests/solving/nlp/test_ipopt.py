@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from waves import objective, program
 
-from loomopt.model.sampling import Tally
+from loomopt.model.session import current
 from loomopt.solving.nlp import ipopt
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Settings
@@ -91,12 +91,12 @@ def test_evaluations_are_counted_with_the_nodes_they_look_at(monkeypatch):
 
     counted = Counted(stats=lambda: {"return_status": "Solve_Succeeded", **calls_made})
     monkeypatch.setattr(nlp, "solver", lambda warm, settings: counted)
-    before = Tally.positions
+    before = current().positions
     assert ipopt.run(calls, nlp, sampler, X, extra, nodes, Multipliers()).iterations == 4
-    assert Tally.positions - before == 12 * 2
-    before = Tally.positions
+    assert current().positions - before == 12 * 2
+    before = current().positions
     del calls_made["iter_count"]
     assert ipopt.run(calls, nlp, sampler, X, extra, [[], []], Multipliers()).iterations == 0, (
         "it did not come to iterate"
     )
-    assert Tally.positions - before == 12, "a program without nodes is one position"
+    assert current().positions - before == 12, "a program without nodes is one position"

@@ -3,6 +3,7 @@
 import pytest
 from beatup_nlps import DESIGN, program_of, put
 
+from loomopt.model.session import current
 from loomopt.solving.nlp import transcribe as built
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.nlp.transcribe import transcribe
@@ -38,4 +39,4 @@ def test_no_more_programs_are_kept_than_there_is_room_for():
     for slots in range(6, 6 + built.CACHE_SIZE + 3):
         program = program_of((), "torque")
         transcribe(program, sampler_at(program, DESIGN), slots)
-    assert len(built._cache) <= built.CACHE_SIZE
+    assert current().count(built.NLPS) == built.CACHE_SIZE

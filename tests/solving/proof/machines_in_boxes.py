@@ -10,11 +10,11 @@ from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
-from loomopt.solving.engine import solve_program
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.proof import task
 from loomopt.solving.proof.levels import loosening
 from loomopt.solving.proof.task import Task, reduced
+from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search
 
 
@@ -43,7 +43,7 @@ def solved(name: str, target: str, *changes: str) -> Solved:
     scene = scene.update(numbers) if numbers else scene
     job = registry.of(scene)
     program = job.program(scene, target)
-    return Solved(job, program, solve_program(program, job, Settings()))
+    return Solved(job, program, resolved(Search(job, program, Settings())))
 
 
 def quietly(text: str) -> None:

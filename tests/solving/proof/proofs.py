@@ -4,9 +4,9 @@ import functools
 import math
 
 import numpy as np
-from support.shedding_by_hand import plain
 
 import loomopt as lo
+from reference import shedding as plain
 
 JOBS = ("beatup", "rapier", "shedding")
 SLACK = 1e-8

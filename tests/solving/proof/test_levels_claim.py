@@ -7,10 +7,10 @@ from machines_in_boxes import solved
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.solving.engine import solve_program
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.options import Everywhere
+from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.levels import Levels, Outcome, claimed
+from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search, objectives
 
 
@@ -18,16 +18,16 @@ def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
     """The best of narrower bounds, taken for the best of all: its certificate there passes by itself."""
     wide = solved("beatup", "torque")
     scene = lo.load("beatup").set("bounds.l3.min", "152 mm")
-    narrow = solve_program(registry.of(scene).program(scene, "torque"), wide.job, Settings())
+    narrow = resolved(Search(wide.job, registry.of(scene).program(scene, "torque"), Settings()))
     assert narrow.best is not None
-    here = narrow.best.candidate
+    here = narrow.best
     worse = replace(narrow, program=wide.program, candidates=(here,))
     assert worse.passed
-    found, bound = claimed(worse, Everywhere(1e-3, 60.0))
+    found, bound = claimed(worse, GlobalProof(1e-3, 60.0))
     assert bound.proven
     assert found.best is not None
-    assert found.best.candidate.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
-    assert found.best.candidate.objectives[0] < here.objectives[0] * (1 - 1e-3)
+    assert found.best.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
+    assert found.best.objectives[0] < here.objectives[0] * (1 - 1e-3)
 
 
 def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypatch):
@@ -35,11 +35,11 @@ def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypa
     wide = solved("beatup", "balance")
     worse = solved("beatup", "balance", "bounds.l3.min=152 mm")
     assert worse.search.best is not None
-    here = replace(worse.search, program=wide.program, candidates=(worse.search.best.candidate,))
+    here = replace(worse.search, program=wide.program, candidates=(worse.search.best,))
     monkeypatch.setattr(Levels, "run", lambda self, until, say: Outcome(why="open", lowest=wide.x))
-    found, _ = claimed(here, Everywhere(1e-3, 0.2))
+    found, _ = claimed(here, GlobalProof(1e-3, 0.2))
     assert found.best is not None
-    assert found.best.candidate.objectives[1] < here.best.candidate.objectives[1] - 1e-3
+    assert found.best.objectives[1] < here.best.objectives[1] - 1e-3
 
 
 def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
@@ -47,7 +47,7 @@ def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
     better = Outcome(better=found.x, why="a better design was found")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Levels, "run", lambda self, until, say: better)
-        search, bound = claimed(found.search, Everywhere())
+        search, bound = claimed(found.search, GlobalProof())
     assert search is found.search
     assert not bound.proven
     assert "no certified optimum was reached" in bound.why
@@ -56,7 +56,7 @@ def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
 def test_time_that_is_up_leaves_the_gap_and_the_answer():
     found = solved("beatup-light", "balance", "gravity")
     said: list[str] = []
-    search, bound = claimed(found.search, Everywhere(1e-5, 0.3, said.append))
+    search, bound = claimed(found.search, GlobalProof(1e-5, 0.3, said.append))
     assert search.best is not None
     assert not bound.proven
     assert bound.gap > 1e-5
@@ -72,7 +72,7 @@ def test_nothing_is_claimed_without_a_certified_answer_or_where_it_is_refused():
     found = solved("beatup", "balance")
     empty = Search(found.job, found.program, Settings())
     for search, refused, why in ((empty, "", "no certified answer"), (found.search, "sizes", "sizes")):
-        same, bound = claimed(search, Everywhere(), refused)
+        same, bound = claimed(search, GlobalProof(), refused)
         assert same is search
         assert why in bound.why
         said = bound.as_dict()
@@ -81,7 +81,7 @@ def test_nothing_is_claimed_without_a_certified_answer_or_where_it_is_refused():
 
 def test_a_proof_says_all_that_scripts_read():
     found = solved("beatup-light", "balance")
-    _, bound = claimed(found.search, Everywhere(1e-3))
+    _, bound = claimed(found.search, GlobalProof(1e-3))
     said = bound.as_dict()
     assert set(said) == {"proven", "gap", "bound", "band", "boxes", "seconds", "why"}
     assert said["proven"] is True

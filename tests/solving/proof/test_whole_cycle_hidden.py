@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from proofs import DWELL, FULL, SLACK, cam_force, found, proofs_of, solved, violated
-from reference.beatup import Machine
 from support import toy
-from support.shedding_by_hand import plain
 from support.shedding_cases import flat, freed, product
 
 import loomopt as lo
@@ -16,6 +14,8 @@ from loomopt.base.errors import BadInput
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import taylor_bounds
 from loomopt.solving.certificate.taylor_bounds import Boxes
+from reference import shedding as plain
+from reference.beatup import Machine
 
 # Effects, laws, coils ------------------------------------------------------------------------------------------------
 

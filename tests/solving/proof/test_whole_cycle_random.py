@@ -6,13 +6,14 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from proofs import FULL, cam_force, dense, found, solved
-from reference.beatup import Machine
-from reference.rapier import Drive
-from support.shedding_by_hand import RPM, lopsided, plain, softest
-from support.shedding_by_hand import product as framed
+from support.shedding_cases import framed
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from reference import shedding as plain
+from reference.beatup import Machine
+from reference.cam_force import RPM, lopsided, softest
+from reference.rapier import Drive
 
 near = st.floats(-0.05, 0.05)
 PEAK_ACCELERATION = "limits.peak_acceleration.max", "m/rad^2"

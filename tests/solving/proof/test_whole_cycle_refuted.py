@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from proofs import CLAIMED, JOBS, SLACK, cam_force, dense, found, solved, violated
-from reference.beatup import Machine
-from reference.rapier import Drive
-from support.shedding_by_hand import lopsided, plain
-from support.shedding_by_hand import product as framed
-from support.shedding_cases import product
+from support.shedding_cases import framed, product
 
 import loomopt as lo
 from loomopt.model.sampling import Sampler
 from loomopt.scenes.packaged import problems
+from reference import shedding as plain
+from reference.beatup import Machine
+from reference.cam_force import lopsided
+from reference.rapier import Drive
 
 
 @pytest.mark.parametrize("name", [name for name in problems() if name != "beatup-light"])

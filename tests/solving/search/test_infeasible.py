@@ -5,10 +5,10 @@ import json
 import math
 
 import pytest
-from reference.beatup import DESIGN
 
 import loomopt as lo
 from loomopt.solving.answer.solution import remedies
+from reference.beatup import DESIGN
 
 TIGHT: dict[str, tuple[str, dict[str, object], str]] = {
     "light, torque": ("beatup-light", {}, "torque"),

@@ -14,7 +14,7 @@ from loomopt.physics.mechanisms.cam_spline import spline
 from loomopt.solving.certificate import second_order
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import least_change, settle
+from loomopt.solving.search import least_change, tie_break
 from loomopt.solving.search.least_change import with_least_change
 from loomopt.solving.search.search import Search, judged, objectives, tried
 
@@ -178,7 +178,7 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
         asked.append(set(ends[0]))
         return True
 
-    monkeypatch.setattr(settle, "_is_same", counted)
+    monkeypatch.setattr(tie_break, "_is_same", counted)
     axes = [AxisMove(n, (n,), (Wish("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import pytest
 from searches import candidate, empty
 
+from loomopt.solving.answer import report
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.search import multistart
-from loomopt.solving.search.search import Candidate, Judged
+from loomopt.solving.search.search import Candidate
 
 BEST = replace(candidate(1, 2, x=1.0), value=1002.0)
 
 
 def search(*candidates, **more):
-    return replace(empty(candidates=(BEST, *candidates)), best=Judged(BEST, BEST.point.x, None), **more)
+    return replace(empty(candidates=(BEST, *candidates)), best=BEST, **more)
 
 
 def left(value):
@@ -30,21 +30,21 @@ def left(value):
     ],
 )
 def test_what_was_done_is_told(made, sentence):
-    assert multistart.search_report(made) == sentence
+    assert report._sought(made) == sentence
 
 
 def test_why_no_other_basin_was_looked_for():
     made = search()
     made = replace(made, program=replace(made.program, single="it is linear"))
-    assert multistart.search_report(made) == "No other basin was looked for: it is linear."
+    assert report._sought(made) == "No other basin was looked for: it is linear."
 
 
 def test_solves_that_ended_in_the_best_are_those_there_and_those_left_at_its_value():
     far, near = left(1003.0), left(1002.0 + 1e-8)
-    counts = multistart.search_counts(search(far, near, candidate(1, 2, x=1.0), candidate(1, 5, x=3.0)))
+    counts = report._counts(search(far, near, candidate(1, 2, x=1.0), candidate(1, 5, x=3.0)))
     assert (counts["starts"], counts["starts_at_best"], counts["basins"]) == (5, 3, 2)
 
 
 def test_without_an_optimum_there_is_none_to_count():
-    counts = multistart.search_counts(empty(candidates=(left(3.0),)))
+    counts = report._counts(empty(candidates=(left(3.0),)))
     assert (counts["starts"], counts["starts_at_best"], counts["basins"]) == (1, 0, 0)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from reference.beatup import DESIGN, LENGTHS, Machine
 from support import toy
 
 import loomopt as lo
 from loomopt.model.moves import AxisMove, ScaleMove, Wish
-from loomopt.solving.search.settle import settle, unchanging
+from loomopt.solving.search.tie_break import moved, unchanging
+from reference.beatup import DESIGN, LENGTHS, Machine
 
 
 def slide(goal, low=-100.0, high=100.0):
@@ -94,7 +94,7 @@ def test_today_s_own_values_are_kept_where_nothing_asks_for_others():
 def slid(rows, goal, limits=(), y=0.5):
     """Return y after the silent level that wants it at goal; f is the objective."""
     program = toy.program("xy", rows, limits=limits, moves=(slide(goal),))
-    x, said = settle(program, {"x": 1.0, "y": y})
+    x, said = moved(program, {"x": 1.0, "y": y})
     assert x["x"] == 1.0
     return x["y"], said
 
@@ -131,7 +131,7 @@ def test_a_limit_already_met_stops_the_move_at_once():
 def test_nothing_is_said_to_be_settled_where_nothing_moved():
     assert slid(FLAT, 0.5) == (0.5, ())
     program = toy.program("xy", FLAT)
-    assert settle(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
+    assert moved(program, {"x": 1.0, "y": 0.5}) == ({"x": 1.0, "y": 0.5}, ())
 
 
 # Goals of a move --------------------------------------------------------------------------------------------------
@@ -202,13 +202,13 @@ def test_a_peak_is_compared_all_round_not_by_its_height():
     """The peak of x cos φ + y sin 2 φ / 9 stays 1 or nearly; the wave does not."""
     waves = {"w": lambda m, v, phi: m.cos(phi) * v["x"] + v["y"] * (1 - m.cos(phi) ** 2) ** 4 / 99}
     program = toy.program("xy", {}, waves, objectives=("peak w",), moves=(slide(0.9),))
-    assert settle(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
+    assert moved(program, {"x": 1.0, "y": 0.5})[0]["y"] == 0.5
 
 
 @pytest.mark.parametrize(("size", "told"), [(1.0, True), (1e3, False), (1e-3, True)])
 def test_a_move_is_told_that_is_no_rounding_in_the_variables_own_size(size, told):
     program = toy.program("xy", FLAT, moves=(slide(0.5 + 1e-7),), sizes={"y": size})
-    assert bool(settle(program, {"x": 1.0, "y": 0.5})[1]) == told
+    assert bool(moved(program, {"x": 1.0, "y": 0.5})[1]) == told
 
 
 # To the last number -----------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from support import overlaps
 
 import loomopt as lo
 from loomopt.interface.figures import accuracy as accuracy_figure
-from loomopt.jobs.shedding import design as limit_law
+from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import accuracy, optima
 from loomopt.studies.accuracy.ladders import NO_ORDER, grouped
 
@@ -95,7 +95,7 @@ def test_finite_differences_have_order_two_until_rounding_takes_over(studies, la
 def test_a_free_law_tends_to_the_limit_law_with_order_one(studies, ladders):
     rows = ladders["shedding"]["law K1, spline intervals"]
     assert 1.0 <= studies["shedding"].orders["law K1, spline intervals"] <= 1.35
-    limit = limit_law.least_stiffness(lo.load("shedding"), 6e4)
+    limit = JOB.law_limit(lo.load("shedding"), {"K1": 6e4})
     for intervals, by_hand in LINEAR_PROGRAMMES.items():
         (row,) = (row for row in rows if row.setting == intervals) if intervals in SMALL.intervals else (None,)
         assert row is None or row.error == pytest.approx(float(by_hand / limit - 1), rel=1e-7)

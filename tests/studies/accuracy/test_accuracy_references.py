@@ -5,7 +5,7 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.jobs.shedding import design as limit_law
+from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.subject import Target
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
     [
         ("beatup", "balance", 88.6894134918),  # four solvers and 40-digit arithmetic
         ("beatup-light", "balance", 82.3371385326),
-        ("rapier", "stroke-dwell", 0.694984753569),  # benchmarks/plain_rapier.py: SLSQP exchange, Newton
+        ("rapier", "stroke-dwell", 0.694984753569),  # tests/reference/rapier_layouts.py: SLSQP exchange, Newton
         ("shedding", "stiffness", 102602.609425357),  # tests/reference/shedding.py: 30 digits
         ("shedding", "law", 59955.4638624003),  # tests/reference/shedding.py: HiGHS
         ("shedding", "force", 15679.7298884577),
@@ -43,7 +43,7 @@ def test_the_limit_law_ends_at_rest_when_its_equation_of_motion_is_integrated():
     integrate = pytest.importorskip("scipy.integrate")
     optimize = pytest.importorskip("scipy.optimize")
     scene = lo.load("shedding")
-    stiffness = float(limit_law.least_stiffness(scene, 6e4))
+    stiffness = float(JOB.law_limit(scene, {"K1": 6e4}))
     travel, preload, rate = 65.6e-3, 80e-3, 20 * math.pi / math.radians(120)
 
     def arc(u, state):
@@ -63,7 +63,7 @@ def test_the_limit_law_falls_to_that_of_an_impulse_as_the_bound_goes():
     """Without a bound: an impulse, then flight to rest at the bottom in one rise, 35567.2269027 N/m in closed form."""
     scene = lo.load("shedding")
     bounds = [2 * math.pi * size for size in (1, 10, 1000, 1e6)]
-    found = [limit_law.least_stiffness(scene.set("limits.law_acceleration.max", repr(most)), 6e4) for most in bounds]
+    found = [JOB.law_limit(scene.set("limits.law_acceleration.max", repr(most)), {"K1": 6e4}) for most in bounds]
     assert found == sorted(found, reverse=True)
     assert float(found[-1]) == pytest.approx(35567.226902713526, rel=1e-6)  # tests/reference/shedding.py
 
@@ -83,8 +83,8 @@ def test_the_limit_law_falls_to_that_of_an_impulse_as_the_bound_goes():
     ids=["damping", "friction", "coil", "no inertia", "symmetric", "step", "unlike", "free angles"],
 )
 def test_where_the_limit_law_does_not_hold_there_is_none(changed):
-    assert limit_law.least_stiffness(changed(lo.load("shedding")), 1e5) is None
+    assert JOB.law_limit(changed(lo.load("shedding")), {"K1": 1e5}) is None
 
 
 def test_a_spring_that_no_law_needs_more_than_is_no_start():
-    assert limit_law.least_stiffness(lo.load("shedding"), 4.9e4) is None
+    assert JOB.law_limit(lo.load("shedding"), {"K1": 4.9e4}) is None

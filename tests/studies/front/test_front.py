@@ -14,7 +14,7 @@ from loomopt.jobs import registry
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import run
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, Side, Task
 
 RPM = math.pi / 30
 CLOSE = 1e-9
@@ -74,12 +74,12 @@ def test_peak_torque_against_counterweight(mass, kilograms, peak):
 
 def test_slope_of_the_counterweight(mass):
     trade, rows = mass
-    assert at(trade, 0.01, rows[1]).multipliers["peak_torque per m4e"] == pytest.approx(-1.477, abs=5e-4)
+    assert at(trade, 0.01, rows[1]).multipliers[plan.sloped(("peak_torque", "m4e"))] == pytest.approx(-1.477, abs=5e-4)
 
 
 def test_area_of_the_front(mass):
     found = trade.read_front(*mass)
-    masses, peaks = found.values("m4e"), found.values("peak_torque")
+    masses, peaks = plan.values(found.rows, "m4e"), plan.values(found.rows, "peak_torque")
     assert masses[0] == 0.0
     assert masses[-1] == pytest.approx(6.286039692, rel=1e-8)
     corners = list(zip([*masses, 7.0], [97.0 - peak for peak in [*peaks, peaks[-1]]], strict=True))
@@ -92,13 +92,13 @@ def test_every_point_is_certified_and_none_is_as_good_as_another(mass):
     assert len(found.rows) >= 40
     assert all(row.certified and row.status == "optimal" for row in found.rows)
     for axis, rising in (("m4e", 1), ("peak_torque", -1)):
-        assert all(rising * (b - a) > 0.0 for a, b in itertools.pairwise(found.values(axis)))
+        assert all(rising * (b - a) > 0.0 for a, b in itertools.pairwise(plan.values(found.rows, axis)))
 
 
 def test_multipliers_are_the_slope_between_neighbours(mass):
     found = trade.read_front(*mass)
-    slopes = [row.multipliers["peak_torque per m4e"] for row in found.rows[:-1]]
-    points = list(zip(found.values("m4e"), found.values("peak_torque"), strict=True))
+    slopes = [row.multipliers[plan.sloped(("peak_torque", "m4e"))] for row in found.rows[:-1]]
+    points = list(zip(plan.values(found.rows, "m4e"), plan.values(found.rows, "peak_torque"), strict=True))
     for (one, other), (left, right) in zip(itertools.pairwise(points[:-1]), itertools.pairwise(slopes), strict=True):
         if other[0] - one[0] > 1e-3:
             secant = (other[1] - one[1]) / (other[0] - one[0])
@@ -106,12 +106,12 @@ def test_multipliers_are_the_slope_between_neighbours(mass):
 
 
 def test_what_changes_along_the_counterweight_is_told(mass):
-    changes = {change["limits"][0]: change for change in trade.read_front(*mass).changes}
+    changes = {change.limits[0].text: change for change in trade.read_front(*mass).changes}
     assert set(changes) == {"l4 max", "l1 min"}
-    assert changes["l4 max"]["at"] == pytest.approx(2.2654, abs=1e-4)
-    assert changes["l4 max"]["kind"] == "active set"
-    assert changes["l1 min"]["at"] == pytest.approx(6.286039692, rel=1e-8)
-    assert changes["l1 min"]["kind"] == "kink"
+    assert changes["l4 max"].at == pytest.approx(2.2654, abs=1e-4)
+    assert changes["l4 max"].kind == "active set"
+    assert changes["l1 min"].at == pytest.approx(6.286039692, rel=1e-8)
+    assert changes["l1 min"].kind == "kink"
 
 
 def test_rounds_are_batches_of_eight_with_parents_of_earlier_rounds(mass):
@@ -173,7 +173,7 @@ def test_peak_torque_against_reed_torque(torque, reed, peak):
 def test_slopes_against_reed_torque(torque):
     trade, (least, balanced) = torque
     slopes = [
-        at(trade, reed, parent).multipliers["peak_torque per M3_fdc"]
+        at(trade, reed, parent).multipliers[plan.sloped(("peak_torque", "M3_fdc"))]
         for reed, parent in ((20.0, balanced), (45.5, least), (50.0, least), (64.0, least))
     ]
     assert slopes == pytest.approx([-0.119, -0.096, -0.042, -0.0416], abs=6e-4)
@@ -182,21 +182,22 @@ def test_slopes_against_reed_torque(torque):
 def test_the_counterweight_that_is_used_up_is_told():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "M3_fdc"), ranges={"M3_fdc": (45.0, 46.0)}, points=5)
     found = read_front(trade, run.run(trade))
-    assert (found.values("M3_fdc")[0], found.values("M3_fdc")[-1]) == pytest.approx((45.0, 46.0), abs=1e-7)
-    used, left = (next(c for c in found.changes if name in c["limits"]) for name in ("m4e min", "theta max"))
-    assert used["between"][0] < 45.3960098 < used["between"][1]
-    assert used["kind"] == "active set"
-    assert left["between"][0] < 45.639 < left["between"][1]
-    assert all(c["between"][1] - c["between"][0] < 0.07 for c in (used, left))
+    torques = plan.values(found.rows, "M3_fdc")
+    assert (torques[0], torques[-1]) == pytest.approx((45.0, 46.0), abs=1e-7)
+    used, left = (next(c for c in found.changes if Side.read(name) in c.limits) for name in ("m4e min", "theta max"))
+    assert used.between[0] < 45.3960098 < used.between[1]
+    assert used.kind == "active set"
+    assert left.between[0] < 45.639 < left.between[1]
+    assert all(c.between[1] - c.between[0] < 0.07 for c in (used, left))
 
 
 @pytest.mark.parametrize(("most", "low", "high"), [((), 600.0, 800.0), (("M0",), 700.0, 950.0)])
 def test_reed_torque_against_resistance_in_closed_form(most, low, high):
     trade = front.trade(lo.load("beatup"), ("M3_fdc", "M0"), maximise=most, ranges={"M0": (low, high)}, points=4)
     found = read_front(trade, run.run(trade))
-    for resistance, reed in zip(found.values("M0"), found.values("M3_fdc"), strict=True):
+    for resistance, reed in zip(plan.values(found.rows, "M0"), plan.values(found.rows, "M3_fdc"), strict=True):
         assert reed == pytest.approx(max(0.0, 676.981102 - resistance, resistance - 871.503394), abs=2e-6)
-    reached = found.values("M0")
+    reached = plan.values(found.rows, "M0")
     assert (reached[-1] if not most else reached[0]) == pytest.approx(871.503394 if most else 676.981102, abs=2e-6)
 
 
@@ -210,7 +211,7 @@ def test_dwells_of_the_rapier():
         assert row.reached == {"stroke": True}
         assert read(row, "peak_acceleration") == pytest.approx(peak, rel=2e-9)
         assert min(row.figures["dwell_after"], row.figures["dwell_before"]) == pytest.approx(math.radians(degrees))
-        assert row.multipliers["peak_acceleration per dwell"] > 0.0
+        assert row.multipliers[plan.sloped(("peak_acceleration", "dwell"))] > 0.0
 
 
 STIFFNESS = {0.080: 102602.609425, 0.060: 119901.395181, 0.040: 144270.372242, 0.020: 181234.597037}
@@ -227,9 +228,9 @@ def test_stiffness_against_preload(preload, preload_, stiffness):
 def test_statics_govern_a_short_spring(preload):
     found = trade.read_front(*preload)
     (change,) = found.changes
-    assert change["kind"] == "kink"
-    assert change["limits"] == ["N_min min"]
-    assert change["at"] == pytest.approx(2.096358e-3, abs=5e-10)
+    assert change.kind == "kink"
+    assert change.limits == (Side("N_min", "min"),)
+    assert change.at == pytest.approx(2.096358e-3, abs=5e-10)
     static = (369.55 + 124.545) / 0.001
     assert read(at(preload[0], 0.001, preload[1][1]), "K1") == pytest.approx(static, rel=1e-10)
 
@@ -243,9 +244,9 @@ def test_stiffness_against_speed():
         assert row.certified
         assert read(row, "K1") == pytest.approx(stiffness, rel=1e-10)
     found = read_front(trade, rows)
-    assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
-    assert found.changes[0]["kind"] == "kink"
-    assert found.values("speed")[-1] == pytest.approx(900 * RPM)
+    assert found.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
+    assert found.changes[0].kind == "kink"
+    assert plan.values(found.rows, "speed")[-1] == pytest.approx(900 * RPM)
 
 
 def test_the_end_of_an_axis_that_has_one_need_not_be_named():
@@ -290,7 +291,7 @@ def test_what_the_least_change_from_today_buys():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "change"), points=3)
     found = read_front(trade, run.run(trade))
     assert all(row.certified for row in found.rows)
-    assert len(found.values("change")) >= 3
+    assert len(plan.values(found.rows, "change")) >= 3
     for before, row in itertools.pairwise(found.rows):
         assert row.figures["change"] == pytest.approx(read(row, "change"), abs=CLOSE)
         assert read(row, "peak_torque") < read(before, "peak_torque")
@@ -300,7 +301,7 @@ def test_two_axes_that_do_not_conflict():
     trade = front.trade(lo.load("beatup"), ("peak_torque", "m4e"))
     found = read_front(trade, run.run(trade))
     assert len(found.rows) == 1
-    assert found.values("m4e") == [0.0]
+    assert plan.values(found.rows, "m4e") == [0.0]
     assert found.message == "peak_torque and m4e do not conflict: one design is best in both."
 
 
@@ -327,7 +328,7 @@ def test_an_end_without_a_least_asks_for_a_range():
 def test_a_range_ends_the_front(ranges, axis, reached):
     trade = front.trade(loose(), ("K1", "X0"), ranges=ranges, points=3)
     found = read_front(trade, run.run(trade))
-    assert (found.values(axis)[0], found.values(axis)[-1]) == pytest.approx(reached)
+    assert (plan.values(found.rows, axis)[0], plan.values(found.rows, axis)[-1]) == pytest.approx(reached)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from loomopt.studies.front import plan
 from loomopt.studies.front.plan import NARROW, Scale
-from loomopt.studies.run.rows import Row
+from loomopt.studies.run.rows import Row, Side
 
 SCALE = Scale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
 
@@ -18,7 +18,7 @@ def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True,
     warm |= {"again": again, "fine": fine, "near": None}
     status = "optimal" if certified else "failed"
     place = {} if point < 2 else {"b": b if asked is None else asked}
-    return Row(point, place, parent, status, None, {}, {}, {"a per b": slope}, {}, certified, 0.0, warm)
+    return Row(point, place, parent, status, None, {}, {}, {plan.sloped(("a", "b")): slope}, {}, certified, 0.0, warm)
 
 
 ENDS = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0)]
@@ -104,9 +104,9 @@ def test_a_kink_is_found_where_it_is():
         return (b, 1 - 2 * b, -2.0, ("l1 min",)) if b < 0.3 else (b, 0.4 * (1 - b) / 0.7, -0.4 / 0.7, ("l2 max",))
 
     (change,), gaps = told(computed(answer))
-    assert change["kind"] == "kink"
-    assert change["limits"] == ["l1 min", "l2 max"]
-    assert change["at"] == pytest.approx(0.3, abs=1e-9)
+    assert change.kind == "kink"
+    assert change.limits == (Side("l1", "min"), Side("l2", "max"))
+    assert change.at == pytest.approx(0.3, abs=1e-9)
     assert gaps == []
 
 
@@ -117,9 +117,9 @@ def test_a_change_without_a_corner_is_an_active_set():
         return b, 1 - 1.5 * b + 0.75 * past**2, slope, ("l1 min",) if b < 0.3 else ()
 
     (change,), _ = told(computed(answer))
-    assert change["kind"] == "active set"
-    assert change["limits"] == ["l1 min"]
-    assert change["at"] == pytest.approx(0.3, abs=NARROW)
+    assert change.kind == "active set"
+    assert change.limits == (Side("l1", "min"),)
+    assert change.at == pytest.approx(0.3, abs=NARROW)
 
 
 def test_a_stretch_where_nothing_is_better_is_a_gap_with_a_jump_at_its_end():
@@ -131,8 +131,8 @@ def test_a_stretch_where_nothing_is_better_is_a_gap_with_a_jump_at_its_end():
 
     rows = computed(answer)
     changes, gaps = told(rows)
-    jump = next(change for change in changes if change["kind"] == "jump")
-    assert jump["at"] == pytest.approx(0.6, abs=2 * NARROW)
+    jump = next(change for change in changes if change.kind == "jump")
+    assert jump.at == pytest.approx(0.6, abs=2 * NARROW)
     assert gaps == [(pytest.approx(0.2), pytest.approx(0.6, abs=2 * NARROW))]
 
 
@@ -141,8 +141,8 @@ def test_a_sheer_fall_is_a_jump():
         return (b, 1 - 0.1 * b, -0.1, ("l1 min",)) if b < 0.4 else (b, 0.2 * (1 - b), -0.2, ("l1 min",))
 
     (change,), _ = told(computed(answer))
-    assert change["kind"] == "jump"
-    assert change["at"] == pytest.approx(0.4, abs=2 * NARROW)
+    assert change.kind == "jump"
+    assert change.at == pytest.approx(0.4, abs=2 * NARROW)
 
 
 def test_a_plan_ends():

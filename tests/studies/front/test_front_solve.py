@@ -65,8 +65,8 @@ def test_an_axis_that_a_limit_alone_stops_is_certified_after_the_other():
     trade = front.trade(lo.load("beatup"), ("l1", "l3"))
     found = read_front(trade, run.run(trade))
     assert found.message.startswith("l1 and l3 do not conflict: one design is best in both.")
-    assert found.values("l1") == pytest.approx([0.03])
-    assert found.values("l3") == pytest.approx([0.147938261848])
+    assert plan.values(found.rows, "l1") == pytest.approx([0.03])
+    assert plan.values(found.rows, "l3") == pytest.approx([0.147938261848])
 
 
 def test_stiffness_against_the_speed_up_to_which_contact_holds():
@@ -80,8 +80,8 @@ def test_stiffness_against_the_speed_up_to_which_contact_holds():
         assert row.figures["contact_speed"] == pytest.approx(speed * RPM, rel=1e-10)
         assert row.figures["speed"] == pytest.approx(600 * RPM)
     found = read_front(trade, rows)
-    assert found.changes[0]["at"] / RPM == pytest.approx(119.2122, abs=1e-4)
-    assert found.changes[0]["kind"] == "kink"
+    assert found.changes[0].at / RPM == pytest.approx(119.2122, abs=1e-4)
+    assert found.changes[0].kind == "kink"
 
 
 @pytest.mark.parametrize("axes", [("contact_max", "contact_speed"), ("contact_speed", "peak_power")])
@@ -91,13 +91,13 @@ def test_a_contact_speed_that_is_traded_is_the_rows_figure_and_the_others_are_re
     found = read_front(trade, run.run(trade))
     assert len(found.rows) >= 4
     assert all(row.certified for row in found.rows)
-    assert min(found.values("contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
+    assert min(plan.values(found.rows, "contact_speed")) == pytest.approx(119.212195 * RPM, rel=1e-8)
     for row in found.rows:
         there = lo.evaluate(scene, row.design).figures
         for axis in axes:
             assert plan.value(row, axis) == pytest.approx(row.figures[axis], rel=1e-9)
             assert there[axis] == pytest.approx(row.figures[axis], rel=1e-9)
-    for one, other in itertools.pairwise(found.values(axes[0])):
+    for one, other in itertools.pairwise(plan.values(found.rows, axes[0])):
         assert one < other
 
 

@@ -11,7 +11,7 @@ from made_up_study import Chain
 
 from loomopt.base.errors import BadInput
 from loomopt.studies.run import executors, run
-from loomopt.studies.run.rows import Row, digest
+from loomopt.studies.run.rows import Multiplier, Row, Side, digest
 from loomopt.studies.run.store import Store
 
 
@@ -125,13 +125,28 @@ def test_a_digest_leaves_out_seconds_and_order_and_nothing_else():
 
 
 def test_a_row_is_the_same_through_json():
-    row = Row(
-        3, {"a": 0.1}, 1, "failed", "why", {"l": 1e-300}, {"f": None, "g": 5e-324}, {"f per l min": -0.0}, {"f": True}
-    )
+    prices = {Multiplier("f", Side("l", "min")): -0.0}
+    row = Row(3, {"a": 0.1}, 1, "failed", "why", {"l": 1e-300}, {"f": None, "g": 5e-324}, prices, {"f": True})
     assert Row.from_dict(json.loads(json.dumps(row.as_dict()))) == row
     assert "warm" not in row.told()
     with pytest.raises(TypeError):
         row.as_dict()["figures"]["f"] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "text"),
+    [
+        (Multiplier("M3_fdc", Side("l1", "min")), "M3_fdc per l1 min"),
+        (Multiplier("K1", Side("N_min", "fixed")), "K1 per N_min fixed"),
+        (Multiplier("K1", Side("the spring's index", "max")), "K1 per the spring's index max"),
+        (Multiplier("peak_torque", Side("m4e")), "peak_torque per m4e"),
+        (Multiplier("K1", Side("no clash")), "K1 per no clash"),
+    ],
+)
+def test_a_multiplier_s_text_is_read_as_it_was_written(multiplier, text):
+    assert multiplier.text == text
+    assert Multiplier.read(text) == multiplier
+    assert Side.read(multiplier.side.text) == multiplier.side
 
 
 @pytest.mark.parametrize("count", [0, -1, 5000])

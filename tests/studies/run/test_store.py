@@ -5,12 +5,13 @@ import sqlite3
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.studies.run.rows import Row
+from loomopt.studies.run.rows import Multiplier, Row, Side
 from loomopt.studies.run.store import Store
 
 ROW = Row(
-    2, {"operation.M0": 0.1 + 0.2}, 1, "optimal", None, {"l1": 1 / 3}, {"a": None, "b": 5e-324}, {"a per l1 min": -0.0},
-    {"a": False}, True, 0.5, {"x": {"l1": 1 / 7}, "nodes": [[[0, 0.5, -1.0, False]]]},
+    2, {"operation.M0": 0.1 + 0.2}, 1, "optimal", None, {"l1": 1 / 3}, {"a": None, "b": 5e-324},
+    {Multiplier("a", Side("l1", "min")): -0.0}, {"a": False},
+    True, 0.5, {"x": {"l1": 1 / 7}, "nodes": [[[0, 0.5, -1.0, False]]]},
 )  # fmt: skip
 
 

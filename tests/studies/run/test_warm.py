@@ -24,7 +24,7 @@ def answer():
 
 def test_a_start_read_from_json_leads_to_the_same_bits(answer):
     data = json.loads(json.dumps(warm.written(answer.point, program(SCENE))))
-    read, direct = engine.solve(NEXT, near=[warm.read(data, program(NEXT))]), engine.solve(NEXT, near=answer)
+    read, direct = engine.solve(NEXT, near=[warm.read(data, program(NEXT))]), engine.solve(NEXT, near=[answer.point])
     assert read.design == direct.design
     assert read.figures == direct.figures
     assert read.message == direct.message

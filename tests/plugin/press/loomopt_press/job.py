@@ -1,16 +1,15 @@
 """The press: the least crank torque of a slider-crank, its stroke kept."""
 
+from loomopt.base.errors import BadInput
 from loomopt.jobs.base import Figures, Job
-from loomopt.model import numbers
 from loomopt.model.curves import Columns
-from loomopt.model.limits import DesignLimit
 from loomopt.model.model import JobModel
-from loomopt.model.objectives import Peak
-from loomopt.model.program import Numbers, Program, Variable
+from loomopt.model.program import Numbers
 from loomopt.model.sampling import Sampler
 from loomopt.scenes.scene import Scene
-from loomopt_press import model as press
-from loomopt_press.scene import SCHEMA, check
+from loomopt_press.model import model
+from loomopt_press.program import PressTask
+from loomopt_press.scene import SCHEMA, fault
 
 
 class Press(Job):
@@ -18,40 +17,19 @@ class Press(Job):
 
     name = "press"
     own_schema = SCHEMA
+    task = PressTask
 
     def check(self, scene: Scene) -> None:
-        """Raise BadInput where the slider-crank does not turn."""
-        check(scene)
+        """Raise BadInput when today's press cannot turn."""
+        reason = fault(scene.mechanism, scene.show)
+        if reason:
+            raise BadInput(
+                f"today's press cannot turn: {reason}", file=scene.origin, key="mechanism.crank, rod", remedy="Mend it."
+            )
 
     def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
         """Return the slider-crank with the effects the scene calls for."""
-        return press.model(scene.active, numbers.words(scene), frozenset(numbers.numbers(scene)))
-
-    def program(self, scene: Scene, target: str) -> Program:
-        """Return the target as a task."""
-        known = numbers.numbers(scene)
-        limited, labels = numbers.bounds(scene, known), numbers.labels(scene)
-        sampler = Sampler(self.model(scene), known)
-        variables = tuple(
-            Variable(name, *ends, max(abs(known[name]), *map(abs, ends)) or 1.0, ends, labels.get(name, ""))
-            for name, ends in limited.items()
-        )
-        limits = [each for v in variables if v.called in scene.bounds for each in numbers.bound_limits(v)]
-        limits += numbers.figure_limits(scene, sampler)
-        limits += numbers.demanded(scene, sampler.model.checks, known, {})
-        limits += [DesignLimit(press.LONGER, -1, press.LONGER, 0.0, known["rod"], relaxable=False)]
-        return Program(
-            sampler.model,
-            variables,
-            {name: value for name, value in known.items() if name not in limited},
-            tuple(limits),
-            (
-                Peak("peak_torque", "peak_torque", sampler.peak("peak_torque") or 1.0),
-                *numbers.least(sampler),
-            ),
-            (numbers.inside(variables, known),),
-            tuple(numbers.axis_moves(scene, known, limited)),
-        )
+        return model(scene)
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what the optimum is worth."""

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Group, Kinematics
 from loomopt.model.model import Instant, JobModel, Quantity, Row
+from loomopt.model.numbers import numbers, words
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Effect, Motion
+from loomopt.physics.effects.kinds import Motion
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
+from loomopt.scenes.scene import Scene
 
 TOP, BOTTOM = "top dead centre", "bottom dead centre"
 LONGER = "assembly: crank < rod"
@@ -102,6 +104,6 @@ ROWS = {
 """Figures over the cycle and of the design alone, SI."""
 
 
-def model(effects: tuple[Effect, ...], words: tuple[tuple[str, str, str], ...], known: frozenset[str]) -> JobModel:
-    """Return the slider-crank with effects."""
-    return JobModel(SliderCrank(), effects, words, QUANTITIES, ROWS, known=known)
+def model(scene: Scene) -> JobModel:
+    """Return the slider-crank with the effects the scene calls for."""
+    return JobModel(SliderCrank(), scene.active, words(scene), QUANTITIES, ROWS, known=frozenset(numbers(scene)))

@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping
 
-from loomopt.base.errors import BadInput
 from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import Shown
 from loomopt.physics.effects import declared
 from loomopt.physics.schema import Figure, Table, Target
-from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
 from loomopt_press.model import LONGER
 
@@ -38,15 +36,6 @@ def fault(design: Mapping[str, float], shown: Shown) -> str:
     """Say why a design cannot work; "" when it can."""
     longest = shown(design["rod"], "length")
     return "" if design["crank"] < design["rod"] else f"the crank must be shorter than the rod, {longest}"
-
-
-def check(scene: Scene) -> None:
-    """Raise BadInput when today's press cannot turn."""
-    reason = fault(scene.mechanism, scene.show)
-    if reason:
-        raise BadInput(
-            f"today's press cannot turn: {reason}", file=scene.origin, key="mechanism.crank, rod", remedy="Mend it."
-        )
 
 
 SCHEMA = SceneSchema(

@@ -1,0 +1,1 @@
+"""What tries to break loomopt: random scenes, spoilt input, mutants."""

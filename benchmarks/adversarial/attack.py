@@ -1,0 +1,198 @@
+"""Attack answers from outside: random scenes of all jobs, physics in plain NumPy, SLSQP, evolution, linear programmes.
+
+A certified answer is beaten where an admissible design (every limit held to 1e-9 on a fine grid) is better by more than
+1e-6 in natural sizes, the first objective first; broken where it breaks a limit or states another figure than it has;
+matched where the attack, not knowing it, ends within 1e-6 of it, which measures the attack. `infeasible` is refuted
+where an admissible design is found. Whatever is not certified is told with its reasons. Each failure is printed with
+its scene and design. Any of them but "second order open" ends in exit status 1.
+
+    python benchmarks/adversarial/attack.py [--count N] [--seed S] [--jobs rapier,beatup,shedding] [--seconds T]
+                                [--only K] [--compare] [--json]
+
+--count: scenes of each job; --seconds: no scene is begun later. Scene K of a job and seed is always the same one:
+--only K draws it alone. --compare also solves with one and with eight starts, and counts who finds the best known.
+"""
+
+import argparse
+import importlib
+import itertools
+import sys
+import time
+import zlib
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from benchmarks import harness
+
+BETTER = 1e-6
+"""What counts as better, in natural sizes; an earlier objective counts as held within 1e-9."""
+HELD = 1e-9
+BROKEN = 1e-7
+"""What a certified answer may be off the referee's figures and limits: ten times the accuracy it was asked for."""
+JOBS = ("rapier", "beatup", "shedding")
+OPEN = "second order open"
+CALLS: dict[str, dict[str, Any]] = {"default": {}, "starts=1": {"starts": 1}, "starts=8": {"starts": 8}}
+COUNTED = (
+    "tried",
+    "optimal",
+    "matched",
+    "infeasible",
+    "beaten",
+    "broken",
+    "refuted",
+    f"uncertified: {OPEN}",
+    "uncertified: other",
+)
+FAILURES = ("beaten", "broken", "refuted", "uncertified: other")
+
+
+def better(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Say whether objectives are lower by more than 1e-6: the first, or where it is held the second."""
+    for a, b in zip(one, other, strict=True):
+        if a < b - BETTER:
+            return True
+        if a > b + HELD:
+            return False
+    return False
+
+
+def near(one: tuple[float, ...], other: tuple[float, ...], room: float = BETTER) -> bool:
+    """Say whether no objective is higher by more than `room`."""
+    return all(a <= b + room for a, b in zip(one, other, strict=True))
+
+
+def scene_of(job: str, seed: int, number: int) -> Any:
+    """Return scene `number` of a job and seed, with its question by hand."""
+    import numpy as np
+
+    rng = np.random.default_rng([zlib.crc32(job.encode()), seed, number])
+    return importlib.import_module(f"benchmarks.adversarial.attack_{job}").drawn(rng)
+
+
+class Trial:
+    """One scene: the answer, and what became of it."""
+
+    def __init__(self, task: Any, seed: int) -> None:
+        import loomopt as lo
+
+        self.task, self.seed = task, seed
+        self.scene = lo.load(task.base).update(task.changes)
+        self.found: tuple[dict[str, float], tuple[float, ...]] | None = None
+        self.answers: dict[str, Any] = {}
+        self.verdicts: list[tuple[str, str]] = []
+        self.matched = False
+
+    def solved(self, names: Any) -> None:
+        """Solve by the public call in each of the ways named."""
+        import loomopt as lo
+
+        for name in names:
+            self.answers[name] = lo.solve(self.scene, self.task.target, **CALLS[name])
+        self.answer = self.answers["default"]
+
+    def judged(self) -> None:
+        """Attack the answer and note what became of it."""
+        answer, task = self.answer, self.task
+        claimed = task.objectives(answer.design) if answer.status == "optimal" else None
+        if claimed is not None:
+            excess, stated = task.excess(answer.design), task.stated(answer.figures)
+            if not excess <= BROKEN:
+                self.verdicts.append(("broken", f"its own design exceeds a limit by {excess:.3g}"))
+            if not near(stated, claimed, BROKEN) or not near(claimed, stated, BROKEN):
+                self.verdicts.append(("broken", f"it states {stated} and has {claimed}"))
+        if answer.status not in ("optimal", "infeasible"):
+            reasons = list(answer.certificate.reasons) if answer.certificate else [answer.message]
+            known = answer.status == "uncertified" and reasons == [OPEN]
+            self.verdicts.append(
+                (f"uncertified: {OPEN if known else 'other'}", f"{answer.status}: {'; '.join(reasons)}")
+            )
+        self._attack(claimed)
+        if self.found is None:
+            return
+        design, objectives = self.found
+        if answer.status == "infeasible":
+            self.verdicts.append(("refuted", f"{design} is admissible, objectives {objectives}"))
+        elif claimed is not None and better(objectives, claimed):
+            self.verdicts.append(("beaten", f"{objectives} instead of {claimed} by {design}"))
+
+    def _attack(self, claimed: tuple[float, ...] | None) -> None:
+        """Keep the best admissible design: of what does not know the answer, then around it and by more starts."""
+        for design in self.task.attack(self.seed, claimed):
+            self._keep(design)
+            if self.answer.status == "infeasible" and self.found is not None:
+                return
+        if claimed is None:
+            return
+        self.matched = self.found is not None and near(self.found[1], claimed)
+        for design in self.task.attack(self.seed, claimed, self.answer.design):
+            self._keep(design)
+        for answer in self.answers.values():
+            if answer.status == "optimal":
+                self._keep(answer.design)
+
+    def _keep(self, design: Mapping[str, float]) -> None:
+        if self.task.excess(design) <= HELD:
+            objectives = self.task.objectives(design)
+            if self.found is None or better(objectives, self.found[1]):
+                self.found = dict(design), objectives
+
+    def hits(self) -> dict[str, bool]:
+        """Say which ways to solve found the best known."""
+        assert self.found is not None
+        best = self.found[1]
+        return {
+            name: answer.status == "optimal" and not better(best, self.task.objectives(answer.design))
+            for name, answer in self.answers.items()
+        }
+
+
+def told(job: str, seed: int, number: int, trial: Trial) -> list[str]:
+    """Return a line for each failure, from which it can be made again."""
+    task = trial.task
+    again = f"lo.solve(lo.load({task.base!r}).update({task.changes!r}), {task.target!r})"
+    place = f"--jobs {job} --seed {seed} --only {number}"
+    return [
+        f"{kind} ({place}): {why}\n    {again}\n    answer {dict(trial.answer.design)}" for kind, why in trial.verdicts
+    ]
+
+
+def parsed() -> argparse.Namespace:
+    words = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    words.add_argument("--count", type=int, default=10)
+    words.add_argument("--seed", type=int, default=0)
+    words.add_argument("--jobs", default=",".join(JOBS))
+    words.add_argument("--seconds", type=float, default=float("inf"))
+    words.add_argument("--only", type=int)
+    words.add_argument("--compare", action="store_true")
+    words.add_argument("--json", action="store_true")
+    return words.parse_args()
+
+
+def main() -> None:
+    harness.one_thread()
+    asked = parsed()
+    jobs, began = asked.jobs.split(","), time.perf_counter()
+    counts = {job: Counter[str]() for job in jobs}
+    failures, numbers = list[str](), [asked.only] if asked.only is not None else range(asked.count)
+    for number, job in itertools.product(numbers, jobs):
+        if time.perf_counter() - began > asked.seconds:
+            break
+        trial = Trial(scene_of(job, asked.seed, number), number)
+        trial.solved(CALLS if asked.compare else ["default"])
+        trial.judged()
+        counts[job].update(["tried", trial.answer.status, *{kind for kind, _ in trial.verdicts}])
+        counts[job]["matched"] += trial.matched
+        if asked.compare and trial.found is not None:
+            counts[job].update(["comparable", *(f"best by {name}" for name, hit in trial.hits().items() if hit)])
+        for line in told(job, asked.seed, number, trial):
+            failures.append(line)
+            print(line, file=sys.stderr, flush=True)
+    columns = [*COUNTED, *(["comparable", *(f"best by {name}" for name in CALLS)] if asked.compare else [])]
+    rows = [{"job": job, **{name: counts[job][name] for name in columns}} for job in jobs]
+    harness.show(rows, asked.json, **({"failures": failures} if asked.json else {}))
+    sys.exit(any(counts[job][kind] for job in jobs for kind in FAILURES))
+
+
+if __name__ == "__main__":
+    main()

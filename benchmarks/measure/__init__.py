@@ -1,0 +1,1 @@
+"""What loomopt takes, and whether two checkouts say the same."""

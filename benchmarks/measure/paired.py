@@ -1,0 +1,151 @@
+"""This checkout against another in one run: what solving, certifying, evaluating, simulating and reading cost in each.
+
+Two worker processes do the same piece of work in turn, over and over, so that noise hits both alike; the clock counts
+the processor's time, so that other work on the machine counts little. "Built" is a solve with no NLP built before;
+"cold" one from the job's own starts; "warm" one from a neighbour's answer; "certificate" is part of the cold one.
+
+    git worktree add ../before TAG
+    python benchmarks/measure/paired.py ../before [--repeats N] [--only CASE] [--work evaluate,warm] [--most 1.05]
+        [--json]
+
+Quartiles are of the ratios of each round. With `--most` the exit code says whether a piece of work took longer than
+that by all that is told: medians, least times, and three quarters of the rounds.
+"""
+
+import functools
+import gc
+import math
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks import harness
+from benchmarks.measure import checkouts
+from benchmarks.measure.same_answers import FRAME, REED, TAPE
+
+CASES = {
+    "beatup": ("beatup", "balance", "operation.M0", "755 N*m"),
+    "beatup pulse": ("beatup", "pulse", "operation.M0", "755 N*m"),
+    "rapier": ("rapier", "stroke-dwell", "operation.stroke", "845 mm"),
+    "rapier smooth": ("rapier", "smooth", "operation.stroke", "845 mm"),
+    "shedding": ("shedding", "stiffness", "operation.speed", "590 rpm"),
+    "shedding law": ("shedding", "law", "operation.speed", "590 rpm"),
+    "beatup, all": ("beatup", "balance", "operation.M0", "755 N*m", *REED),
+    "rapier, all": ("rapier", "stroke-dwell", "operation.stroke", "845 mm", *TAPE),
+    "shedding, all": ("shedding", "stiffness", "operation.speed", "590 rpm", *FRAME),
+}
+"""Name → scene, target, the one number by which the neighbour differs whose answer a warm solve starts from, and
+effects that are put on: all algebraic ones that stand together."""
+WORK = ("built", "cold", "warm", "evaluate", "simulate", "read")
+OFTEN = {"read": 10, "evaluate": 20, "simulate": 5}
+"""How often a short piece of work is done for one time."""
+REPEATS = 9
+RATIOS = "ratio of medians", "ratio of least", "lower quartile"
+"""What must all be above a number for a piece of work to count as slower than that."""
+
+
+@functools.cache
+def case(name: str) -> tuple[Any, str, Any]:
+    """Return a case's scene, its target, and its neighbour's answer."""
+    import loomopt as lo
+
+    job, target, key, value, *effects = CASES[name]
+    scene = lo.load(job)
+    for effect in effects:
+        scene = scene.with_effect(effect)
+    return scene, target, lo.solve(scene.set(key, value), target)
+
+
+def work(name: str, what: str) -> Callable[[], Any]:
+    """Return one piece of work."""
+    import loomopt as lo
+    from loomopt.model import session
+    from loomopt.solving.nlp import transcribe
+
+    scene, target, neighbour = case(name)
+
+    def built() -> Any:
+        session.current().forget(transcribe.NLPS)
+        return lo.solve(scene, target)
+
+    calls: dict[str, Callable[[], Any]] = {
+        "built": built,
+        "cold": lambda: lo.solve(scene, target),
+        "warm": lambda: lo.solve(scene, target, near=neighbour),
+        "evaluate": lambda: lo.evaluate(scene, neighbour.design),
+        "simulate": lambda: lo.simulate(scene, neighbour.design),
+        "read": lambda: lo.load(CASES[name][0]),
+    }
+    return calls[what]
+
+
+def timed(question: tuple[str, str]) -> dict[str, float]:
+    """Return the milliseconds of processor time that a piece of work takes; of a solve, the certificate's too."""
+    name, what = question
+    call, often = work(name, what), OFTEN.get(what, 1)
+    gc.collect()
+    began = time.process_time()
+    for _ in range(often):
+        found = call()
+    seconds = (time.process_time() - began) / often
+    part = {"certificate": 1e3 * found.time["certify_s"]} if what == "cold" else {}
+    return {what: 1e3 * seconds, **part}
+
+
+def times(pair: tuple[checkouts.Worker, ...], question: tuple[str, str], repeats: int) -> list[list[dict[str, float]]]:
+    """Return what a piece of work took in each worker, the first time left out."""
+    found: list[list[dict[str, float]]] = [[] for _ in pair]
+    for repeat in range(repeats + 1):
+        places = range(len(pair)) if repeat % 2 else reversed(range(len(pair)))
+        for place in places:
+            taken = pair[place].ask(question)
+            if repeat:
+                found[place].append(taken)
+    return found
+
+
+def rows(name: str, here: list[dict[str, float]], there: list[dict[str, float]]) -> Iterator[dict[str, Any]]:
+    """Yield the table's lines of one piece of work."""
+    for part in here[0]:
+        one, other = [taken[part] for taken in here], [taken[part] for taken in there]
+        low, high = np.quantile([a / b for a, b in zip(one, other, strict=True)], (0.25, 0.75)).tolist()
+        yield {
+            "case": name,
+            "work": part,
+            "here [ms]": statistics.median(one),
+            "there [ms]": statistics.median(other),
+            "ratio of medians": statistics.median(one) / statistics.median(other),
+            "ratio of least": min(one) / min(other),
+            "lower quartile": low,
+            "upper quartile": high,
+        }
+
+
+def main() -> None:
+    """Print the table of one run."""
+    parser = checkouts.arguments(__doc__ or "")
+    parser.add_argument("--repeats", type=int, default=REPEATS)
+    parser.add_argument("--only", default="", help="cases whose name starts so")
+    parser.add_argument("--work", default=",".join(WORK), help="pieces of work, with commas between")
+    parser.add_argument("--most", type=float, default=math.inf, help="largest ratio that passes")
+    asked = parser.parse_args()
+    wanted = [what for what in WORK if what in asked.work.split(",")]
+    questions = [(name, what) for name in CASES if name.startswith(asked.only) for what in wanted]
+    with checkouts.workers(__file__, asked.other) as pair:
+        found = [line for question in questions for line in rows(question[0], *times(pair, question, asked.repeats))]
+    worst = max(min(each[ratio] for ratio in RATIOS) for each in found)
+    harness.show(found, asked.json, worst=worst)
+    sys.exit(worst > asked.most)
+
+
+if __name__ == "__main__":
+    if checkouts.WORKER in sys.argv:
+        # loomopt's own times are those of the processor too.
+        time.perf_counter = time.process_time
+        checkouts.serve(timed)
+    else:
+        main()

@@ -1,0 +1,252 @@
+"""This checkout against another: the same answers to every packaged scene and target, and to variations of them.
+
+A case is the same when its status, its binding limits and the keys of its JSON are, and when its objectives agree to
+1e-12 of their natural size (`Objective.scale`); of a case without an optimum, when the same limits clash and the least
+relaxation is the same to 1e-9; of a refusal, when its words are. Every exception is printed; the exit code says
+whether there are any.
+
+    git worktree add ../before TAG
+    python benchmarks/measure/same_answers.py ../before [--only SCENE] [--json]
+"""
+
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from benchmarks import harness
+from benchmarks.measure import checkouts
+
+SAME = 1e-12
+RELAXED = 1e-9
+SCENES = {
+    "beatup": ("balance", "pulse", "torque", "retrofit"),
+    "beatup-heavy": ("balance", "pulse", "torque", "retrofit"),
+    "beatup-light": ("balance", "pulse", "torque", "retrofit"),
+    "rapier": ("stroke-dwell", "dwell", "smooth", "match"),
+    "shedding": ("stiffness", "law", "force", "speed"),
+    "shedding-printed-travel": ("stiffness", "law", "force", "speed"),
+    "shedding-static": ("stiffness", "force", "speed"),
+}
+REED = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")
+TAPE = ("head_inertia", "tape_friction")
+FRAME = ("damping", "dry_friction")
+LAWS = ("harmonic", "modified_sine", "modified_trapezoid", "polynomial_345", "polynomial_4567", "polynomial_56789")
+COIL: dict[str, Any] = {f"bounds__{name}__free": True for name in ("wire", "diameter", "turns", "initial_tension")}
+Case = dict[str, Any]
+
+
+def case(name: str, target: str, *effects: str, free: str = "", options: Any = None, **changes: Any) -> Case:
+    """Return one case; a change's key is written with __ for the dot."""
+    keys = {key.replace("__", "."): value for key, value in changes.items()}
+    return {"scene": name, "target": target, "effects": effects, "free": free, "set": keys, "options": options or {}}
+
+
+def beatups() -> Iterator[Case]:
+    """Yield variations of the beat-up: cloth, speed, effects, bounds, limits, and what cannot be had."""
+    for M0 in (590, 700, 745.5, 830, 900):
+        yield case("beatup", "balance", operation__M0=f"{M0} N*m")
+    for target in ("balance", "torque"):
+        yield case("beatup", target, operation__speed="450 rpm")
+        yield case("beatup", target, *REED)
+        yield case("beatup", target, *REED, effects__rod_inertia__model="exact")
+    for effect in REED:
+        yield case("beatup", "balance", effect)
+    yield case("beatup", "pulse", *REED)
+    yield case("beatup", "retrofit", *REED)
+    yield case("beatup", "balance", effects__resistance__pulse="1 deg")
+    yield case("beatup", "balance", bounds__m4e="3 kg")
+    yield case("beatup", "balance", bounds__m4e__max="0 kg")
+    yield case("beatup", "balance", bounds__l1="31 mm", bounds__l4__max="160 mm")
+    yield case("beatup", "balance", bounds__l2__max="82 mm", limits__mu_min__min="57 deg")
+    yield case("beatup", "balance", limits__swing={"min": "23.08 deg", "max": "23.08 deg"})
+    yield case("beatup", "torque", limits__J4__max="0.65 kg*m^2")
+    yield case("beatup", "torque", limits__peak_torque__max="100 N*m", targets__torque__M3_tolerance="0 N*m")
+    yield case("beatup", "balance", limits__pulse_rms__max="400 N*m")
+    for name, weight in (("l1", 50.0), ("l2", 1e6), ("l4", 1e6)):
+        heavy: dict[str, Any] = {f"targets__retrofit__weights__{name}": weight}
+        yield case("beatup", "retrofit", **heavy)
+    yield case("beatup", "balance", limits__peak_torque__max="40 N*m")
+    yield case("beatup", "pulse", limits__pulse_rms__max="100 N*m")
+    yield case("beatup", "torque", bounds__l4__max="152 mm")
+    yield case("beatup", "balance", limits__tape_force__max="1 N")
+    yield from (case("beatup", "balance", options={"accuracy": accuracy}) for accuracy in (1e-3, 1e-11))
+    yield case("beatup", "balance", options={"starts": 4, "seed": 3})
+
+
+def rapiers() -> Iterator[Case]:
+    """Yield variations of the rapier drive."""
+    for stroke, dwell in ((700, 40), (900, 20)):
+        at = {"operation__stroke": f"{stroke} mm", "operation__dwell_after": f"{dwell} deg"}
+        yield case("rapier", "stroke-dwell", **at)
+    yield case("rapier", "stroke-dwell", free="sley")
+    yield from (case("rapier", "stroke-dwell", effect) for effect in TAPE)
+    yield case("rapier", "stroke-dwell", *TAPE, limits__tape_force__max="470 N")
+    yield case("rapier", "stroke-dwell", *TAPE, limits__peak_torque__max="260 N*m")
+    yield case("rapier", "dwell", limits__peak_acceleration__max="0.9 m/rad^2")
+    yield case("rapier", "stroke-dwell", limits__peak_jerk__max="1.6 m/rad^3")
+    yield case("rapier", "stroke-dwell", operation__dwell_after="80 deg", operation__dwell_before="80 deg")
+    yield case("rapier", "stroke-dwell", limits__peak_acceleration__max="0.6 m/rad^2")
+    yield case("rapier", "stroke-dwell", bounds__l6="180 mm", limits__mu_min__min="35 deg")
+
+
+def sheddings() -> Iterator[Case]:
+    """Yield variations of the heald frame."""
+    for law in LAWS:
+        yield case("shedding", "stiffness", *FRAME, mechanism__law=law)
+        yield case("shedding", "force", mechanism__law=law)
+    for shape in ("linear", "step"):
+        yield case("shedding", "stiffness", effects__warp_tension__shape=shape, operation__N_min="50 N")
+        yield case("shedding", "law", "dry_friction", effects__warp_tension__shape=shape, targets__law__intervals=8)
+    for symmetric in (False, True):
+        own: dict[str, Any] = {"targets__law__symmetric": symmetric, "targets__law__intervals": 8}
+        yield case("shedding", "law", *FRAME, **own)
+        yield case("shedding-printed-travel", "law", **own, operation__speed="500 rpm")
+    yield case("shedding", "stiffness", free="rise")
+    yield case("shedding", "stiffness", "damping", free="rise")
+    yield case("shedding", "stiffness", bounds__X0__max="60 mm")
+    yield case("shedding", "stiffness", limits__contact_max__max="25 kN", operation__N_min="10 N")
+    yield case("shedding", "force", bounds__K1__max="110 kN/m")
+    yield case("shedding", "stiffness", bounds__K1__max="100 kN/m")
+    yield case("shedding", "force", limits__contact_max__max="10 kN")
+    yield case("shedding", "stiffness", limits__pressure_angle_max__max="20 deg")
+    yield case("shedding", "speed", operation__N_min="100 N")
+    slow: dict[str, Any] = {"operation__speed": "177 rpm"}
+    yield case("shedding", "stiffness", "coil", **slow, **COIL)
+    yield case("shedding", "stiffness", "coil", **slow)
+
+
+def cases() -> list[Case]:
+    """Return every packaged scene and target, then the variations."""
+    packaged = [case(name, target) for name, targets in SCENES.items() for target in targets]
+    return [*packaged, *beatups(), *rapiers(), *sheddings()]
+
+
+def name_of(asked: Case) -> str:
+    """Return what a case is called in the list of exceptions."""
+    changes = [f"{key} = {value}" for key, value in asked["set"].items()]
+    parts = [*asked["effects"], *([f"free {asked['free']}"] if asked["free"] else []), *changes]
+    parts += [f"{key} {value}" for key, value in asked["options"].items()]
+    return " ".join([asked["scene"], asked["target"], *([f"({', '.join(parts)})"] if parts else [])])
+
+
+# In a worker ------------------------------------------------------------------------------------------------------
+
+
+def answered(asked: Case) -> Case:
+    """Return what is compared of a case's answer."""
+    import loomopt as lo
+
+    try:
+        scene = lo.load(asked["scene"])
+        for effect in asked["effects"]:
+            scene = scene.with_effect(effect)
+        scene = scene.update(asked["set"])
+        scene = scene.free(asked["free"]) if asked["free"] else scene
+        answer = lo.solve(scene, asked["target"], **asked["options"])
+    except lo.BadInput as error:
+        return {"status": "refused", "message": str(error)}
+    objectives = program_of(scene, asked["target"]).objectives
+    found = answer.as_dict()
+    return {
+        "status": answer.status,
+        "message": answer.message,
+        "objectives": [[each.figure, answer.figures[each.figure], each.scale, each.power] for each in objectives],
+        "binding": sorted(f"{price.limit} {price.side}" for price in answer.binding),
+        "worth": {f"{p.limit} {p.side}": dict(p.worth) for p in answer.binding},
+        "keys": sorted(keys(found)),
+        "clash": sorted(answer.clash),
+        "relaxation": {f"{each.limit} {each.side}": each.needed for each in answer.relaxation},
+        "figures": {**found["figures"], **{f"today's {k}": v for k, v in answer.before.figures.items()}}
+        if answer.before
+        else found["figures"],
+    }
+
+
+def program_of(scene: Any, target: str) -> Any:
+    """Return the program of a target."""
+    from loomopt.jobs import registry
+
+    return registry.of(scene).program(scene, target)
+
+
+def keys(found: Any, at: str = "") -> Iterator[str]:
+    """Yield the paths of all keys of a JSON object; those of a list's entries once."""
+    if isinstance(found, Mapping):
+        for key, value in found.items():
+            yield f"{at}.{key}"
+            yield from keys(value, f"{at}.{key}")
+    elif isinstance(found, list):
+        for value in found:
+            yield from keys(value, f"{at}[]")
+
+
+# Compared ---------------------------------------------------------------------------------------------------------
+
+
+def differences(here: Case, there: Case) -> Iterator[str]:
+    """Yield how two answers to one case differ."""
+    if here["status"] != there["status"]:
+        yield f"status {here['status']} here, {there['status']} there: {here['message']} | {there['message']}"
+        return
+    if here["status"] == "refused":
+        if here["message"] != there["message"]:
+            yield f"refused here: {here['message']} | there: {there['message']}"
+        return
+    if here["status"] == "optimal":
+        off = gap(here, there)
+        if not off <= SAME:
+            yield f"objectives off by {off:.2g}: {here['objectives']} | {there['objectives']}"
+    for part in ("binding", "clash", "keys"):
+        more, less = (sorted({*one[part]} - {*other[part]}) for one, other in ((here, there), (there, here)))
+        if more or less:
+            yield f"{part}: only here {more}, only there {less}"
+    for limit, needed in there["relaxation"].items():
+        own = here["relaxation"].get(limit)
+        if own is None or abs(own - needed) > RELAXED * abs(needed):
+            yield f"relaxation of {limit}: {own} here, {needed} there"
+
+
+def gap(here: Case, there: Case) -> float:
+    """Return by how much the objectives of two answers differ, in their natural sizes."""
+    pairs = zip(here["objectives"], there["objectives"], strict=True)
+    return max(abs(abs(a) ** power - abs(b) ** power) / scale for (_, a, _, _), (_, b, scale, power) in pairs)
+
+
+def farthest(here: Mapping[str, float | None], there: Mapping[str, float | None]) -> tuple[float, str]:
+    """Return the largest relative difference of two sets of figures, and of which; below 1e-3 as of 1e-3."""
+    shared = [(k, here.get(k), there.get(k)) for k in {*here, *there}]
+    off = {k: abs(a - b) / max(abs(a), abs(b), 1e-3) for k, a, b in shared if a is not None and b is not None}
+    worst = max(off, key=lambda k: off[k], default="")
+    return off.get(worst, 0.0), worst
+
+
+def main() -> None:
+    """Compare all cases and print the exceptions."""
+    parser = checkouts.arguments(__doc__ or "")
+    parser.add_argument("--only", default="", help="scenes whose name starts so")
+    parser.add_argument("--figures", type=float, default=1e-8, help="tell of figures that differ by more")
+    asked = parser.parse_args()
+    wanted = [each for each in cases() if each["scene"].startswith(asked.only)]
+    rows = []
+    with checkouts.workers(__file__, asked.other) as pair:
+        for each in wanted:
+            for worker in pair:
+                worker.send(each)
+            here, there = (worker.receive() for worker in pair)
+            told = list(differences(here, there))
+            if here["status"] == there["status"] != "refused":
+                off, which = farthest(here["figures"], there["figures"])
+                told += [f"note: figure {which} differs by {off:.2g}"] if off > asked.figures else []
+            rows += [{"case": name_of(each), "exception": text} for text in told]
+            for text in told:
+                print(f"{name_of(each)}: {text}", file=sys.stderr)
+    exceptions = [row for row in rows if not row["exception"].startswith("note")]
+    harness.show(rows or [{"case": "none", "exception": ""}], asked.json, cases=len(wanted), exceptions=len(exceptions))
+    sys.exit(bool(exceptions))
+
+
+if __name__ == "__main__":
+    if checkouts.WORKER in sys.argv:
+        checkouts.serve(answered)
+    else:
+        main()

@@ -1,0 +1,105 @@
+"""From the shell to the answer: the processor's time of whole commands beside that of `import casadi, numpy` alone.
+
+Commands run in turn, each in a process of its own, all with bytecode cached in a folder of this run, so that noise
+hits all alike and nothing has to be compiled. "loomopt solve beatup, less the solve" leaves out what `lo.solve` itself
+takes in that process; the rest is start-up: Python, imports, words, scene, tables. From one start: how wide a search
+is made is no start-up (benchmarks/measure/answers.py).
+
+Importing CasADi and NumPy is mostly loading shared libraries, a command is mostly running Python: their ratio differs
+by machine. "The same, with Typer and pydantic at work" is both, and so the fairer measure between machines.
+
+    python benchmarks/measure/startup.py [--quick] [--json]
+"""
+
+import argparse
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+
+from benchmarks import harness
+
+ALONE = "import casadi, numpy"
+FLOOR = "the same, with Typer and pydantic at work"
+LIBRARIES = """import gc
+gc.disable()
+import casadi, numpy, pydantic, typer
+class Table(pydantic.BaseModel):
+    length: float
+Table.model_validate({"length": 1.0})
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
+@app.callback()
+def start() -> None: ...
+@app.command()
+def solve(problem: str, target: str = "balance") -> None: ...
+app()"""
+COMMANDS = ("--version", "list", "evaluate beatup", "solve beatup --starts 1", "solve beatup")
+SOLVE, REST = "loomopt solve beatup --starts 1", "loomopt solve beatup, less the solve"
+TOLD = """import sys, time
+from loomopt.interface import api; from loomopt.interface.cli import app as cli
+solve = api.solve
+def timed(*arguments, **options):
+    import casadi
+    began = time.process_time()
+    answer = solve(*arguments, **options)
+    print(time.process_time() - began, file=sys.stderr)
+    return answer
+api.solve = timed
+cli.main()"""
+ROUNDS, FEW = 21, 5
+
+
+def spent(code, words, cache):
+    """Return the processor's seconds of one process, and the line it says on stderr."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env={**environment, "PYTHONPYCACHEPREFIX": cache, "PYDANTIC_DISABLE_PLUGINS": "__all__"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stderr
+
+
+def one_round(cache):
+    """Return the processor's milliseconds of each command, run once."""
+    found = {ALONE: spent(ALONE, (), cache)[0], FLOOR: spent(LIBRARIES, ("solve", "beatup"), cache)[0]}
+    for words in COMMANDS:
+        found[f"loomopt {words}"] = spent("from loomopt.interface.cli.app import main; main()", words.split(), cache)[0]
+    whole, solved = spent(TOLD, SOLVE.split()[1:], cache)
+    found[REST] = whole - float(solved)
+    return {name: 1e3 * seconds for name, seconds in found.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as cache:
+        one_round(cache)
+        rounds = [one_round(cache) for _ in range(FEW if asked.quick else ROUNDS)]
+    rows = []
+    for name in rounds[0]:
+        times, ratios = [one[name] for one in rounds], [one[name] / one[ALONE] for one in rounds]
+        rows.append(
+            {
+                "command": name,
+                "least [ms]": min(times),
+                "median [ms]": statistics.median(times),
+                "ratio of least": min(times) / min(one[ALONE] for one in rounds),
+                "median of ratios": statistics.median(ratios),
+                "beside the libraries at work": statistics.median(one[name] / one[FLOOR] for one in rounds),
+            }
+        )
+    harness.show(rows, asked.json)
+
+
+if __name__ == "__main__":
+    harness.one_thread()
+    main()

@@ -1,0 +1,1 @@
+"""loomopt beside other ways to the same answer."""

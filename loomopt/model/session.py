@@ -1,0 +1,81 @@
+"""What one solve leaves for the next and what is counted meanwhile; one thread computes at a time.
+
+CasADi counts the references to its expressions without a lock, and all expressions share some of theirs.
+"""
+
+import contextlib
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator
+from contextvars import ContextVar
+from typing import TypeVar, cast
+
+Made = TypeVar("Made")
+
+LOCK = threading.RLock()
+"""Held by the thread that computes, whatever its session: what CasADi's expressions share, all sessions do."""
+
+
+class Session:
+    """What is kept, and how many positions of mechanisms were evaluated, by samples, nodes and boxes."""
+
+    def __init__(self) -> None:
+        self.positions = 0
+        self._kept: dict[str, OrderedDict[Hashable, object]] = {}
+        self._beside: weakref.WeakKeyDictionary[object, dict[Hashable, object]] = weakref.WeakKeyDictionary()
+
+    def kept(self, what: str, most: int, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what is kept by a key, made where it is not there; the least recently used of more than `most` goes.
+
+        what: of which there are so many at most.
+        """
+        with LOCK:
+            found = self._kept.setdefault(what, OrderedDict())
+            if key in found:
+                found.move_to_end(key)
+            else:
+                found[key] = make()
+                if len(found) > most:
+                    found.popitem(last=False)
+            return cast(Made, found[key])
+
+    def beside(self, owner: object, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what is kept of an owner by a key, made where it is not there; it goes with its owner."""
+        with LOCK:
+            found = self._beside.setdefault(owner, {})
+            if key not in found:
+                found[key] = make()
+            return cast(Made, found[key])
+
+    def count(self, what: str) -> int:
+        """Return how many are kept."""
+        return len(self._kept.get(what, ()))
+
+    def forget(self, what: str) -> None:
+        """Let go of all that is kept of one sort."""
+        self._kept.pop(what, None)
+
+
+OF_PROCESS = Session()
+"""Where a thread computes that has entered no other: so a sweep finds the NLPs that a solve has built."""
+_CURRENT = ContextVar[Session | None]("session", default=None)
+
+
+def current() -> Session:
+    """Return the session in which this thread computes."""
+    return _CURRENT.get() or OF_PROCESS
+
+
+@contextlib.contextmanager
+def working(session: Session | None = None) -> Iterator[Session]:
+    """Compute in a session, the current one where none is given, while no other thread does; yields the session.
+
+    A thread that has begun may begin again, as a solve within a solve does.
+    """
+    with LOCK:
+        token = _CURRENT.set(session or current())
+        try:
+            yield current()
+        finally:
+            _CURRENT.reset(token)

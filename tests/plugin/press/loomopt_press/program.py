@@ -1,0 +1,20 @@
+"""From a press scene to the program: crank, rod and every bounded number, the least peak torque."""
+
+from loomopt.base.records import lazy
+from loomopt.jobs.task import Task
+from loomopt.model.model import JobModel
+from loomopt.model.objectives import Objective, Peak
+from loomopt_press.model import model
+
+
+class PressTask(Task):
+    """The slider-crank; what it may do, and what its effects ask for, is said by the scene."""
+
+    @lazy
+    def model(self) -> JobModel:
+        """The slider-crank with the effects the scene calls for."""
+        return model(self.scene)
+
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the peak crank torque, and what checks would have least."""
+        return Peak("peak_torque", "peak_torque", self.figure_size("peak_torque")), *self.least()

@@ -1,0 +1,80 @@
+"""Four problems solved in one thread after another, then so many times in four threads at once: the same, to the digit.
+
+    python four_threads.py [TIMES]
+
+Run by test_threads.py: where expressions of two threads meet, the process ends without a word.
+"""
+
+import gc
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import loomopt as lo
+from loomopt.model import session
+from loomopt.solving.nlp import transcribe
+
+PROBLEMS = {
+    "beatup-light": ("balance", ()),
+    "rapier": (None, ()),
+    "shedding-static": (None, ()),
+    "beatup": ("balance", ("gravity", "rod_inertia")),
+}
+"""Scene → target and effects that are put on."""
+USES = ("solve", "evaluate", "simulate", "prove")
+
+
+def used(name, how):
+    """Return the digits of one use of a problem, and what it counted."""
+    target, effects = PROBLEMS[name]
+    scene = lo.load(name)
+    for effect in effects:
+        scene = scene.with_effect(effect)
+    if how == "solve":
+        answer = lo.solve(scene, target, starts=1)
+        return answer.design, answer.figures, answer.certificate, answer.solver, answer.message
+    if how == "evaluate":
+        return lo.evaluate(scene, target=target).as_dict()
+    if how == "simulate":
+        return lo.simulate(scene).to_csv()
+    return lo.prove(scene, target=target).as_dict()
+
+
+def together(times):
+    """Return what four threads found that go through problems and uses, each beginning with another."""
+    found, begin = list[tuple[tuple[str, str], object]](), threading.Barrier(len(PROBLEMS))
+
+    def work(first):
+        names = list(PROBLEMS)
+        begin.wait()
+        for k in range(times):
+            if first == 0 and k % 3 == 0:
+                session.current().forget(transcribe.NLPS)
+            for place in range(len(names)):
+                name = names[(first + place) % len(names)]
+                found.extend(((name, how), used(name, how)) for how in (USES if k == 0 else ("solve", "evaluate")))
+
+    with ThreadPoolExecutor(len(PROBLEMS)) as pool:
+        list(pool.map(work, range(len(PROBLEMS))))
+    return found
+
+
+def collecting(stop):
+    """Collect garbage again and again, so that what CasADi made is let go of in a thread that computes nothing."""
+    while not stop.wait(0.1):
+        gc.collect()
+
+
+if __name__ == "__main__":
+    alone = {(name, how): used(name, how) for name in PROBLEMS for how in USES}
+    gc.freeze()
+    stop = threading.Event()
+    collector = threading.Thread(target=collecting, args=(stop,))
+    collector.start()
+    try:
+        found = together(int(sys.argv[1]) if sys.argv[1:] else 1)
+    finally:
+        stop.set()
+    differing = {what for what, digits in found if repr(digits) != repr(alone[what])}
+    print(len(found), "uses,", "differing:", sorted(differing) or "none")
+    sys.exit(bool(differing))
