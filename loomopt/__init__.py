@@ -4,6 +4,8 @@
 >>> answer = lo.solve(lo.load("beatup-light"), target="balance")
 """
 
+from loomopt.base import __version__ as __version__
+
 TYPE_CHECKING = False  # as type checkers know it: `typing` would be nearly all that importing this takes
 if TYPE_CHECKING:
     from loomopt.base.errors import BadInput
@@ -23,8 +25,6 @@ if TYPE_CHECKING:
     from loomopt.interface.finished import DesignStudy, EffectsStudy
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Proofs
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "Answer": "loomopt.interface.api",

@@ -63,6 +63,8 @@ def imports(source):
             names += [(f"{node.module}.{alias.name}", node.lineno) for alias in node.names]
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             names += [(node.value, node.lineno)] if re.fullmatch(r"loomopt(\.\w+)+", node.value) else []
+    # What is taken from the package itself would come from above all rooms.
+    names = [("loomopt.__init__" if name.startswith("loomopt.__") else name, line) for name, line in names]
     inner = [(name.removeprefix("loomopt."), line) for name, line in names if name.startswith("loomopt.")]
     return [(name, line) for name, line in inner if room(name) in FLOOR]
 

@@ -6,7 +6,7 @@ import re
 import sys
 from pathlib import Path
 
-from loomopt import __version__
+from loomopt.base import __version__
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""

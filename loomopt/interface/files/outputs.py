@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt import __version__
+from loomopt.base import __version__
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
 from loomopt.interface import tables
