@@ -195,7 +195,7 @@ def proofs(found: "Proofs") -> list[str | Grid]:
     """Return the parts of a proof: a sentence, and what was shown of each limit."""
     words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
     for proof in found.proofs:
-        unit = words.unit(proof.limit.removeprefix("peak "))
+        unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
         shown = "" if unit == "1" else unit

@@ -126,7 +126,9 @@ def roundings(scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
     Empty where no rounding shows: in nominal numbers and in a computer's own. Lists of numbers are never typed.
     """
     words, labels = Words(scene), numbers.labels(scene)
-    known = {name: words.kind(labels.get(name, name)) for name in design if _single(scene, name)}
+    known = {
+        name: words.kind(labels.get(name, name)) for name in design if not designs.in_list(name, scene.schema.lists)
+    }
     sizes = {name: (1.0, factor(scene.shown_in(kind))) for name, kind in known.items()}
     given = {name: min((digits(design[name] / size), size) for size in sizes[name]) for name in known if design[name]}
     most = max((count for count, _ in given.values()), default=0)
@@ -145,11 +147,6 @@ def digits(value: float) -> int:
 def _half(value: float, count: int) -> float:
     """Return half a unit of the last of `count` significant digits."""
     return 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - count + 1)
-
-
-def _single(scene: Scene, name: str) -> bool:
-    """Say whether a number of a design stands by itself, and is none of a list."""
-    return not any(name.startswith(f"{each}_") for each in scene.schema.lists)
 
 
 def _values(evaluate: Evaluate, design: Mapping[str, float]) -> list[float]:

@@ -50,7 +50,7 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, clash.x) if clash.x else job.today(scene))
-    return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
+    return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits.values()))
 
 
 def _counts(search: Search) -> dict[str, Any]:
@@ -195,7 +195,7 @@ def without_optimum(
         status="infeasible" if found.relaxations else "failed",
         message=message,
         relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
-        clash=found.limits,
+        clash=tuple(found.limits),
         explanation=explanation if found.relaxations else "",
         solver=solver,
         today=today,

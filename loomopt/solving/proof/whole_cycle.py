@@ -83,7 +83,7 @@ class _Read:
 class _Claim:
     """That |quantity| (of a signed one, the quantity) stays below a bound; peak: its refined largest; all SI."""
 
-    limit: str
+    name: str
     text: str
     quantity: str
     bound: float
@@ -123,9 +123,7 @@ def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) 
     for figure, quantity in job.peaks(whole.sampler.model).items():
         peak = whole.sampler.peak(quantity)
         if math.isfinite(peak):
-            yield _over_cycle(
-                whole, _Claim(f"peak {figure}", f"{figure} as claimed", quantity, peak, peak, kind="peak")
-            )
+            yield _over_cycle(whole, _Claim(figure, f"{figure} as claimed", quantity, peak, peak, kind="peak"))
 
 
 def _over_cycle(read: _Read, claim: _Claim) -> Proof:
@@ -136,7 +134,7 @@ def _over_cycle(read: _Read, claim: _Claim) -> Proof:
     worst = max(found, key=lambda each: RANK[each.status])
     count = sum(each.boxes for each in found)
     angle = None if worst.angle is None else worst.angle % (2 * math.pi)
-    return Proof(claim.limit, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle, claim.kind)
+    return Proof(claim.name, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle, claim.kind)
 
 
 def _single(read: _Read, limit: Limit, text: str) -> Proof:

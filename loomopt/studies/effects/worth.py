@@ -9,6 +9,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.model.program import Objective, Program
+from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import evaluation
 from loomopt.solving.answer.solution import Evaluation, Finding
@@ -221,6 +222,9 @@ def _scales(objectives: Mapping[str, Objective], given: Scene, target: str) -> d
 def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evaluation:
     """Return a design, of which only the numbers count that a scene has. Raises BadInput."""
     numbers = registry.of(scene).numbers(scene)
-    lists = tuple(f"{name}_" for name in scene.schema.lists)
-    own = {name: value for name, value in design.items() if scene.full(name) in numbers or name.startswith(lists)}
+    own = {
+        name: value
+        for name, value in design.items()
+        if scene.full(name) in numbers or designs.in_list(name, scene.schema.lists)
+    }
     return evaluation.evaluate(scene, own, target)

@@ -146,7 +146,7 @@ def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
     here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else terms.evaluation({})
     today = functools.partial(terms.evaluation, {})
     told = {"status": found.reason, "accuracy": solver.accuracy}
-    explained = solver.job.explain(solver.scene, clash.limits)
+    explained = solver.job.explain(solver.scene, clash.limits.values())
     made = report.without_optimum(terms.target or "", here, clash, told, today, explained)
     return made if clash.limits else replace(made, status=found.status, message=f"No design was found: {found.reason}.")
 

@@ -145,7 +145,7 @@ def relaxed(text, alone):
 )
 def test_an_infeasible_target_says_what_clashes_and_what_helps(relaxations, said):
     here = evaluated((), {"x": 1.0, "y": 1.0})
-    clash = Clash(("p <= 1", "x >= 9"), relaxations)
+    clash = Clash({"p <= 1": "p", "x >= 9": "x"}, relaxations)
     answer = report.without_optimum("least", here, clash, {"status": "Restoration_Failed"}, here, "Physics.")
     assert answer.status == "infeasible"
     head = "No admissible design exists near any start. Limits that clash: p <= 1, x >= 9."
