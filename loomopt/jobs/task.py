@@ -285,8 +285,8 @@ class Task(abc.ABC):
     # Natural sizes.
 
     def figure_size(self, name: str) -> float:
-        """Return the natural size of a figure."""
-        return size_read(self.sampler, name)
+        """Return the natural size of a figure: today's value of it, or of the first row that it is read from."""
+        return size_read(self.sampler, self.read_from.get(name, (name,))[0])
 
     def size(self, axis: str) -> float:
         """Return the natural size of what of an axis is sought the least of."""
