@@ -24,7 +24,9 @@ MODEL = JobModel(
     integrals=(Integral("mean", "", "force"), Integral("mean_square", "rms", "square")),
 )
 WITH_CLOTH = replace(
-    MODEL, effects=(*MODEL.effects, CLOTH), integrals=(Integral("pressing", "", "force", where=("cloth", 1.0)),)
+    MODEL,
+    effects=(*MODEL.effects, CLOTH),
+    integrals=(Integral("pressing", "", "force", where=("cloth", 1.0)), Integral("whole", "", "force")),
 )
 MACHINES = {
     "spring and mass": {},
@@ -91,6 +93,8 @@ def test_a_mean_over_pieces_is_the_integral_over_just_these(width):
         lambda phi: a + b * mpmath.cos(phi) + F * (met - mpmath.cos(phi)) / (1 + met), [math.pi - width, math.pi]
     )
     assert sampler.figures["pressing"] == pytest.approx(float(exact) / width, rel=1e-9 if width < 0.01 else 1e-12)
+    whole = a + F * (met * width + math.sin(width)) / (1 + met) / TURN
+    assert sampler.figures["whole"] == pytest.approx(whole, rel=1e-9), "pieces count by their widths"
 
 
 @pytest.mark.parametrize("samples", [90, 360, 5000])
