@@ -4,7 +4,7 @@ import abc
 import functools
 import importlib
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -233,8 +233,8 @@ class Job(abc.ABC):
                     found[label(check, key)] = sold
         return found
 
-    def explain(self, scene: Scene, clash: Sequence[str]) -> str:
-        """Return what physics says of why the limits `clash` (phrases) do; "" where it says nothing."""
+    def explain(self, scene: Scene, clash: Collection[str]) -> str:
+        """Return what physics says of why the limits named `clash` do; "" where it says nothing."""
         known = self.numbers(scene)
         limited = numbers.bounds(scene, known)
         told = [check.explain(known, limited, own, clash, scene.show) for check, own in _checks(scene)]

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +90,11 @@ def flat(design: Design) -> dict[str, float]:
     for name, value in design.items():
         found |= {name: value} if isinstance(value, float | int) else {f"{name}_{k}": v for k, v in enumerate(value)}
     return found
+
+
+def in_list(key: str, lists: Collection[str]) -> bool:
+    """Say whether a number of a flat design is one of a list's."""
+    return any(_place(key, name) is not None for name in lists)
 
 
 def _place(key: str, name: str) -> int | None:

@@ -22,14 +22,14 @@ class Clock:
         yield
         self._parts[part] += time.perf_counter() - began
 
-    def told(self, search: Search) -> dict[str, float]:
+    def seconds(self, search: Search) -> dict[str, float]:
         """Return the seconds of each part and of all; making NLPs counts as building, not as solving."""
         parts = self._parts
         return {
             "import_s": parts["import"],
             "build_s": parts["build"] + search.built,
             "solve_s": parts["solve"] + search.solved - search.built,
-            "settle_s": search.settled,
+            "settle_s": search.tie_broken,
             "certify_s": search.certified,
             "report_s": parts["report"],
             "total_s": time.perf_counter() - self.began,

@@ -17,7 +17,7 @@ from loomopt.solving.clock import Clock
 from loomopt.solving.nlp.ipopt import IterationCallback
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.options import GlobalProof
-from loomopt.solving.search import elastic, least_change, steady_state
+from loomopt.solving.search import elastic, multistart
 from loomopt.solving.search.search import Search
 
 
@@ -61,14 +61,17 @@ def solve(
         today = {**job.values(program, job.today(scene)), **program.today}
 
         begun = own.positions
-        search = steady_state.searched(Search(job, program, settings, today), starts, seed, near, on_start)
+        search = multistart.resolved(Search(job, program, settings, today), starts, seed, near, on_start)
         bound, sold = None, job.sizes(scene)
         if global_proof:
             from loomopt.solving.proof import levels
 
             refused = f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else ""
             search, bound = levels.claimed(search, global_proof, refused)
-        search = least_change.with_least_change(search)
+        if search.best and search.best.certificate.level:
+            from loomopt.solving.search import least_change
+
+            search = least_change.with_least_change(search)
         # Figures are read as finely for every answer: they are no part of what accuracy costs.
         evaluations = own.positions - begun
 
@@ -88,4 +91,4 @@ def solve(
 
             settings.at("proving")
             answer = whole_cycle.proven(scene, target, answer)
-        return report.completed(answer, bound, evaluations, clock.told(search))
+        return report.completed(answer, bound, evaluations, clock.seconds(search))

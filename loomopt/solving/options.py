@@ -43,25 +43,25 @@ def check(
     check_global_proof(global_proof)
 
 
-def check_global_proof(asked: GlobalProof | None) -> None:
+def check_global_proof(proof: GlobalProof | None) -> None:
     """Raise BadInput for a gap or a time outside what can be kept, where a proof is asked for at all."""
-    if asked is None:
+    if proof is None:
         return
-    arguments.number(asked.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
-    arguments.number(asked.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
-    if not LEAST_GAP <= asked.gap <= MOST_GAP:
+    arguments.number(proof.gap, "gap", f"{LEAST_GAP:g} to {MOST_GAP:g}", "Give 1e-3 as a number, or leave it out")
+    arguments.number(proof.seconds, "seconds", "seconds, more than 0", "Give 60 as a number, or leave it out")
+    if not LEAST_GAP <= proof.gap <= MOST_GAP:
         raise BadInput(
             "the gap is out of range",
             key="--gap",
-            value=f"{asked.gap:g}",
+            value=f"{proof.gap:g}",
             allowed=f"{LEAST_GAP:g} to {MOST_GAP:g}",
             remedy="Write --gap 1e-3, or leave it out.",
         )
-    if not 0 < asked.seconds < math.inf:
+    if not 0 < proof.seconds < math.inf:
         raise BadInput(
             "the time is out of range",
             key="--time",
-            value=f"{asked.seconds:g}",
+            value=f"{proof.seconds:g}",
             allowed="seconds, more than 0",
             remedy="Write --time 60, or leave it out.",
         )

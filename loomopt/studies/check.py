@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scenes import packaged, provenance
+from loomopt.scenes import designs, packaged, provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
@@ -224,9 +224,9 @@ def reference(found: Solution, scene: Scene) -> "pd.DataFrame":
     columns: dict[str, Any] = {"status": found.status}
     figures = {**found.figures, **found.design}
     lists = {
-        f"{name}_{k} [{found.units[name]}]": v
+        f"{key} [{found.units[name]}]": value
         for name in scene.schema.lists
-        for k, v in enumerate(found.design.get(name, ()))
+        for key, value in designs.flat({name: found.design.get(name, ())}).items()
     }
     if found.status == "infeasible":
         figures = {}

@@ -156,7 +156,7 @@ def test_a_relaxation_is_the_same_in_other_words():
 
 
 def test_what_physics_says_of_a_clash_is_in_the_scenes_units():
-    clash = ("surge_ratio >= 13", "shear_share <= 0.5")
+    clash = ("surge_ratio", "shear_share")
     scenes = (all_on(lo.load("shedding")), all_on(in_inches("shedding")))
     own, inches = (registry.of(scene).explain(scene, clash) for scene in scenes)
     assert re.search(r" mm carry at least \S+ MPa .* allows \S+ MPa", own)

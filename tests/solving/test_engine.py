@@ -9,7 +9,7 @@ from loomopt.solving.answer import evaluation
 from loomopt.solving.answer.solution import Clash
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
-from loomopt.solving.search import steady_state
+from loomopt.solving.search import multistart
 from loomopt.solving.search.search import Search
 
 BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
@@ -129,13 +129,13 @@ def test_the_callback_counts_iterations():
 def test_a_program_is_solved_without_its_scene():
     program = toy.program("xy", BOWL)
     search = Search(toy.ToyJob(program), program, Settings())
-    found = steady_state.searched(search)
+    found = multistart.resolved(search)
     assert found.passed
     assert found.best.x == pytest.approx({"x": 1.0, "y": 0.0}, abs=1e-12)
-    again = steady_state.searched(search, near=[found.candidates[0].point])
+    again = multistart.resolved(search, near=[found.candidates[0].point])
     assert (again.passed, len(again.candidates)) == (True, 1)
     other = replace(found.candidates[0].point, structure="another")
-    assert steady_state.searched(search, near=[other]).candidates[0].point.iterations > 0
+    assert multistart.resolved(search, near=[other]).candidates[0].point.iterations > 0
 
 
 def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):

@@ -14,7 +14,7 @@ from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import steady_state
+from loomopt.solving.search import multistart
 from loomopt.solving.search.search import Search
 
 SCENE = lo.load("beatup").with_effect("shaft_torsion")
@@ -128,7 +128,7 @@ def test_an_optimum_of_too_few_harmonics_is_not_certified():
 
 def test_a_search_that_ends_where_more_are_needed_begins_again_with_them():
     program, job = coarse(8), registry.of(SCENE)
-    search = steady_state.searched(Search(job, program, Settings()), 1)
+    search = multistart.resolved(Search(job, program, Settings()), 1)
     assert counted(program) == "8"
     assert counted(search.program) == "32"
     assert search.passed

@@ -201,7 +201,7 @@ def simulate(
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else ""
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else None
     for path in out or ():
         outputs.curves(path, scene, given, asked, name, said)
         remark(f"Wrote {path}")
@@ -226,7 +226,7 @@ def export(
     from loomopt.interface.files import outputs
 
     scene, given, name, status = read_asked(problem, design, target, sets, on, off)
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given else ""
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
     for path in out:
         outputs.linkage(path, scene, given, said)
         remark(f"Wrote {path}")

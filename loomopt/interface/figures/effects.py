@@ -19,6 +19,7 @@ WIDTH, BAR, ROOM = 7.0, 0.34, 1.25
 """Inches: of the page, of an effect's bars, beside those of a panel."""
 DECADES = 5
 """How far below the larger of tolerance and largest share a bar is still seen."""
+SHIFTED = "shift at the reference's design"
 SHIFT, REGRET, LIMIT = COLOURS[0], COLOURS[1], COLOURS[3]
 QUIET = "#6b7280"
 NUMBER = 7.0
@@ -42,7 +43,7 @@ def _drawn(found: Found) -> Any:
     names = [f"{row.effect}{' (may go)' if row.effect in found.left_out else ''}" for row in found.rows]
     panels: dict[str, Mapping[str, Sequence[float | None]]] = {
         figure: {
-            "shift at the reference's design": [row.shift.get(figure) for row in found.rows],
+            SHIFTED: [row.shift.get(figure) for row in found.rows],
             "regret of the design found without": [row.regret.get(figure) for row in found.rows],
         }
         for figure in found.reference.scales
@@ -112,7 +113,7 @@ def _panel(
 
 def _length(value: float | None, label: str, least: float, most: float) -> float:
     """Return where a bar ends, %: of a shift at its size, of what else is none the worse at the beginning."""
-    size = 0.0 if value is None else abs(value) if label.startswith("shift") else value
+    size = 0.0 if value is None else abs(value) if label == SHIFTED else value
     return min(max(100 * size, least), most)
 
 

@@ -4,10 +4,10 @@ import contextlib
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt import __version__
 from loomopt.base.errors import BadInput
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
-DRAWINGS = (".svg", ".dxf", ".csv")
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
 TODAY, GIVEN = "today's machine", "a given design"
@@ -39,7 +38,18 @@ FOUND = {
     "interrupted": "best design for {} so far, interrupted",
 }
 """What an answer's design is, by its status and target."""
-BROKEN = "; limits not held: "
+
+
+class Subject(NamedTuple):
+    """What a drawn design is, in a few words, and the limits that it does not hold."""
+
+    name: str
+    broken: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """Both, for a title."""
+        return f"{self.name}; limits not held: {', '.join(self.broken)}" if self.broken else self.name
 
 
 def document(found: Evaluation) -> str:
@@ -132,7 +142,7 @@ def curves(
     design: Design,
     accuracy: float | None = None,
     target: str | None = None,
-    said: str = "",
+    said: Subject | None = None,
 ) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
@@ -164,7 +174,7 @@ def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Fi
     return drawn
 
 
-def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: str = "") -> "Figure":
+def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: Subject | None = None) -> "Figure":
     """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
     design: SI; today's without one. said: what it is, as `what` says it.
@@ -177,50 +187,64 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], sa
     own = {**now, **design}
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
-    name, broken, _ = said.partition(BROKEN)
-    subject = name or (GIVEN if design else TODAY)
-    title = f"{scene.name}: {subject}{', limits not held' if broken else ''}, curves over the cycle"
+    subject = said or Subject(GIVEN if design else TODAY)
+    title = f"{scene.name}: {subject.name}{', limits not held' if subject.broken else ''}, curves over the cycle"
     unit = scene.shown_in("angle")
     drawn: Figure = curves.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
 
 
-def what(found: Evaluation, target: str | None = None, status: str | None = None) -> str:
-    """Say in a few words what the design of an evaluation or of an answer is.
+def what(found: Evaluation, target: str | None = None, status: str | None = None) -> Subject:
+    """Say what the design of an evaluation or of an answer is.
 
     target, status: of the answer whose design was evaluated, where it was one's.
     """
-    broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
-    said = f"{BROKEN}{broken}" if broken else ""
+    broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     if isinstance(found, Solution):
-        return FOUND[found.status].format(found.sought) + said
+        return Subject(FOUND[found.status].format(found.sought), broken)
     if target and status in FOUND and not (broken and status == "optimal"):
-        return FOUND[status].format(target) + said
+        return Subject(FOUND[status].format(target), broken)
     own, scene = flat(found.design), found.scene
     now = registry.of(scene).today(scene) if scene else {}
-    return (TODAY if own.items() <= now.items() else GIVEN) + said
+    return Subject(TODAY if own.items() <= now.items() else GIVEN, broken)
 
 
-def drawing(scene: Scene, design: Design, said: str = "") -> "Drawing":
+def drawing(scene: Scene, design: Design, said: Subject | None = None) -> "Drawing":
     """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
     found = registry.of(scene).views.linkage(scene, flat(design))
-    return replace(found, title=f"{scene.name}: {said or (GIVEN if design else TODAY)}")
+    return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
 
 
-def linkage(path: Path, scene: Scene, design: Design, said: str = "") -> None:
-    """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
-    from loomopt.interface.files import dxf, svg
-
-    ending = suffix(path, DRAWINGS)
-    if ending == ".csv":
-        text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
-    elif ending == ".svg":
-        text(path, svg.render(drawing(scene, design, said)))
-    else:
-        atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
+def linkage(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
+    """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`)."""
+    DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
 
 
-def picture(path: Path, scene: Scene, design: Design, said: str = "") -> None:
+def _joints(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage's joints as CSV."""
+    text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
+
+
+def _svg(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage as SVG at true scale."""
+    from loomopt.interface.files import svg
+
+    text(path, svg.render(drawing(scene, design, said)))
+
+
+def _dxf(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage as DXF at true scale."""
+    from loomopt.interface.files import dxf
+
+    atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
+
+
+Writer = Callable[[Path, Scene, Design, Subject | None], None]
+DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints}
+"""Ending of a file → what writes a linkage to it."""
+
+
+def picture(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.interface.figures import figure
 

@@ -155,7 +155,7 @@ def everywhere(found: GlobalBound, scene: Scene) -> str:
         if level.bound == 0.0 and level.proven:
             said.append(f"{name} is 0, less than which there is none")
         elif math.isfinite(level.bound):
-            said.append(f"{among} has {name} {BEYOND[side]} {words.bounded(level.objective, level.bound, side)}")
+            said.append(f"{among} has {name} {BEYOND[side]} {words.outward(level.objective, level.bound, side)}")
         kept.append(f"{name} at most {words.shown(level.objective, level.band, 2)} {BEYOND[-side]} the best")
     head = f"Proven best, gap {100 * found.gap:.2g} %" if found.proven else f"NOT proven best: {found.why}"
     cost = f" ({found.boxes} boxes, {found.seconds:.1f} s)" if found.boxes else ""
@@ -195,7 +195,7 @@ def proofs(found: "Proofs") -> list[str | Grid]:
     """Return the parts of a proof: a sentence, and what was shown of each limit."""
     words, angle, lines = Words(found.scene), found.scene.shown_in("angle"), []
     for proof in found.proofs:
-        unit = words.unit(proof.limit.removeprefix("peak "))
+        unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
         shown = "" if unit == "1" else unit

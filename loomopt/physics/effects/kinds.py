@@ -4,7 +4,7 @@ An effect that is absent from a scene is absent from its equations.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
@@ -108,7 +108,7 @@ class Effect:
     examples: tables it may have, as a scene writes them, for tests and templates.
     letters: keys of its table → their symbols in equations, a key's own name without one.
     figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
-    many: whether the table holds one table for each of several instances; instance: which of them this is.
+    many: whether the table holds one table for each of several instances; kind, instance: of one of them its table.
     """
 
     name: str
@@ -124,12 +124,13 @@ class Effect:
     figures: tuple[Figure, ...] = ()
     margins: Mapping[str, str] = field(default_factory=dict)
     many: bool = False
+    kind: str = ""
     instance: str = ""
 
     @property
     def path(self) -> tuple[str, ...]:
         """Where its table stands inside [effects]: under its name; of an instance under that of its kind first."""
-        return (self.name.removesuffix(f".{self.instance}"), self.instance) if self.instance else (self.name,)
+        return (self.kind, self.instance) if self.instance else (self.name,)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -176,7 +177,11 @@ def nothing_remarked(given: Values, own: Values, shown: Shown) -> str:
 
 
 def nothing_explained(
-    known: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], own: Any, clash: Iterable[str], shown: Shown
+    known: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    own: Any,
+    clash: Collection[str],
+    shown: Shown,
 ) -> str:
     """Return nothing: physics has nothing general to say."""
     return ""
@@ -191,7 +196,7 @@ class Check(Effect, Generic[Pose]):
     on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
     remark(given, own, shown): what to know beside its figures, "" for nothing, in the reader's units.
-    explain(known, bounds, own, clash, shown): what physics says of why the limits `clash` do, in the reader's units.
+    explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
     """
 
     quantities: Mapping[str, Reading[Pose]] = field(default_factory=dict)
@@ -201,7 +206,7 @@ class Check(Effect, Generic[Pose]):
     axes: tuple[Axis, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
     remark: Callable[[Values, Values, Shown], str] = nothing_remarked
-    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Iterable[str], Shown], str] = (
+    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], Shown], str] = (
         nothing_explained
     )
 
@@ -335,7 +340,7 @@ EVALUATED = (Speed,)
 @functools.cache
 def instance(effect: Effect, name: str) -> Effect:
     """Return one instance of an effect that there may be many of: the same object for the same name."""
-    return replace(effect, name=f"{effect.name}.{name}", instance=name)
+    return replace(effect, name=f"{effect.name}.{name}", kind=effect.name, instance=name)
 
 
 def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:

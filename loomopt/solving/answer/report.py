@@ -11,10 +11,9 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.evaluation import evaluated, evaluation
 from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Price, Relaxation, Solution, remedies
 from loomopt.solving.answer.words import Words
-from loomopt.solving.certificate.kkt import figure_of
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound
 from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.search.search import Candidate, Judged, Search, compared
+from loomopt.solving.search.search import Candidate, Search, compared
 
 Today = Callable[[], Evaluation]
 """Evaluates today's machine."""
@@ -32,9 +31,9 @@ def answer(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
     return _with(scene, target, search, search.best)
 
 
-def _with(scene: Scene, target: str, search: Search, best: Judged) -> Solution:
+def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solution:
     """Return the answer of the best design that was reached."""
-    job, program, point = search.job, search.program, best.candidate.point
+    job, program, point = search.job, search.program, best.point
     solver: dict[str, Any] = {**NOT_SOLVED, **_counts(search), "status": point.status, "iterations": point.iterations}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
@@ -50,13 +49,13 @@ def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solutio
         solver |= {"status": points[0].status, "iterations": sum(point.iterations for point in points)}
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, clash.x) if clash.x else job.today(scene))
-    return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits))
+    return without_optimum(target, here, clash, solver, today, job.explain(scene, clash.limits.values()))
 
 
 def _counts(search: Search) -> dict[str, Any]:
     """Return how many starts there were, how many ended at the best, and the accuracy asked for."""
     best = search.best
-    same = [c for c in search.candidates if _is_there(c, best.candidate)] if best else []
+    same = [c for c in search.candidates if _is_there(c, best)] if best else []
     accuracy = search.settings.accuracy
     counts = {
         "starts": len(search.candidates) + search.sought,
@@ -82,7 +81,7 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
     sampler = sampler_at(search.program, candidate.point.x)
     if sampler is None:
         return {}
-    return {objective.figure: figure_of(sampler, objective) for objective in search.program.objectives}
+    return {objective.figure: objective.figure_of(sampler) for objective in search.program.objectives}
 
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:
@@ -195,7 +194,7 @@ def without_optimum(
         status="infeasible" if found.relaxations else "failed",
         message=message,
         relaxation=tuple(each for remedy in remedies(found.relaxations) for each in remedy),
-        clash=found.limits,
+        clash=tuple(found.limits),
         explanation=explanation if found.relaxations else "",
         solver=solver,
         today=today,

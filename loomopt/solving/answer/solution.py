@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 class Proof:
     """What is shown of one limit, SI.
 
-    margin: by how much the refined value stays clear of the limit, negative where it exceeds it; slack: what is left
-    open; boxes: how many it took; angle: a crank angle, rad, where the limit fails.
+    name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
+    the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: a crank angle,
+    rad, where the limit fails.
     """
 
-    limit: str
+    name: str
     text: str
     status: str
     margin: float
@@ -32,13 +33,18 @@ class Proof:
     kind: Literal["limit", "assembly", "peak"] = "limit"
 
     @property
+    def limit(self) -> str:
+        """What JSON data call it."""
+        return f"peak {self.name}" if self.kind == "peak" else self.name
+
+    @property
     def said(self) -> str:
         """What it is of, in a few words."""
-        return self.limit.removeprefix(f"{self.kind} ") if self.kind == "peak" else self.text
+        return self.name if self.kind == "peak" else self.text
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data."""
-        return {name: value for name, value in vars(self).items() if name != "kind"}
+        return {"limit": self.limit} | {key: value for key, value in vars(self).items() if key not in ("name", "kind")}
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,9 +153,12 @@ def remedies(relaxations: Sequence[Relaxation]) -> list[tuple[Relaxation, ...]]:
 
 @dataclass(frozen=True)
 class Clash:
-    """Why nothing is admissible: the limits that clash, the relaxations that help, and where they lead (SI)."""
+    """Why nothing is admissible: the relaxations that help, and where they lead (SI).
 
-    limits: tuple[str, ...] = ()
+    limits: those that clash, as phrases, with their names.
+    """
+
+    limits: Mapping[str, str] = field(default_factory=dict)
     relaxations: tuple[Relaxation, ...] = ()
     x: Mapping[str, float] = field(default_factory=dict)
 

@@ -101,7 +101,7 @@ class Point:
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     violation: float = math.inf
     extra: Floats = field(default_factory=lambda: np.zeros(0), compare=False)
-    """The epigraph variables, or the excesses, in natural sizes."""
+    """The epigraph variables, or the excesses of an elastic solve, in natural sizes."""
     multipliers: Multipliers = field(default_factory=Multipliers, compare=False)
     built: float = 0.0
     binding: tuple[tuple[Extreme, ...], ...] = ()
@@ -112,8 +112,6 @@ class Point:
     """Elastic solves only: limit's place → excess it needs, SI."""
     rough: bool = False
     """Whether what binds may not be met exactly: that was farther than the settings let polishing lead."""
-    excesses: tuple[float, ...] = ()
-    """Elastic solves only: in natural sizes."""
     value: float = math.inf
     """The NLP's objective."""
 

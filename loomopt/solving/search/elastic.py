@@ -27,7 +27,7 @@ def least(program: Program, starts: Iterable[Mapping[str, float]], settings: Set
     """
     best = None
     for start in starts:
-        known = Known(best.binding, sum(best.excesses) - NEEDED) if best else Known()
+        known = Known(best.binding, sum(best.extra.tolist()) - NEEDED) if best else Known()
         point = exchange.solve(program, start, settings, elastic=Elastic(), known=known)
         best = point if point.reached else best
         if best and not best.relaxed:
@@ -61,7 +61,7 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     With this limit all but free, the others' excesses fall to nothing exactly where it suffices; only then is its own
     least sought, with the others firm.
     """
-    count = len(nearest.excesses)
+    count = len(nearest.extra)
     free = tuple(CHEAP if way in ways else 1.0 for way in range(count))
     screened = exchange.solve(program, nearest.x, settings, elastic=Elastic(free, nearest), known=Known(most=SCREENED))
     if not screened.reached:
@@ -72,16 +72,16 @@ def _alone(program: Program, ways: tuple[int, ...], nearest: Point, settings: Se
     return needs if len(needs) == 1 else None
 
 
-def _priced(program: Program, point: Point, words: Words) -> tuple[str, ...]:
-    """Return the limits with a price in the least relaxation: without any of them it would be less."""
+def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
+    """Return the limits, phrase → name, with a price in the least relaxation: without any of them it would be less."""
     prices, places = point.multipliers, [family.limit for family in families(program, elastic=True)]
     if not prices:
-        return ()
+        return {}
     found = list(prices.of_limits.items())
     for rows in (prices.at_stations, prices.at_nodes):
         found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
     priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
-    return tuple(dict.fromkeys(words.limit(limit) for limit in priced if limit.name in program.told))
+    return {words.limit(limit): limit.name for limit in priced if limit.name in program.told}
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

@@ -14,13 +14,15 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.model import Instant, JobModel, Row
-from loomopt.model.program import LEAST_CHANGE, Objective, Program, Variable
+from loomopt.model.moves import LEAST_CHANGE
+from loomopt.model.objectives import Value
+from loomopt.model.program import Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
-from loomopt.solving.search.search import Candidate, Judged, Search, corrected, exact, judged_as_is, objectives, tried
-from loomopt.solving.search.tie_break import unchanging, wished
+from loomopt.solving.search.search import Candidate, Search, as_read, corrected, judged_as_is, objectives, tried
+from loomopt.solving.search.tie_break import unchanging
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
@@ -29,7 +31,7 @@ the first. IPOPT fails at a large one from afar; from one to the next, pivots le
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
-CHANGED = Objective(CHANGE, CHANGE, "value", 1.0)
+CHANGED = Value(CHANGE, CHANGE, 1.0)
 MODELS = 8
 """Models with the change as a row that are kept: a front has one for every set of variables that are held."""
 
@@ -43,7 +45,7 @@ def with_least_change(search: Search) -> Search:
     if best is None or not best.certificate.passed or not best.certificate.level:
         return search
     began, program = time.perf_counter(), search.program
-    here = exact(search, best.x)
+    here = as_read(search, best.x)
     kept = _kept(program, here, best.certificate)
     ways = left(program, here, best.certificate, kept)
     unique = best.certificate.unique
@@ -56,7 +58,7 @@ def with_least_change(search: Search) -> Search:
         moved = replace(best, certificate=replace(best.certificate, open=_called(program, ways, best)))
     elif moved and unique and not _differ(program, moved.x, best.x):
         moved = None
-    return replace(search, best=moved or best, settled=search.settled + time.perf_counter() - began)
+    return replace(search, best=moved or best, tie_broken=search.tie_broken + time.perf_counter() - began)
 
 
 def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float], most: float = MOVED) -> bool:
@@ -64,7 +66,7 @@ def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, floa
     return any(abs(one[v.name] - other[v.name]) > most * v.scale for v in program.variables)
 
 
-def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) -> Judged | None:
+def _moved(search: Search, best: Candidate, kept: Collection[str], ways: Floats) -> Candidate | None:
     """Return the design of least change with its certificate; None where it has none, or a level is not as good.
 
     kept: variables that stay; ways: directions that are open. The weight of the earlier levels against the change is
@@ -72,7 +74,7 @@ def _moved(search: Search, best: Judged, kept: Collection[str], ways: Floats) ->
     itself: its rows are the same ones, and often it has changed least already.
     """
     program = search.program
-    warm = replace(best.candidate.point, x=dict(best.x))
+    warm = replace(best.point, x=dict(best.x))
     task = changing(program, best.x, kept, search.today)
     if task is None:
         return None
@@ -98,9 +100,9 @@ def _as_good(program: Program, x: Mapping[str, float], best: Mapping[str, float]
     return all(abs(now - then) <= FEASIBLE for now, then in levels)
 
 
-def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> tuple[Judged, Certificate] | None:
+def _held(search: Search, best: Candidate, task: Program, candidate: Candidate) -> tuple[Candidate, Certificate] | None:
     """Return a solve's end judged by all levels and the change, and by the levels alone; None where either fails."""
-    judging, here = Search(search.job, task, search.settings), exact(search, best.x)
+    judging, here = Search(search.job, task, search.settings), as_read(search, best.x)
     found = judged_as_is(judging, candidate, here)
     for _ in range(CORRECTIONS):
         before, found = found, corrected(judging, found)
@@ -108,12 +110,12 @@ def _held(search: Search, best: Judged, task: Program, candidate: Candidate) -> 
             break
     if not found.certificate.passed or not _as_good(search.program, found.x, best.x):
         return None
-    there = exact(search, found.x)
+    there = as_read(search, found.x)
     alone = best.certificate if there == here else certify(search.program, there, search.settings.accuracy)
     return (found, alone) if alone.passed else None
 
 
-def _named(found: tuple[Judged, Certificate], best: Judged, task: Program, ways: Floats) -> Judged:
+def _named(found: tuple[Candidate, Certificate], best: Candidate, task: Program, ways: Floats) -> Candidate:
     """Return a design of least change with its certificate, which says what was settled and what is still open."""
     moved, alone = found
     said = f"{', '.join(_called(task, ways, best))}: {LEAST_CHANGE}"
@@ -124,7 +126,7 @@ def _named(found: tuple[Judged, Certificate], best: Judged, task: Program, ways:
         change=moved.certificate.levels[-1],
         open=() if moved.certificate.unique else _called(task, left(task, moved.x, moved.certificate, ()), moved),
     )
-    return Judged(best.candidate, moved.x, certificate)
+    return replace(best, moved=moved.x, certificate=certificate)
 
 
 def changing(
@@ -143,13 +145,14 @@ def changing(
     if not free:
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
+    bounds = program.bound_limits
     held = tuple(replace(v, lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
     return replace(
         program,
         model=_measuring(program.model, tuple(free)),
         variables=held,
         parameters={**program.parameters, **given},
-        limits=tuple(limit for limit in program.limits if limit.family != "variable" or limit.row not in kept),
+        limits=tuple(limit for k, limit in enumerate(program.limits) if k not in bounds or limit.row not in kept),
         objectives=(*program.objectives, CHANGED),
         moves=(),
     )
@@ -188,8 +191,9 @@ def _width(variable: Variable) -> float:
 
 def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
     """Return the variables that moves settle one by one at x (SI): by another rule, or apart from all that is open."""
-    axes = [(name, wished(program, move, x)) for move in program.moves if move.kind == "axis" for name in move.along]
-    others = {name for name, wish in axes if wish and wish.toward != "today"}
+    values = {**program.parameters, **x}
+    axes = [(name, move.wished(values)) for move in program.moves if move.is_apart for name in move.along]
+    others = {name for name, wish in axes if wish and not wish.is_least_change}
     names, level = _level(certificate)
     sizes = np.linalg.norm(level, axis=0)
     apart = {name for name, size in zip(names, sizes, strict=True) if size >= 1.0 - RANK}
@@ -233,7 +237,7 @@ def _inside(level: Floats, scales: Mapping[str, float], move: Mapping[str, float
     return shares if np.linalg.norm(way - shares @ level) <= RANK else None
 
 
-def _called(program: Program, ways: Floats, of: Judged) -> tuple[str, ...]:
+def _called(program: Program, ways: Floats, of: Candidate) -> tuple[str, ...]:
     """Return what a designer calls the variables that directions (k, variables) of a judged design move."""
     labels = {v.name: v.called for v in program.variables}
     pairs = zip(of.certificate.level[0], np.abs(ways).max(axis=0), strict=True) if len(ways) else ()

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from loomopt.model.model import with_words_fixed
+from loomopt.model.program import Program
+from loomopt.model.session import working
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
@@ -28,6 +31,47 @@ flips."""
 
 ELSEWHERE = 1e-3
 """Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
+
+
+RESOLVED = 5
+"""Times a search begins again with what its best needs of a steady state: each doubles it, from the fewest to the most.
+"""
+
+
+@working()
+def resolved(
+    search: Search,
+    starts: int | None = None,
+    seed: int = 0,
+    near: Sequence[Point] = (),
+    on_start: OnStart | None = None,
+) -> Search:
+    """Return how far a search comes, begun again as long as its best needs a finer steady state.
+
+    No scene is read, nothing is said in words. starts: so many, the job's own first, then random ones from `seed`; None
+    for a search of the best basin; near: where neighbours' solves ended, to start warm from; one of another structure
+    is left alone. Raises KeyboardInterrupt on Ctrl-C.
+    """
+    same = [point for point in near if point.structure == search.program.structure]
+    search = searched(search, starts, seed, same, on_start)
+    for _ in range(RESOLVED if search.best else 0):
+        finer = _finer(search)
+        if finer is search.program:
+            break
+        search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
+    return search
+
+
+def _finer(search: Search) -> Program:
+    """Return the program with what the steady state of a search's best needs; itself where it has that, or cannot."""
+    program, best = search.program, search.best
+    if not program.model.states or best is None:
+        return program
+    try:
+        model = with_words_fixed(program.model, {**program.parameters, **best.x})
+    except ArithmeticError:
+        return program
+    return program if model is program.model else replace(program, model=model)
 
 
 def searched(search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None) -> Search:
@@ -139,8 +183,7 @@ def unbeatable(search: Search) -> bool:
     lower = {v.name: v.lower for v in search.program.variables}
     least = 0.0
     for level in search.program.objectives:
-        alone = lower.get(level.row, -math.inf) if level.form == "value" and len(level.rows) == 1 else -math.inf
-        least = search.settings.penalty * least + (0.0 if level.form == "magnitude" else alone / level.scale)
+        least = search.settings.penalty * least + level.least_within(lower) / level.scale
     return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
 
 

@@ -1,4 +1,4 @@
-"""The search for the best certified design: starts → exchange → silent levels → certificate, as steps on records."""
+"""The search for the best certified design: starts → exchange → tie-break → certificate, as steps on records."""
 
 import functools
 import math
@@ -38,26 +38,27 @@ HELD_MARGIN = 2.0
 OnStart = Callable[[int, int], None]
 
 
+NOT_JUDGED = Certificate(False, ("it has not been judged",), (), math.inf, math.inf, False, False)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """Where a solve ended, and the objectives there, in natural sizes, true over the whole cycle.
 
     value: of the NLP's objective there, in which each level weighs far more than the next; that of the NLP itself
-    where the solve was left.
+    where the solve was left. Once it is judged: moved: variables, SI, after the tie-break; certificate: of these.
     """
 
     point: Point
     objectives: tuple[float, ...]
     value: float = math.inf
+    moved: Mapping[str, float] | None = None
+    certificate: Certificate = NOT_JUDGED
 
-
-@dataclass(frozen=True)
-class Judged:
-    """A candidate after the silent levels: its variables, SI, and their certificate."""
-
-    candidate: Candidate
-    x: Mapping[str, float]
-    certificate: Certificate
+    @property
+    def x(self) -> Mapping[str, float]:
+        """The variables of the design, SI."""
+        return self.point.x if self.moved is None else self.moved
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Search:
     settings: those of the next solve; today: today's machine by variable, SI; candidates: of every solve, in order;
     best: the best that was reached, judged; nearest: where all limits' excesses together are least, if a start led to
     no design; sought: from how many starts; designs: how many were looked at; stayed: whether it kept to a neighbour's
-    basin; built, solved, settled, certified: seconds of making NLPs, of solves with that, of silent levels, of
+    basin; built, solved, tie_broken, certified: seconds of making NLPs, of solves with that, of tie-breaks, of
     certificates.
     """
 
@@ -76,14 +77,14 @@ class Search:
     settings: Settings
     today: Mapping[str, float] = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
-    best: Judged | None = None
+    best: Candidate | None = None
     nearest: Point | None = None
     sought: int = 0
     designs: int = 0
     stayed: bool = False
     built: float = 0.0
     solved: float = 0.0
-    settled: float = 0.0
+    tie_broken: float = 0.0
     certified: float = 0.0
 
     @property
@@ -134,7 +135,7 @@ def objectives(program: Program, x: Mapping[str, float]) -> tuple[float, ...]:
     sampler = sampler_at(program, x)
     if sampler is None:
         return (math.inf,) * len(program.objectives)
-    return tuple(sampler.merit(objective) / objective.scale for objective in program.objectives)
+    return tuple(objective.merit(sampler) / objective.scale for objective in program.objectives)
 
 
 def compared(one: Candidate, other: Candidate) -> int:
@@ -146,13 +147,13 @@ def compared(one: Candidate, other: Candidate) -> int:
 
 
 def judged(search: Search) -> Search:
-    """Return the search with its best candidate settled and certified.
+    """Return the search with its best candidate tie-broken and certified.
 
     Where an earlier objective gave way to a later one, it is solved again with a stronger weight between them.
     """
     while search.reached:
         first = search.ranked[0]
-        if search.best is None or search.best.candidate is not first:
+        if search.best is None or search.best.point is not first.point:
             search = _certified(search, first)
         if search.best is None or not _too_weak(search.settings, search.best.certificate):
             break
@@ -169,7 +170,7 @@ def _another(search: Search) -> Search:
     best = search.best
     if best is None:
         return search
-    others = [c for c in search.reached if c is not best.candidate and compared(c, best.candidate) == 0]
+    others = [c for c in search.reached if c.point is not best.point and compared(c, best) == 0]
     for candidate in others[:MOST_ALIKE]:
         search = _certified(search, candidate)
         if search.passed:
@@ -177,12 +178,12 @@ def _another(search: Search) -> Search:
     return _met_farther(replace(search, best=best), best)
 
 
-def _met_farther(search: Search, best: Judged) -> Search:
+def _met_farther(search: Search, best: Candidate) -> Search:
     """Return the search with its best put on what just binds, where that was too far to be sure, if that passes."""
-    if not best.candidate.point.rough:
+    if not best.point.rough:
         return search
     farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
-    again = tried(farther, best.candidate.point.x)
+    again = tried(farther, best.point.x)
     if again.candidates[-1].point.reached:
         again = _certified(again, again.candidates[-1])
     return replace(again, settings=search.settings) if again.passed else search
@@ -200,7 +201,7 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
 def _certified(search: Search, candidate: Candidate) -> Search:
     """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
     accuracy = search.settings.accuracy
-    search, x, certificate = _settled(search, candidate.point.x)
+    search, x, certificate = _judged_at(search, candidate.point.x)
     for _ in range(CORRECTIONS):
         precise = max(min(PRECISE, accuracy), ROUNDING)
         close = certificate.residual <= precise and certificate.error <= accuracy
@@ -209,52 +210,52 @@ def _certified(search: Search, candidate: Candidate) -> Search:
         stepped = _stepped(search.program, x, certificate.correction)
         if sampler_at(search.program, stepped) is None:
             break
-        search, moved, better = _settled(search, stepped)
+        search, moved, better = _judged_at(search, stepped)
         if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
             break
         x, certificate = moved, better
-    return replace(search, best=Judged(candidate, x, certificate))
+    return replace(search, best=replace(candidate, moved=x, certificate=certificate))
 
 
-def _settled(
+def _judged_at(
     search: Search, x: Mapping[str, float], known: Mapping[str, float] | None = None
 ) -> tuple[Search, dict[str, float], Certificate]:
-    """Return the search with the seconds this took, x (SI) after the silent levels, and its certificate.
+    """Return the search with the seconds this took, x (SI) after the tie-break, and its certificate.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
     job, program, began = search.job, search.program, time.perf_counter()
     search.settings.at("certifying")
-    settled, said = tie_break.moved(program, job.tidy(program, x))
-    at, there = time.perf_counter(), exact(search, settled)
+    moved, rules = tie_break.moved(program, job.tidy(program, x))
+    at, there = time.perf_counter(), as_read(search, moved)
     shown = len(program.objectives) - 1 if there == known else 0
-    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=said)
+    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=rules)
     certified = search.certified + time.perf_counter() - at
-    return replace(search, settled=search.settled + at - began, certified=certified), settled, certificate
+    return replace(search, tie_broken=search.tie_broken + at - began, certified=certified), moved, certificate
 
 
-def exact(search: Search, x: Mapping[str, float]) -> dict[str, float]:
+def as_read(search: Search, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return search.job.values(search.program, search.job.design(search.program, x))
 
 
-def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Judged:
-    """Return a candidate after the silent levels with its certificate, not corrected.
+def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float] | None = None) -> Candidate:
+    """Return a candidate after the tie-break with its certificate, not corrected.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
-    _, x, certificate = _settled(search, candidate.point.x, known)
-    return Judged(candidate, x, certificate)
+    _, x, certificate = _judged_at(search, candidate.point.x, known)
+    return replace(candidate, moved=x, certificate=certificate)
 
 
-def corrected(search: Search, found: Judged) -> Judged:
+def corrected(search: Search, found: Candidate) -> Candidate:
     """Return a design moved by its certificate's own step and judged again; as it is where that is worse."""
     x = _stepped(search.program, found.x, found.certificate.correction)
     if not found.certificate.correction or sampler_at(search.program, x) is None:
         return found
-    _, x, certificate = _settled(search, x)
+    _, x, certificate = _judged_at(search, x)
     ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
-    return Judged(found.candidate, x, certificate) if ranks[0] <= ranks[1] else found
+    return replace(found, moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
 
 
 def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]) -> dict[str, float]:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.axes import Traded
-from loomopt.model.program import Limit, Program
+from loomopt.model.limits import Limit
+from loomopt.model.program import Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
@@ -19,7 +20,7 @@ from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import elastic, steady_state
+from loomopt.solving.search import elastic, multistart
 from loomopt.solving.search.search import Search
 from loomopt.studies.front.solver import Asking, Reached, Solver, capped
 from loomopt.studies.run import warm
@@ -85,10 +86,10 @@ class Terms:
         """Return the limit on an axis beside its figure."""
         axis, most = cap
         values = {**self.program.parameters, **self.job.values(self.program, design)}
-        merit = sampled(self.program.model, values).merit(axis.objective)
+        merit = axis.objective.merit(sampled(self.program.model, values))
         ok = merit <= most + FEASIBLE * axis.objective.scale
         name, figure, end = axis.axis.name, axis.figure(merit), _end(axis, most)
-        if axis.objective.form == "magnitude":
+        if axis.objective.is_magnitude:
             return Finding(name, found.figures.get(name) or figure, -end, end, ok)
         low, high = (None, end) if axis.sign > 0 else (end, None)
         return Finding(name, figure, low, high, ok)
@@ -132,7 +133,7 @@ def answer(solver: Solver, target: str | None, found: Reached, asking: Asking, b
         if point:
             terms = Terms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))
-            certificate = certify(program, _exact(solver.job, program, point.x), solver.accuracy)
+            certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
             made = _certified(solver, terms, here, certificate, found, asking)
             return replace(made, point=point, time=_time(began, solved))
     terms = Terms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
@@ -146,7 +147,7 @@ def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
     here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else terms.evaluation({})
     today = functools.partial(terms.evaluation, {})
     told = {"status": found.reason, "accuracy": solver.accuracy}
-    explained = solver.job.explain(solver.scene, clash.limits)
+    explained = solver.job.explain(solver.scene, clash.limits.values())
     made = report.without_optimum(terms.target or "", here, clash, told, today, explained)
     return made if clash.limits else replace(made, status=found.status, message=f"No design was found: {found.reason}.")
 
@@ -155,7 +156,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
     """Return the limits of a program that cannot all be kept, and what helps; nothing where that is not found."""
     job, scene = solver.job, solver.scene
     today = {**job.values(program, job.today(scene)), **program.today}
-    search = steady_state.searched(Search(job, program, Settings(solver.accuracy), today))
+    search = multistart.resolved(Search(job, program, Settings(solver.accuracy), today))
     return elastic.clash(search, Words(scene))
 
 
@@ -178,7 +179,7 @@ def _certified(
     )
 
 
-def _exact(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
+def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, float]:
     """Return the variables, SI, of the design that a person reads of x (SI)."""
     return job.values(program, job.design(program, x))
 
@@ -192,7 +193,7 @@ def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
             continue
         axis, cap = caps[each.limit.name]
         name, limit, figure = axis.axis.name, each.limit, _end(axis, cap)
-        if axis.objective.form != "magnitude":
+        if not axis.objective.is_magnitude:
             limit = replace(limit, sign=axis.sign, value=figure)
         worth = each.worth * abs(axis.slope(figure))
         yield replace(each, limit=replace(limit, name=name), side=limit.sign, worth=worth)

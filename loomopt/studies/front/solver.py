@@ -19,7 +19,7 @@ from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import least_change
 from loomopt.solving.search.multistart import searched, spread, tied
-from loomopt.solving.search.search import Judged, Search, judged, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import Touched, sloped
 from loomopt.studies.run import warm
 from loomopt.studies.run.rows import PEAK, Multiplier, Side
@@ -169,7 +169,7 @@ class Solver:
         status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
-            "point": warm.written(replace(best.candidate.point, x=dict(best.x)), program),
+            "point": warm.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
@@ -184,20 +184,20 @@ class Solver:
             told,
         )
 
-    def _held(self, search: Search, best: Judged, asking: Asking) -> str:
+    def _held(self, search: Search, best: Candidate, asking: Asking) -> str:
         """Return why the point does not count, though one may be there: an axis is above its cap; "" where it does."""
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, asking.caps, strict=True):
             size = axis.objective.scale
-            if cap is not None and sampler.merit(axis.objective) / size > cap / size + FEASIBLE:
+            if cap is not None and axis.objective.merit(sampler) / size > cap / size + FEASIBLE:
                 return f"{axis.axis.name} comes out above what was asked"
         return ""
 
     def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
-        return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
+        return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
-    def _multipliers(self, best: Judged, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
+    def _multipliers(self, best: Candidate, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
         sought, paid = self.axes
         found: dict[Multiplier, float] = {}
@@ -222,7 +222,7 @@ class Solver:
             limit = row.limit
             if limit and limit.name not in own and limit.row not in program.fixed:
                 count[Side(limit.name, ENDS[limit.sign]), _place(sampler, row)] += 1
-        for k in found.pieces(0):
+        for k in found.levels[0]:
             count[Side(self.axes[0].axis.name, PEAK), _place(sampler, found.rows[k])] += 1
         return sorted(Touched(side, place, times).written() for (side, place), times in count.items())
 

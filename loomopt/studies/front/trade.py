@@ -289,7 +289,7 @@ class Trade:
     def _clash(self, asking: Asking) -> str:
         """Return which limits clash, and why; "" where that is not found."""
         limits = answer.clashing(self.solver, self.solver.program(asking)).limits
-        why = registry.of(self.scene).explain(self.scene, limits)
+        why = registry.of(self.scene).explain(self.scene, limits.values())
         return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
 
     def _sloped(self, found: Reached) -> Met:

@@ -54,7 +54,9 @@ def drawn(name, kind):
             for c in map(str, table)
             if c.startswith(f"{v} [")
         }
-    return outputs.plotted(tables.curves(scene, design), scene, design, f"design for {target}" if design else "")
+    return outputs.plotted(
+        tables.curves(scene, design), scene, design, outputs.Subject(f"design for {target}") if design else None
+    )
 
 
 def titled(figure):

@@ -14,8 +14,8 @@ from loomopt.solving.nlp.point import Settings
 from loomopt.solving.proof import task
 from loomopt.solving.proof.levels import loosening
 from loomopt.solving.proof.task import Task, reduced
+from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search
-from loomopt.solving.search.steady_state import searched
 
 
 class Solved(NamedTuple):
@@ -43,7 +43,7 @@ def solved(name: str, target: str, *changes: str) -> Solved:
     scene = scene.update(numbers) if numbers else scene
     job = registry.of(scene)
     program = job.program(scene, target)
-    return Solved(job, program, searched(Search(job, program, Settings())))
+    return Solved(job, program, resolved(Search(job, program, Settings())))
 
 
 def quietly(text: str) -> None:
@@ -61,9 +61,7 @@ def designs(program: Program, count: int, seed: int = 0):
             x["s"] = min(x["s"], max(limit.value for limit in program.limits if limit.name == "m4e") * x["r4e"] ** 2)
         try:
             sampler = Sampler(program.model, {**program.parameters, **x}, 180)
-            kept = all(
-                sampler.excess(limit) <= 0 for limit in program.limits if limit.sign and limit.family == "static"
-            )
+            kept = all(limit.excess(sampler) <= 0 for limit in program.design_limits.values() if limit.sign)
         except (ArithmeticError, TypeError, ValueError):
             continue
         if kept:

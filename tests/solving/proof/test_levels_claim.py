@@ -10,24 +10,24 @@ from loomopt.jobs import registry
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.levels import Levels, Outcome, claimed
+from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search, objectives
-from loomopt.solving.search.steady_state import searched
 
 
 def test_a_search_that_stands_elsewhere_is_led_to_the_optimum():
     """The best of narrower bounds, taken for the best of all: its certificate there passes by itself."""
     wide = solved("beatup", "torque")
     scene = lo.load("beatup").set("bounds.l3.min", "152 mm")
-    narrow = searched(Search(wide.job, registry.of(scene).program(scene, "torque"), Settings()))
+    narrow = resolved(Search(wide.job, registry.of(scene).program(scene, "torque"), Settings()))
     assert narrow.best is not None
-    here = narrow.best.candidate
+    here = narrow.best
     worse = replace(narrow, program=wide.program, candidates=(here,))
     assert worse.passed
     found, bound = claimed(worse, GlobalProof(1e-3, 60.0))
     assert bound.proven
     assert found.best is not None
-    assert found.best.candidate.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
-    assert found.best.candidate.objectives[0] < here.objectives[0] * (1 - 1e-3)
+    assert found.best.objectives == pytest.approx(objectives(wide.program, wide.x), rel=1e-9)
+    assert found.best.objectives[0] < here.objectives[0] * (1 - 1e-3)
 
 
 def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypatch):
@@ -35,11 +35,11 @@ def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypa
     wide = solved("beatup", "balance")
     worse = solved("beatup", "balance", "bounds.l3.min=152 mm")
     assert worse.search.best is not None
-    here = replace(worse.search, program=wide.program, candidates=(worse.search.best.candidate,))
+    here = replace(worse.search, program=wide.program, candidates=(worse.search.best,))
     monkeypatch.setattr(Levels, "run", lambda self, until, say: Outcome(why="open", lowest=wide.x))
     found, _ = claimed(here, GlobalProof(1e-3, 0.2))
     assert found.best is not None
-    assert found.best.candidate.objectives[1] < here.best.candidate.objectives[1] - 1e-3
+    assert found.best.objectives[1] < here.best.objectives[1] - 1e-3
 
 
 def test_a_better_design_that_leads_to_no_certified_optimum_is_told():

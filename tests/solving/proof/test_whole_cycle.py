@@ -107,8 +107,8 @@ def test_the_slack_is_a_share_of_each_quantitys_largest_magnitude(job):
     for one, other in zip(tight, loose, strict=True):
         assert other.slack == pytest.approx(1e3 * one.slack)
         assert other.boxes <= one.boxes
-        if one.limit.removeprefix("peak ") in CLAIMED[job] - {"mu_min", "curvature_min"}:
-            figure = one.limit.removeprefix("peak ")
+        if one.name in CLAIMED[job] - {"mu_min", "curvature_min"}:
+            figure = one.name
             assert one.slack == pytest.approx(SLACK * abs(answer.figures[figure]), rel=1e-3), "sampled"
 
 

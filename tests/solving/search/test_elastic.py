@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from support import toy
 
@@ -102,13 +103,13 @@ def test_each_start_need_only_be_followed_below_the_best_so_far(monkeypatch, sum
         total = sums[len(calls)]
         calls.append(known.most)
         reached = total is not None
-        return Point({}, "", reached, relaxed={0: 1.0} if reached else {}, excesses=(total,) if reached else ())
+        return Point({}, "", reached, relaxed={0: 1.0} if reached else {}, extra=np.array([total] if reached else []))
 
     monkeypatch.setattr(exchange, "solve", solve)
     program = toy.program("xy", ROWS, limits=(("x", -1, 2.0),))
     answer = least(program, [{}] * len(sums), Settings())
     assert tuple(calls) == most
-    assert (answer.excesses[0] if answer else None) == best
+    assert (answer.extra[0] if answer else None) == best
 
 
 def test_another_basin_of_the_least_relaxation_is_found_from_another_start():
@@ -116,8 +117,8 @@ def test_another_basin_of_the_least_relaxation_is_found_from_another_start():
     rows = {**ROWS, "s": lambda v: v["x"] ** 2}
     program = toy.program("xy", rows, limits=(("s", -1, 4.0), ("x", 1, 0.5), ("x", -1, -1.0)))
     right, left = ({"x": x, "y": 0.0} for x in (3.0, -3.0))
-    assert sum(least(program, [right], Settings()).excesses) == pytest.approx(1.5, abs=1e-7)
-    assert sum(least(program, [right, left], Settings()).excesses) == pytest.approx(1.0, abs=1e-7)
+    assert sum(least(program, [right], Settings()).extra) == pytest.approx(1.5, abs=1e-7)
+    assert sum(least(program, [right, left], Settings()).extra) == pytest.approx(1.0, abs=1e-7)
 
 
 def test_a_limit_alone_is_found_though_all_at_once_another_gives_way():

@@ -3,6 +3,7 @@
 import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from searches import BAD, certified, empty, solved
 from support import toy
@@ -107,7 +108,7 @@ def test_nothing_more_is_solved_where_no_design_can_be_better(objectives, least,
     found = wide(toy.program("xy", rows, limits=limits, objectives=objectives, bounds={"x": (0, 3), "y": (0, 1)}))
     assert found.passed
     assert (len(found.candidates) == 1) == alone
-    assert found.best.candidate.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
+    assert found.best.objectives == pytest.approx((least,) * len(objectives), abs=1e-9)
 
 
 def test_each_start_is_told_with_how_many_there_are():
@@ -123,7 +124,7 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     calls, points = solved
     program = toy.program("xy", limits=(("x", -1, 2.0), ("x", 1, 1.0)), objectives=("x",))
     points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
-    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, excesses=(1.0,))
+    nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, extra=np.ones(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
@@ -137,7 +138,7 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
     program = toy.program("xy", limits=(("x", -1, 2.0),), objectives=("x",))
     points += [Point(program.starts[0], "Infeasible_Problem_Detected", False)]
     points += [Point({"x": 2.0, "y": 0.0}, "Solve_Succeeded", True)] * 40
-    nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, excesses=(0.0,))
+    nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, extra=np.zeros(1))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(multistart, "least", lambda *_: nearest)
         found = wide(program)
@@ -149,7 +150,7 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
 def test_a_neighbours_basin_is_kept_to_and_said():
     first = wide(hills())
     away = searched(Search(toy.ToyJob(hills()), hills(), Settings()), 1, 0, (), None)
-    warm = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (away.best.candidate.point,), None)
+    warm = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (away.best.point,), None)
     assert (warm.stayed, first.stayed) == (True, False)
     assert warm.best.x["x"] > 1.8
 
@@ -214,9 +215,9 @@ def test_random_beat_ups_are_as_good_as_from_sixteen_random_starts():
 def test_of_several_neighbours_the_better_basin_counts():
     """Both points lead on; whichever comes first, the deeper of two valleys is the answer."""
     found = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, (), None)
-    best = found.best.candidate.point
-    other = next(c.point for c in found.reached if abs(c.objectives[0] - found.best.candidate.objectives[0]) > 1e-3)
+    best = found.best.point
+    other = next(c.point for c in found.reached if abs(c.objectives[0] - found.best.objectives[0]) > 1e-3)
     for near in ((other, best), (best, other)):
         again = searched(Search(toy.ToyJob(hills()), hills(), Settings()), None, 0, near, None)
         assert again.stayed
-        assert again.best.candidate.objectives == pytest.approx(found.best.candidate.objectives)
+        assert again.best.objectives == pytest.approx(found.best.objectives)

@@ -54,7 +54,7 @@ def test_the_best_that_was_reached_is_judged(certified):
     points = candidate(0, x=3.0, reached=False), candidate(2, x=1.0), candidate(1, x=2.0)
     found = judged(empty(candidates=points))
     assert seen == [2.0]
-    assert (found.best.candidate, found.passed) == (points[2], True)
+    assert (found.best.point, found.passed) == (points[2].point, True)
     assert found.ranked == [points[2], points[1]]
     assert found.reached == [points[1], points[2]]
 
@@ -64,7 +64,7 @@ def test_what_was_judged_is_not_judged_again(certified):
     found = judged(empty(candidates=(candidate(1, x=1.0),)))
     assert judged(found).best is found.best
     more = replace(found, candidates=(*found.candidates, candidate(0.5, x=2.0)))
-    assert judged(more).best.candidate.objectives == (0.5,)
+    assert judged(more).best.objectives == (0.5,)
     assert seen == [1.0, 2.0]
 
 
@@ -79,7 +79,7 @@ def test_where_the_best_does_not_pass_others_with_its_objectives_may(certified):
     points = tuple(candidate(1, x=float(k)) for k in (1, 2, 3, 4))
     found = judged(empty(candidates=points))
     assert seen == [1.0, 2.0, 3.0]
-    assert (found.passed, found.best.candidate) == (True, points[2])
+    assert (found.passed, found.best.point) == (True, points[2].point)
 
 
 def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
@@ -89,7 +89,7 @@ def test_a_few_of_them_are_tried_and_then_the_best_stays(certified):
     found = judged(empty(candidates=points))
     assert MOST_ALIKE == 4
     assert seen == [1.0, 2.0, 3.0, 4.0, 5.0]
-    assert (found.passed, found.best.candidate) == (False, points[0])
+    assert (found.passed, found.best.point) == (False, points[0].point)
 
 
 def test_worse_candidates_do_not_stand_for_the_best(certified):
@@ -127,7 +127,7 @@ def test_a_level_that_gave_way_is_solved_again_with_a_stronger_weight(certified,
     if again:
         assert (found.passed, found.settings.penalty) == (True, 1e5)
         assert [each.point.x["x"] for each in found.candidates] == [0.0], "in place of the one that gave way"
-        assert found.best.candidate.objectives == (0.0, -1.0)
+        assert found.best.objectives == (0.0, -1.0)
 
 
 def test_the_weight_grows_to_an_end(certified, solved):
@@ -236,7 +236,7 @@ def test_time_of_solves_is_summed(certified, solved, monkeypatch):
     twice = searching.tried(searching.tried(empty(), {"x": 0.0}), {"x": 0.0})
     assert (twice.solved, twice.built) == (0.75, 0.25)
     judged = searching._certified(twice, twice.candidates[0])
-    assert (judged.settled, judged.certified) == (1.0, 2.0)
+    assert (judged.tie_broken, judged.certified) == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,13 @@ from searches import candidate, empty
 
 from loomopt.solving.answer import report
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.search.search import Candidate, Judged
+from loomopt.solving.search.search import Candidate
 
 BEST = replace(candidate(1, 2, x=1.0), value=1002.0)
 
 
 def search(*candidates, **more):
-    return replace(empty(candidates=(BEST, *candidates)), best=Judged(BEST, BEST.point.x, None), **more)
+    return replace(empty(candidates=(BEST, *candidates)), best=BEST, **more)
 
 
 def left(value):

@@ -5,7 +5,7 @@ must give K1, and keep what material, winding and space allow.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -115,7 +115,7 @@ def explain(
     known: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
     own: Own,
-    clash: Iterable[str],
+    clash: Collection[str],
     shown: Shown = usual,
 ) -> str:
     """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
@@ -123,8 +123,7 @@ def explain(
     shown(value, kind, digits): a value as text in the reader's unit.
     tau >= 2 K_W (X0 + travel) f sqrt(2 G rho) follows from rate, surge frequency and shear stress [Shigley, ch. 10].
     """
-    named = {limit.split()[0] for limit in clash}
-    if "surge_ratio" not in named or not named & {"shear_share", "bending_share"}:
+    if "surge_ratio" not in clash or not {"shear_share", "bending_share"}.intersection(clash):
         return ""
     stretch = bounds["X0"][1] + known["travel"]
     thinnest = bounds.get("coil.wire", (own.wire, own.wire))[0]
