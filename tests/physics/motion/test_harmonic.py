@@ -7,6 +7,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
@@ -76,6 +77,29 @@ def test_the_answer_goes_on_through_the_corners_and_comes_back_after_a_turn(damp
     for phi in (0.4, 1.2, 5.0):
         once, again = (answer(EXACT, damped, EXACT.number(phi) + turns * 2 * EXACT.pi) for turns in (0, 3))
         assert [abs(a - b) <= MP.mpf(10) ** -40 for a, b in zip(once, again, strict=True)] == [True, True]
+
+
+@pytest.mark.parametrize("damped", ["lightly", "nearly critically", "critically", "beyond"])
+def test_the_answer_is_that_of_an_integrator_over_a_turn(damped):
+    """From z and z˙ at the pulse's beginning, piece by piece, over the turn that follows."""
+    k, c, _ = DAMPED[damped]
+    begin, end = (GIVEN["beta"] + side * OWN["pulse"] / 2 for side in (-1, 1))
+    begun = [float(each) for each in answer(systems.FLOAT, damped, begin + 1e-12)]
+    state, found, exact = begun, list[list[float]](), list[list[float]]()
+    for low, high, pushed in ((begin, end, GIVEN["M0"]), (end, begin + 2 * math.pi, 0.0)):
+
+        def slope(phi, state, pushed=pushed):
+            load = pushed * math.cos(math.pi * (phi - GIVEN["beta"]) / OWN["pulse"])
+            return [state[1] / OMEGA, (load - c * state[1] - k * state[0]) / J / OMEGA]
+
+        angles = np.linspace(low, high, 41)
+        done = solve_ivp(slope, (low, high), state, "DOP853", t_eval=angles, rtol=1e-12, atol=1e-16)
+        found += done.y.T[1:-1].tolist()
+        exact += [[float(each) for each in answer(systems.FLOAT, damped, phi)] for phi in angles[1:-1]]
+        state = done.y[:, -1]
+    largest = np.abs(found).max(axis=0)
+    assert np.abs((np.array(found) - np.array(exact)) / largest).max() < 1e-8
+    assert state / largest == pytest.approx(begun / largest, abs=1e-8), "it repeats"
 
 
 @every
