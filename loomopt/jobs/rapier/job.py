@@ -106,7 +106,7 @@ class Rapier(Job):
         """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
         front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
         gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
-        centres = sampler.given.values["centres"]
+        centres = sampler.given.linkage.centres
         rear = math.pi + centres.beta_r - centres.beta
         return Columns(
             {
