@@ -63,12 +63,13 @@ def case(name: str) -> tuple[Any, str, Any]:
 def work(name: str, what: str) -> Callable[[], Any]:
     """Return one piece of work."""
     import loomopt as lo
-    from loomopt.model import session
-    from loomopt.solving.nlp import transcribe
 
     scene, target, neighbour = case(name)
 
     def built() -> Any:
+        from loomopt.model import session
+        from loomopt.solving.nlp import transcribe
+
         session.current().forget(transcribe.NLPS)
         return lo.solve(scene, target)
 

@@ -17,9 +17,9 @@ EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Load
-from loomopt.maths.systems import Maths; from loomopt.maths.systems import Number
+from loomopt.maths.systems import Maths, Number
 from loomopt.base.quantities import Torque
-from loomopt.physics.schema import Table; from loomopt.physics.schema import Values
+from loomopt.physics.schema import Table, Values
 
 
 class Own(Table):
@@ -123,3 +123,66 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
     assert {name.rpartition("/")[0] for name in added} == {
         *("loomopt/jobs/press", "loomopt/physics/effects/press", "problems", "results")
     }
+
+
+COMMAND = '''"""The command that counts the effects of a scene."""
+
+from loomopt.interface.cli.commands import Problem, Set
+from loomopt.interface.cli.shell import read_scene
+
+
+def count(problem: Problem, sets: Set = None) -> None:
+    """Print how many effects are on."""
+    print(len(read_scene(problem, sets, None, None).effects))
+'''
+FORMAT = '''"""Drawings as the number of their lines."""
+
+from pathlib import Path
+
+from loomopt.base.files import atomically
+from loomopt.interface.files import outputs
+from loomopt.scenes.designs import Design
+from loomopt.scenes.scene import Scene
+
+
+def write(path: Path, scene: Scene, design: Design, said: outputs.Subject | None) -> None:
+    """Write how many primitives a drawing has."""
+    count = len(outputs.drawing(scene, design, said).primitives)
+    atomically(path, lambda part: part.write_text(f"{count}\\n", encoding="utf-8"))
+'''
+
+
+def put(copy, name, old, new):
+    """Replace one place of a file."""
+    text = copy.before[name].decode()
+    assert text.count(old) == 1
+    copy.write(name, text.replace(old, new))
+
+
+@pytest.mark.slow
+def test_a_new_command_is_its_file_and_a_row_of_the_commands(copy):
+    copy.write("loomopt/interface/cli/count.py", COMMAND)
+    name = "loomopt/interface/cli/app.py"
+    put(copy, name, '    "check": check,\n', '    "check": check,\n    "count": count.count,\n')
+    text = (copy.folder / name).read_text(encoding="utf-8")
+    copy.write(
+        name,
+        text.replace("from loomopt.interface.cli import commands", "from loomopt.interface.cli import commands, count"),
+    )
+    assert copy.loomopt("count", "beatup") == "2\n"
+    assert "count" in copy.loomopt("--help")
+    assert copy.touched() == [name, "loomopt/interface/cli/count.py"]
+
+
+@pytest.mark.slow
+def test_a_new_format_of_drawings_is_its_file_and_a_row_of_the_endings(copy):
+    copy.write("loomopt/interface/files/primitives_counted.py", FORMAT)
+    name = "loomopt/interface/files/outputs.py"
+    own = "def _counted(*of: object) -> None:\n    from loomopt.interface.files import primitives_counted\n\n"
+    put(copy, name, "DRAWINGS: dict[", f"{own}    primitives_counted.write(*of)\n\n\nDRAWINGS: dict[")
+    text = (copy.folder / name).read_text(encoding="utf-8")
+    copy.write(name, text.replace('{".svg": _svg,', '{".count": _counted, ".svg": _svg,'))
+    copy.loomopt("export", "beatup", "--out", "drawn.count")
+    assert int((copy.folder / "drawn.count").read_text(encoding="utf-8")) > 10
+    touched = [each for each in copy.touched() if each != "drawn.count"]
+    assert touched == [name, "loomopt/interface/files/primitives_counted.py"]

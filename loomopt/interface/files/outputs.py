@@ -4,7 +4,7 @@ import contextlib
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".svg", ".pdf")
 CURVES = (".csv", ".parquet", *PICTURES)
-DRAWINGS = (".svg", ".dxf", ".csv")
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
 TODAY, GIVEN = "today's machine", "a given design"
@@ -217,16 +216,32 @@ def drawing(scene: Scene, design: Design, said: Subject | None = None) -> "Drawi
 
 
 def linkage(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
-    """Write a design's linkage in the positions that matter: SVG or DXF at true scale, or its joints as CSV."""
-    from loomopt.interface.files import dxf, svg
+    """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`)."""
+    DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
 
-    ending = suffix(path, DRAWINGS)
-    if ending == ".csv":
-        text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
-    elif ending == ".svg":
-        text(path, svg.render(drawing(scene, design, said)))
-    else:
-        atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
+
+def _joints(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage's joints as CSV."""
+    text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
+
+
+def _svg(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage as SVG at true scale."""
+    from loomopt.interface.files import svg
+
+    text(path, svg.render(drawing(scene, design, said)))
+
+
+def _dxf(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+    """Write a linkage as DXF at true scale."""
+    from loomopt.interface.files import dxf
+
+    atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
+
+
+Writer = Callable[[Path, Scene, Design, Subject | None], None]
+DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints}
+"""Ending of a file → what writes a linkage to it."""
 
 
 def picture(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
