@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -108,7 +107,7 @@ class TurnedCrank(Kinematics):
         """Events that lie on corners of its own arcs."""
         return self.steady.breaks
 
-    def linkage(self, maths: Maths, values: Values) -> Any:
+    def linkage(self, maths: Maths, values: Values) -> object:
         """Return what poses read of the scene's numbers at once."""
         return self.steady.linkage(maths, values)
 

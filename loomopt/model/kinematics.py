@@ -120,7 +120,7 @@ class Kinematics(Protocol):
         """Events that lie on corners of its own arcs; the value of such a name is their crank angles, rad."""
         return frozenset()
 
-    def linkage(self, maths: Maths, values: Values) -> Any:
+    def linkage(self, maths: Maths, values: Values) -> object:
         """Return what poses read of the scene's numbers at once, as a record of its own; None without any."""
         return None
 

@@ -44,7 +44,7 @@ class Given(NamedTuple):
     values: Values
     own: Mapping[str, Values]
     known: frozenset[str] = frozenset()
-    linkage: Any = None
+    linkage: object = None
 
 
 def terms(

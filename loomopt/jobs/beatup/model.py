@@ -57,6 +57,13 @@ class Linkage(NamedTuple):
     centres: crank_rocker.DeadCentres
 
 
+def linked(given: Given) -> Linkage:
+    """Return what poses read at once."""
+    found = given.linkage
+    assert isinstance(found, Linkage)
+    return found
+
+
 @dataclass(frozen=True)
 class FrontPose(Motion):
     """The pose at front dead centre, exact: ψ' = 0, and ψ'' in closed form; joints from the positions at β."""
@@ -115,7 +122,7 @@ class CrankRocker:
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return s = m4e r4e², kg·m², and both dead centres, rad."""
-        values, centres = given.values, given.linkage.centres
+        values, centres = given.values, linked(given).centres
         found = {"beta": centres.beta, "beta_r": centres.beta_r}
         return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
 
@@ -125,13 +132,13 @@ class CrankRocker:
 
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedPose:
         """Return the pose at crank angles φ, rad."""
-        pose = crank_rocker.Pose(maths, given.linkage.lengths, node.phi)
+        pose = crank_rocker.Pose(maths, linked(given).lengths, node.phi)
         return ReedPose(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
         """Return the pose at front dead centre."""
         return FrontPose(
-            maths, given.linkage, given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
+            maths, linked(given), given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
         )
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
@@ -166,11 +173,11 @@ def _front(at: Instant) -> Motion:
 
 
 ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: at.given.linkage.centres.swing),
-    "theta": Row(lambda at: at.given.linkage.centres.theta),
-    "beta": Row(lambda at: at.given.linkage.centres.beta),
+    "swing": Row(lambda at: linked(at.given).centres.swing),
+    "theta": Row(lambda at: linked(at.given).centres.theta),
+    "beta": Row(lambda at: linked(at.given).centres.beta),
     "M3_fdc": Row(lambda at: at.force, event=FRONT),
-    "alpha_fdc": Row(lambda at: at.given.linkage.centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
+    "alpha_fdc": Row(lambda at: linked(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
     "r4": Row(eccentricity, ("m4", "r4", "m4e")),
     "r4e_square": Row(lambda at: at.values["r4e"] ** 2),
 }

@@ -105,6 +105,13 @@ class Linkage(NamedTuple):
     centres: crank_rocker.DeadCentres
 
 
+def linked(given: Given) -> Linkage:
+    """Return what poses read at once."""
+    found = given.linkage
+    assert isinstance(found, Linkage)
+    return found
+
+
 @dataclass(frozen=True)
 class RapierDrive:
     """The drive's motion."""
@@ -131,10 +138,10 @@ class RapierDrive:
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
-        values, centres = given.values, given.linkage.centres
+        values, centres = given.values, linked(given).centres
         found = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
-        front = rapier_drive.Pose(maths, given.linkage.dimensions, stand, 0).relative
+        front = rapier_drive.Pose(maths, linked(given).dimensions, stand, 0).relative
         found |= {"front_x": front.x, "front_y": front.y}
         given = given._replace(values={**values, **found})
         if STROKE in called:
@@ -155,7 +162,7 @@ class RapierDrive:
         """Return the pose at crank angles φ1, rad."""
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
-        joints = rapier_drive.Pose(maths, given.linkage.dimensions, stand, node.phi)
+        joints = rapier_drive.Pose(maths, linked(given).dimensions, stand, node.phi)
         return HeadPose(
             joints, Vector(values["front_x"], values["front_y"]), values.get("speed"), values.get("omega_dot")
         )
@@ -181,10 +188,8 @@ class RapierDrive:
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Return both dead centres of the sley, rad."""
-        return {
-            "front dead centre": 0,
-            "rear dead centre": maths.pi + given.linkage.centres.beta_r - given.linkage.centres.beta,
-        }
+        centres = linked(given).centres
+        return {"front dead centre": 0, "rear dead centre": maths.pi + centres.beta_r - centres.beta}
 
 
 def _turn(k: int) -> str:
@@ -230,8 +235,8 @@ LOADED = (*TAPE_FORCE, drive.TORQUE, drive.POWER)
 """Figures that loads give."""
 
 ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: at.given.linkage.centres.swing),
-    "theta": Row(lambda at: at.given.linkage.centres.theta),
+    "swing": Row(lambda at: linked(at.given).centres.swing),
+    "theta": Row(lambda at: linked(at.given).centres.theta),
     "phi_stroke": Row(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
     "rest": Row(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
     "stroke_short": Row(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
