@@ -107,9 +107,13 @@ class TurnedCrank(Kinematics):
         """Events that lie on corners of its own arcs."""
         return self.steady.breaks
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Mapping[str, Number]:
+    def linkage(self, maths: Maths, values: Values) -> object:
+        """Return what poses read of the scene's numbers at once."""
+        return self.steady.linkage(maths, values)
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Mapping[str, Number]:
         """Return what follows from the scene's numbers, and the speed, rad/s, that the motor has without load."""
-        return {**self.steady.derived(maths, values, called), NO_LOAD: self.turning.no_load}
+        return {**self.steady.derived(maths, given, called), NO_LOAD: self.turning.no_load}
 
     def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
         """Return where events lie that no formula gives."""

@@ -120,8 +120,12 @@ class Kinematics(Protocol):
         """Events that lie on corners of its own arcs; the value of such a name is their crank angles, rad."""
         return frozenset()
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Mapping[str, Number]:
-        """Return what follows from the scene's numbers at once; called: events that effects call in."""
+    def linkage(self, maths: Maths, values: Values) -> object:
+        """Return what poses read of the scene's numbers at once, as a record of its own; None without any."""
+        return None
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Mapping[str, Number]:
+        """Return what numbers follow from the scene's at once; called: events that effects call in."""
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> Mapping[str, float]:
@@ -141,18 +145,21 @@ class Kinematics(Protocol):
 
 
 def four_bar(
-    lengths: Callable[[Values], crank_rocker.Lengths],
     names: tuple[str, str, str, str],
+    side: int,
     phase: Callable[[Values], Number],
     phrases: tuple[str, str],
     obliquity: OfPhi | None = None,
 ) -> Group:
     """Return the group of a crank-rocker.
 
-    lengths(values), names: its links and what the scene calls them; phase(values): the linkage's own crank angle at
-    φ = 0, rad; phrases: that rod and rocker are not stretched, and not folded.
+    names: what the scene calls its links; side: on which its rocker lies; phase(values): the linkage's own crank angle
+    at φ = 0, rad; phrases: that rod and rocker are not stretched, and not folded.
     """
     l1, l2, l3, l4 = names
+
+    def lengths(values: Values) -> crank_rocker.Lengths:
+        return crank_rocker.Lengths(values[l1], values[l2], values[l3], values[l4], side)
 
     def far(m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
         return crank_rocker.span_far(m, lengths(given.values), phi + phase(given.values))

@@ -412,8 +412,8 @@ class JobModel:
         for effect, full in self._full.items():
             own[effect] = {key: values[name] for key, name in full.items() if name in values}
             own[effect] |= self.words_of(effect)
-        derived = self.kinematics.derived(maths, values, self.called)
-        return Given({**values, **derived}, own, frozenset(values))
+        given = Given(values, own, frozenset(values), self.kinematics.linkage(maths, values))
+        return given._replace(values={**values, **self.kinematics.derived(maths, given, self.called)})
 
     @lazy
     def switches(self) -> tuple[str, ...]:

@@ -116,7 +116,7 @@ def recorded_quantities(
     values = {of: tape.known(value) if isinstance(value, Recorded) else value for of, value in raw.values.items()}
     inputs = {value.place: of for of, value in values.items() if isinstance(value, Recorded)}
     since = len(tape.operations)
-    given = Given(values, raw.own)
+    given = Given(values, raw.own, linkage=raw.linkage)
     read = model.together(there, given, Node(phi, switch))
     outputs = tuple([read(name) for name in names])
     needed = tape.needed(outputs, since)

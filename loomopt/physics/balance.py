@@ -37,12 +37,14 @@ class Pose(Motion):
 class Given(NamedTuple):
     """All numbers of a scene in one number system: `values` by name, `own` values of each effect.
 
-    known: names of the scene's numbers, from which all else follows.
+    known: names of the scene's numbers, from which all else follows. linkage: the mechanism's own record of what its
+    poses read at once, such as lengths and dead centres.
     """
 
     values: Values
     own: Mapping[str, Values]
     known: frozenset[str] = frozenset()
+    linkage: object = None
 
 
 def terms(

@@ -23,8 +23,11 @@ class Yoke:
     arcs: tuple[Arcs, ...] = ()
     breaks: frozenset[str] = frozenset()
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Values:
-        return {"stroke": 2 * values["r"]}
+    def linkage(self, maths: Maths, values: Values) -> None:
+        return None
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
+        return {"stroke": 2 * given.values["r"]}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
         return {}

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import loomopt as lo
 from loomopt.jobs import registry
+from loomopt.jobs.beatup.model import linked
 from loomopt.physics import cycle
 from loomopt.physics.effects.beatup import resistance
 
@@ -201,13 +202,13 @@ WRAPPED = {
 @pytest.mark.parametrize("name", WRAPPED)
 def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     scene = FRICTION.update(WRAPPED[name])
-    values = sampler(scene).given.values
+    given = sampler(scene).given
     curves = lo.simulate(scene)
     phi = curves["phi [rad]"].to_numpy()
     assert (phi[0], phi[-1]) == (0.0, pytest.approx(TURN))
     assert np.all(np.diff(phi) >= 0)
     pulse = scene.own(resistance.Own).pulse
-    away = np.abs((phi - values["beta"] + math.pi) % TURN - math.pi)
+    away = np.abs((phi - given.values["beta"] + math.pi) % TURN - math.pi)
     expected = np.where(away < pulse / 2, 745.0 * np.cos(math.pi * away / pulse), 0.0)
     assert curves["M_R [N*m]"].to_numpy() == pytest.approx(expected, rel=0, abs=1e-9)
     once = np.flatnonzero((phi != 0) & (np.diff(phi, prepend=-1) > 0) & (np.diff(phi, append=9) > 0))
@@ -216,7 +217,7 @@ def test_the_pulse_of_the_curves_is_right_across_the_ends_of_the_turn(name):
     moving = np.abs(psi_1) > 1e-9
     assert friction[moving] == pytest.approx(-2.0 * np.sign(psi_1[moving]), rel=1e-9)
     assert lo.evaluate(scene).figures["M3_fdc"] == pytest.approx(
-        745.0 + 2.0 - 0.62 * values["centres"].psi_2_front * scene.operation["speed"] ** 2, rel=1e-12
+        745.0 + 2.0 - 0.62 * linked(given).centres.psi_2_front * scene.operation["speed"] ** 2, rel=1e-12
     )
 
 

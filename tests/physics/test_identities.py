@@ -78,7 +78,7 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     corners = {name: load.corners(systems.FLOAT, plain.values, plain.own[name]) for name, load in cornered.items()}
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
-    lengths = given_.values["lengths"]
+    lengths = beatup.linked(given_).lengths
     pose = ReedPose(angle, given_.values["speed"], crank_rocker.Pose(system, lengths, angle), omega_dot)
     arguments = (system, found.loads, pose, given_, switches)
     return balance.output_force(*arguments), balance.crank_torque(*arguments)

@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
@@ -50,35 +50,45 @@ class ReedPose(Motion):
         return -self.joints.psi_2
 
 
+class Linkage(NamedTuple):
+    """What poses read at once of the four lengths."""
+
+    lengths: crank_rocker.Lengths
+    centres: crank_rocker.DeadCentres
+
+
+def linked(given: Given) -> Linkage:
+    """Return what poses read at once."""
+    found = given.linkage
+    assert isinstance(found, Linkage)
+    return found
+
+
 @dataclass(frozen=True)
 class FrontPose(Motion):
     """The pose at front dead centre, exact: ψ' = 0, and ψ'' in closed form; joints from the positions at β."""
 
     maths: Maths
-    values: Values
+    linkage: Linkage
+    phi: Number
     omega: Number
     omega_dot: Number
     q1: int = 0
 
     @property
-    def phi(self) -> Number:
-        """β, rad."""
-        return self.values["beta"]
-
-    @property
     def q(self) -> Number:
         """−ψ, rad."""
-        return -self.values["centres"].psi_front
+        return -self.linkage.centres.psi_front
 
     @property
     def q2(self) -> Number:
         """−ψ''."""
-        return -self.values["centres"].psi_2_front
+        return -self.linkage.centres.psi_2_front
 
     @lazy
     def joints(self) -> crank_rocker.Pose:
         """The linkage with crank and rod stretched."""
-        return crank_rocker.front_pose(self.maths, self.values["lengths"], self.values["centres"])
+        return crank_rocker.front_pose(self.maths, *self.linkage)
 
 
 def _obliquity(maths: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
@@ -97,19 +107,23 @@ class CrankRocker:
     def groups(self) -> Mapping[str, Group]:
         """The dyad of rod and rocker: it comes nearest to folding and stretching at φ = 0 and π."""
         found = four_bar(
-            lambda values: values["lengths"],
             ("l1", "l2", "l3", "l4"),
+            1,
             lambda values: 0,
             ("B to D < l2 + l3", "B to D > |l2 - l3|"),
             _obliquity,
         )
         return {"": Group(found.quantities, found.closes, found.rows, found.margins, (0.0, math.pi))}
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
-        """Return s = m4e r4e², kg·m², and both dead centres, rad."""
+    def linkage(self, maths: Maths, values: Values) -> Linkage:
+        """Return lengths and dead centres."""
         lengths = crank_rocker.Lengths(values["l1"], values["l2"], values["l3"], values["l4"])
-        centres = crank_rocker.dead_centres(maths, lengths)
-        found = {"lengths": lengths, "centres": centres, "beta": centres.beta, "beta_r": centres.beta_r}
+        return Linkage(lengths, crank_rocker.dead_centres(maths, lengths))
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
+        """Return s = m4e r4e², kg·m², and both dead centres, rad."""
+        values, centres = given.values, linked(given).centres
+        found = {"beta": centres.beta, "beta_r": centres.beta_r}
         return found if "s" in values else found | {"s": values["m4e"] * values["r4e"] ** 2}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
@@ -118,12 +132,14 @@ class CrankRocker:
 
     def pose(self, maths: Maths, given: Given, node: Node) -> ReedPose:
         """Return the pose at crank angles φ, rad."""
-        pose = crank_rocker.Pose(maths, given.values["lengths"], node.phi)
+        pose = crank_rocker.Pose(maths, linked(given).lengths, node.phi)
         return ReedPose(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
         """Return the pose at front dead centre."""
-        return FrontPose(maths, given.values, given.values.get("speed"), given.values.get("omega_dot"))
+        return FrontPose(
+            maths, linked(given), given.values["beta"], given.values.get("speed"), given.values.get("omega_dot")
+        )
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Return both dead centres, rad."""
@@ -157,11 +173,11 @@ def _front(at: Instant) -> Motion:
 
 
 ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: at.values["centres"].swing),
-    "theta": Row(lambda at: at.values["centres"].theta),
-    "beta": Row(lambda at: at.values["centres"].beta),
+    "swing": Row(lambda at: linked(at.given).centres.swing),
+    "theta": Row(lambda at: linked(at.given).centres.theta),
+    "beta": Row(lambda at: linked(at.given).centres.beta),
     "M3_fdc": Row(lambda at: at.force, event=FRONT),
-    "alpha_fdc": Row(lambda at: at.values["centres"].psi_2_front * _front(at).omega ** 2, ("speed",)),
+    "alpha_fdc": Row(lambda at: linked(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
     "r4": Row(eccentricity, ("m4", "r4", "m4e")),
     "r4e_square": Row(lambda at: at.values["r4e"] ** 2),
 }

@@ -7,7 +7,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.refusals import refusal
 from loomopt.jobs import base
 from loomopt.jobs.base import Crossing, Figures, Job, Studied
-from loomopt.jobs.rapier.model import jerk_mean, match_mean, read
+from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read
 from loomopt.jobs.rapier.program import RapierTask, model
 from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table
 from loomopt.maths.systems import FLOAT
@@ -106,7 +106,7 @@ class Rapier(Job):
         """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
         front = sampler.model.kinematics.still(FLOAT, sampler.given, "front dead centre", {}).joints  # type: ignore[attr-defined]
         gap = math.atan2(front.dyad.link2.y, front.dyad.link2.x) - front.phi3
-        centres = sampler.given.values["centres"]
+        centres = linked(sampler.given).centres
         rear = math.pi + centres.beta_r - centres.beta
         return Columns(
             {

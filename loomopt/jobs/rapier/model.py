@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.effects.kinds import Effect, Motion
-from loomopt.physics.mechanisms import rapier_drive
+from loomopt.physics.mechanisms import crank_rocker, rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
@@ -98,6 +98,20 @@ def _five_bar() -> Group:
     return Group({"span_far": far, "span_near": near, "obliquity": obliquity}, closes)
 
 
+class Linkage(NamedTuple):
+    """What poses read at once of the scene's numbers; centres: the sley's dead centres."""
+
+    dimensions: rapier_drive.Dimensions
+    centres: crank_rocker.DeadCentres
+
+
+def linked(given: Given) -> Linkage:
+    """Return what poses read at once."""
+    found = given.linkage
+    assert isinstance(found, Linkage)
+    return found
+
+
 @dataclass(frozen=True)
 class RapierDrive:
     """The drive's motion."""
@@ -110,32 +124,30 @@ class RapierDrive:
     def groups(self) -> Mapping[str, Group]:
         """The five-bar's dyad, and that of the sley four-bar."""
         sley = four_bar(
-            lambda values: rapier_drive.sley_lengths(values["dimensions"]),
             SLEY,
+            -1,
             lambda values: values["beta"],
             ("sley: A to B0 < l2 + l3", "sley: A to B0 > |l2 - l3|"),
         )
         return {"": _five_bar(), "sley_": sley}
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
-        """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
+    def linkage(self, maths: Maths, values: Values) -> Linkage:
+        """Return dimensions, and the sley's dead centres."""
         dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})
-        centres = rapier_drive.Sley(maths, dimensions).centres
-        found = {
-            "dimensions": dimensions,
-            "centres": centres,
-            "beta": centres.beta,
-            "frame_angle": values["phi30"] - centres.psi_front,
-        }
+        return Linkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
+        """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
+        values, centres = given.values, linked(given).centres
+        found = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
-        front = rapier_drive.Pose(maths, dimensions, stand, 0).relative
+        front = rapier_drive.Pose(maths, linked(given).dimensions, stand, 0).relative
         found |= {"front_x": front.x, "front_y": front.y}
+        given = given._replace(values={**values, **found})
         if STROKE in called:
-            given = Given({**values, **found}, {})
             farthest = values["phi_stroke"] if "phi_stroke" in values else values.get(HAND_OVER, 0)
             found[STROKE] = self.pose(maths, given, Node(farthest, {})).q2
         if TURNS in called:
-            given = Given({**values, **found}, {})
             hints = [values[name] for name in itertools.takewhile(values.__contains__, map(_turn, itertools.count()))]
             found[TURNS] = tuple(
                 turning_points.followed(lambda phi: self._rates(maths, given, phi), hint) for hint in hints
@@ -150,7 +162,7 @@ class RapierDrive:
         """Return the pose at crank angles φ1, rad."""
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
-        joints = rapier_drive.Pose(maths, values["dimensions"], stand, node.phi)
+        joints = rapier_drive.Pose(maths, linked(given).dimensions, stand, node.phi)
         return HeadPose(
             joints, Vector(values["front_x"], values["front_y"]), values.get("speed"), values.get("omega_dot")
         )
@@ -176,11 +188,8 @@ class RapierDrive:
 
     def events(self, maths: Maths, given: Given) -> dict[str, Number]:
         """Return both dead centres of the sley, rad."""
-        values = given.values
-        return {
-            "front dead centre": 0,
-            "rear dead centre": maths.pi + values["centres"].beta_r - values["centres"].beta,
-        }
+        centres = linked(given).centres
+        return {"front dead centre": 0, "rear dead centre": maths.pi + centres.beta_r - centres.beta}
 
 
 def _turn(k: int) -> str:
@@ -226,8 +235,8 @@ LOADED = (*TAPE_FORCE, drive.TORQUE, drive.POWER)
 """Figures that loads give."""
 
 ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: at.values["centres"].swing),
-    "theta": Row(lambda at: at.values["centres"].theta),
+    "swing": Row(lambda at: linked(at.given).centres.swing),
+    "theta": Row(lambda at: linked(at.given).centres.theta),
     "phi_stroke": Row(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
     "rest": Row(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
     "stroke_short": Row(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),

@@ -171,8 +171,12 @@ class CamFrame:
         """The half open shed, where it is one of the law's own breaks."""
         return frozenset((HALF_OPEN,) if self.law.symmetric and Fraction(1, 2) in self.law.breaks else ())
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> dict[str, Number]:
+    def linkage(self, maths: Maths, values: Values) -> None:
+        """Return nothing: poses read the numbers."""
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return the angles where segments begin, the law's knots, and where the shed is half open if called in."""
+        values = given.values
         far = values["rise"]
         turning = far + values["far_dwell"]
         near = turning + values["return"]

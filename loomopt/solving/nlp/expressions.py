@@ -52,7 +52,8 @@ class Quantities:
         """Kept: what identifies a symbol is another's once it is gone."""
         self._worth: dict[object, Any] = {identity(symbol): values[name] for name, symbol in symbols.items()}
         found = model.given(replace(systems.casadi(), choose=chosen), symbols)
-        self.given, self._in_symbols = given, Given(self._shared(found.values, given.values), found.own)
+        shared = self._shared(found.values, given.values)
+        self.given, self._in_symbols = given, Given(shared, found.own, linkage=found.linkage)
         self.phi, self.switches = ca.SX.sym("phi"), {name: ca.SX.sym(name) for name in switches}
         self._traced: dict[str, _Traced] = {}
 

@@ -52,7 +52,11 @@ class Steps:
         raised = Arcs(RAISED, lambda maths, given: tuple(map(maths.number, HALF)), raised_at)
         return raised, Arcs(STEP, corners, step_at, chain=follow if self.lifted else None)
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Values:
+    def linkage(self, maths: Maths, values: Values) -> None:
+        return None
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
+        values = given.values
         return {**heights(maths, values, self.bend), **{name: values[name] for name in HEIGHTS if name in values}}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:

@@ -29,7 +29,10 @@ class Still:
     arcs: tuple[Arcs, ...] = ()
     breaks: frozenset[str] = frozenset()
 
-    def derived(self, maths: Maths, values: Values, called: Collection[str]) -> Values:
+    def linkage(self, maths: Maths, values: Values) -> None:
+        return None
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> Values:
         return {}
 
     def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
