@@ -78,8 +78,8 @@ def outcome(programs: list[tuple[Program, ...]]) -> Outcome:
             if not point.reached or sampler is None:
                 found.append(None)
                 continue
-            excess = max(excess, point.violation, *(sampler.excess(k) for k in program.limits if k.sign != 0))
-            found.append(tuple(sampler.merit(level) / level.scale for level in program.objectives))
+            excess = max(excess, point.violation, *(k.excess(sampler) for k in program.limits if k.sign != 0))
+            found.append(tuple(level.merit(sampler) / level.scale for level in program.objectives))
     return Outcome(tuple(found), excess, iterations, left)
 
 

@@ -8,20 +8,11 @@ from dataclasses import replace
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
 from loomopt.model import drive, numbers
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.program import (
-    LEAST_CHANGE,
-    Goal,
-    Limit,
-    Move,
-    Numbers,
-    Objective,
-    Program,
-    Variable,
-    Wish,
-    goals,
-    nothing_follows,
-)
+from loomopt.model.moves import LEAST_CHANGE, AxisMove, Move, ScaleMove, Wish
+from loomopt.model.objectives import Objective, Value
+from loomopt.model.program import Goal, Numbers, Program, Variable, goals, nothing_follows
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, owned
 from loomopt.physics.tolerances import START_ROOM
@@ -181,7 +172,7 @@ class Task(abc.ABC):
             told = set[str | float]()
             for by, value in sorted(binding, key=lambda said: -said[1]):
                 if not told & {by, value}:
-                    yield Limit(by, -1, name, value, held.scale, "variable")
+                    yield BoundLimit(by, -1, name, value, held.scale)
                 told |= {by, value}
 
     def figures(self) -> list[Limit]:
@@ -195,8 +186,8 @@ class Task(abc.ABC):
 
     def row_limit(self, name: str, sign: int, row: str, value: float, scale: float, relaxable: bool = True) -> Limit:
         """Return a limit on a row of the model: on one of the design alone, or over the whole cycle."""
-        over_cycle = self.model.has_quantity(row)
-        return Limit(name, sign, row, value, scale, "cycle" if over_cycle else "static", relaxable=relaxable)
+        kind = CycleLimit if self.model.has_quantity(row) else DesignLimit
+        return kind(name, sign, row, value, scale, relaxable=relaxable)
 
     def demands(self) -> list[Limit]:
         """Return what checks demand of their rows and quantities while they are on.
@@ -219,7 +210,7 @@ class Task(abc.ABC):
     def margins(self) -> list[Limit]:
         """Return the margins by which the links close, which nobody can give up."""
         rows = [row for group in self.model.kinematics.groups.values() for row in group.margins]
-        return [Limit(row, -1, row, 0.0, self.length, "static", relaxable=False) for row in rows]
+        return [DesignLimit(row, -1, row, 0.0, self.length, relaxable=False) for row in rows]
 
     @property
     def length(self) -> float:
@@ -241,7 +232,7 @@ class Task(abc.ABC):
     def least(self) -> tuple[Objective, ...]:
         """Return the levels after a target's own: rows that the checks would have least."""
         rows = [check.least for check in self.sampler.model.checks if check.least]
-        return tuple(Objective(row, row, "value", abs(self.sampler.static[row]) or 1.0) for row in rows)
+        return tuple(Value(row, row, abs(self.sampler.static[row]) or 1.0) for row in rows)
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Return the job's own starts: today's machine."""
@@ -271,13 +262,13 @@ class Task(abc.ABC):
 
     def move(self, name: str, along: str, wishes: Sequence[Wish] = (Wish("today", LEAST_CHANGE),)) -> Move:
         """Return the move along one number; it would stay nearest to today's where no other wish is told."""
-        return Move(name, (along,), "axis", tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
+        return AxisMove(name, (along,), tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
 
     def scale_move(self, name: str, along: tuple[str, ...]) -> Move:
         """Return the move that scales lengths in common, and would stay nearest to today's."""
         today = {n: self.known[n] for n in along if n in self.known}
         bounds = {n: self.limited[n] for n in along if n in self.limited}
-        return Move(name, along, "scale", (Wish("today", LEAST_CHANGE),), today, bounds)
+        return ScaleMove(name, along, (Wish("today", LEAST_CHANGE),), today, bounds)
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
         """Return what gives the variables that follow from the others."""
@@ -314,10 +305,10 @@ def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]
     """Return the bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
     name, v = variable.called, variable
     if v.lower == v.upper:
-        return [Limit(name, 0, v.name, v.lower, v.scale, "variable")]
+        return [BoundLimit(name, 0, v.name, v.lower, v.scale)]
     ends = [(sign, value) for sign, value in ((-1, v.lower), (1, v.upper)) if math.isfinite(value)]
     return [
-        Limit(name, sign, v.name, value, v.scale, "variable", relaxable=relaxable_from or sign > 0 or value > 0.0)
+        BoundLimit(name, sign, v.name, value, v.scale, relaxable=relaxable_from or sign > 0 or value > 0.0)
         for sign, value in ends
     ]
 

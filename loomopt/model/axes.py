@@ -7,12 +7,16 @@ from dataclasses import dataclass, replace
 from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
 from loomopt.maths.systems import Number
+from loomopt.model.limits import Limit
 from loomopt.model.model import Formula, Instant, JobModel, Row
-from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst
+from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
 Asked = Mapping[str, Sense]
 """Axis → which end of it is sought."""
+FORMS: Mapping[str, type[Objective]] = {"value": Value, "magnitude": Magnitude, "peak": Peak}
+"""How an axis says that it is read → the kind of objective that it is."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Traded:
     @property
     def called(self) -> str:
         """Its name; of a magnitude it says so."""
-        return f"|{self.axis.name}|" if self.objective.form == "magnitude" else self.axis.name
+        return f"|{self.axis.name}|" if self.objective.is_magnitude else self.axis.name
 
     def figure(self, value: float) -> float:
         """Return the figure, SI, of a value."""
@@ -49,14 +53,7 @@ class Traded:
 
     def limits(self, name: str, value: float) -> list[Limit]:
         """Return what keeps the value at most at `value`, as limits of a name: a magnitude on both sides, always."""
-        family = "cycle" if self.objective.form == "peak" else "static"
-        sides = ((1, value), (-1, -value)) if self.objective.form == "magnitude" else ((1, value),)
-        scale = self.objective.scale
-        return [
-            Limit(name, sign, row, bound, scale, family)  # type: ignore[arg-type]
-            for row in self.objective.rows
-            for sign, bound in sides
-        ]
+        return self.objective.limits(name, value)
 
 
 def asked_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Asked, origin: str) -> dict[str, Axis]:
@@ -90,16 +87,21 @@ def with_axes(
         own = program.model.has_row(name) or program.model.has_quantity(name)
         axis, rows = axes[name], axes[name].rows or (name if own else full(name),)
         _demand(program, name, rows)
-        peak = axis.form == "peak" or (not axis.form and program.model.has_quantity(rows[0]))
-        form = "peak" if peak else axis.form or "value"
-        opposed = not peak and axis.sign * (1 if sense == "least" else -1) < 0
+        form = axis.form or ("peak" if program.model.has_quantity(rows[0]) else "value")
+        opposed = FORMS[form] is not Peak and axis.sign * (1 if sense == "least" else -1) < 0
         if opposed:
             program = replace(program, model=opposing(program.model, rows))
             rows = tuple(map(opposite, rows))
-        objective = Objective(name, rows[0], form, size(name), axis.power, rows[1:])
+        objective = _objective(name, rows, FORMS[form], size(name), axis.power)
         found.append(Traded(axis, sense, objective))
     levels = (*program.objectives, *(traded.objective for traded in found))
     return replace(program, objectives=levels), tuple(found)
+
+
+def _objective(name: str, rows: Sequence[str], kind: type[Objective], scale: float, power: int) -> Objective:
+    """Return the objective of an axis; of several rows the worst counts."""
+    first, *others = rows
+    return Worst(name, first, scale, tuple(others), power=power) if others else kind(name, first, scale, power=power)
 
 
 def _demand(program: Program, name: str, rows: Sequence[str]) -> None:

@@ -7,13 +7,14 @@ serves every scene of the same structure.
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
+from loomopt.model.limits import BoundLimit, CycleLimit, Limit, SingleLimit
 from loomopt.model.model import JobModel
-from loomopt.physics.cycle import Where
-from loomopt.physics.schema import Values
+from loomopt.model.moves import Move
+from loomopt.model.objectives import Objective, Peak
 from loomopt.physics.tolerances import FEASIBLE
 
 
@@ -35,45 +36,6 @@ class Variable:
     def called(self) -> str:
         """What a designer calls it."""
         return self.label or self.name
-
-
-@dataclass(frozen=True)
-class Limit:
-    """A limit as `sign · (row − value · weight) ≤ 0`: sign +1 for a maximum, −1 for a minimum, 0 for an equality.
-
-    name: as the scene calls it; row, weight: names of values, static figures or whole-cycle quantities (weight "" = 1);
-    family: where the row lives; scale: natural size of the row; relaxable: whether a designer could give way.
-    A whole-cycle row is |quantity| ≤ bound (of a signed quantity, quantity ≤ bound): the value itself or, for a
-    minimum, what it leaves of the complement.
-    where: (switch, its value) on the pieces it holds for; hidden: it states what a named one means.
-    """
-
-    name: str
-    sign: int
-    row: str
-    value: float
-    scale: float
-    family: Literal["variable", "static", "cycle"]
-    weight: str = ""
-    relaxable: bool = True
-    complement: float = 0.0
-    where: Where | None = None
-    hidden: bool = False
-
-    @property
-    def bound(self) -> float:
-        """The largest |quantity| that a whole-cycle row allows, SI."""
-        return self.complement + self.sign * self.value
-
-    @property
-    def structure(self) -> Hashable:
-        """What the built NLP depends on: everything but the numbers."""
-        return self.name, self.sign, self.row, self.family, self.weight, self.relaxable, self.where
-
-    def residual(self, values: Values, limit: Number) -> Number:
-        """Return how far the limit is exceeded, SI; for an equality the signed difference."""
-        bound = limit * values[self.weight] if self.weight else limit
-        return bound - values[self.row] if self.sign < 0 else values[self.row] - bound
 
 
 class Goal(NamedTuple):
@@ -103,68 +65,6 @@ def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
         high = min((limit.value for limit in each if limit.sign >= 0), default=math.inf)
         found.append(Goal(name, low, high, FEASIBLE * max(limit.scale for limit in each)))
     return tuple(found)
-
-
-@dataclass(frozen=True)
-class Objective:
-    """One level of a target: least |row| ("magnitude"), least peak over the cycle ("peak") or least row ("value").
-
-    figure: what the designer reads; scale: its natural size, SI; power: the figure's power that the row is.
-    others: more rows of the same form; combine: whether the worst of all counts, or their sum.
-    """
-
-    figure: str
-    row: str
-    form: Literal["magnitude", "peak", "value"]
-    scale: float
-    power: int = 1
-    others: tuple[str, ...] = ()
-    combine: Literal["worst", "sum"] = "worst"
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """All rows it reads."""
-        return (self.row, *self.others)
-
-    @property
-    def groups(self) -> tuple[tuple[str, ...], ...]:
-        """The rows whose worst counts: the objective is the sum over the groups."""
-        return (self.rows,) if self.combine == "worst" else tuple((row,) for row in self.rows)
-
-    @property
-    def is_smooth(self) -> bool:
-        """Whether it is one smooth function of the design."""
-        return self.form == "value" and len(self.groups) == len(self.rows)
-
-
-LEAST_CHANGE = "least change from today"
-
-
-class Wish(NamedTuple):
-    """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
-
-    when, above: it holds where that variable exceeds that value, SI; "" for always.
-    """
-
-    toward: Literal["today", "least", "most"]
-    reason: str
-    when: str = ""
-    above: float = 0.0
-
-
-class Move(NamedTuple):
-    """A direction that may leave everything unchanged, along straight lines in the NLP's variables.
-
-    kind "scale": all of `along` grow in proportion; "axis": each of `along` changes by itself.
-    wishes: the first that holds is followed; today, bounds: of each of `along`, SI.
-    """
-
-    name: str
-    along: tuple[str, ...]
-    kind: Literal["scale", "axis"]
-    wishes: tuple[Wish, ...]
-    today: Mapping[str, float]
-    bounds: Mapping[str, tuple[float, float]]
 
 
 Numbers = Mapping[str, float]
@@ -207,7 +107,7 @@ class Program:
             tuple(variable.name for variable in self.variables),
             tuple(self.parameters),
             tuple(limit.structure for limit in self.limits),
-            tuple((objective.rows, objective.form, objective.combine) for objective in self.objectives),
+            tuple(objective.structure for objective in self.objectives),
         )
 
     @lazy
@@ -216,16 +116,44 @@ class Program:
 
         The rows of one limit's side give way together.
         """
-        sides: dict[tuple[str, str, int], tuple[int, ...]] = {}
+        sides: dict[Hashable, tuple[int, ...]] = {}
         count = 0
         for limit in self.limits:
-            key = limit.name, limit.family, limit.sign
-            if limit.relaxable and key not in sides:
+            if limit.relaxable and limit.side not in sides:
                 size = 2 if limit.sign == 0 else 1
-                sides[key] = tuple(range(count, count + size))
+                sides[limit.side] = tuple(range(count, count + size))
                 count += size
-        keys = {k: (limit.name, limit.family, limit.sign) for k, limit in enumerate(self.limits) if limit.relaxable}
-        return {k: sides[key] for k, key in keys.items()}
+        return {k: sides[limit.side] for k, limit in enumerate(self.limits) if limit.relaxable}
+
+    @lazy
+    def bound_limits(self) -> dict[int, BoundLimit]:
+        """The limits that are bounds of variables, by place."""
+        return {k: limit for k, limit in enumerate(self.limits) if isinstance(limit, BoundLimit)}
+
+    @lazy
+    def single_limits(self) -> dict[int, SingleLimit]:
+        """The limits that are one row each, by place."""
+        return {k: limit for k, limit in enumerate(self.limits) if isinstance(limit, SingleLimit)}
+
+    @lazy
+    def design_limits(self) -> dict[int, SingleLimit]:
+        """The limits that are one row each and no bound of a variable, by place."""
+        return {k: limit for k, limit in self.single_limits.items() if k not in self.bound_limits}
+
+    @lazy
+    def cycle_limits(self) -> dict[int, CycleLimit]:
+        """The limits over the whole cycle, by place."""
+        return {k: limit for k, limit in enumerate(self.limits) if isinstance(limit, CycleLimit)}
+
+    @lazy
+    def row_limits(self) -> tuple[Limit, ...]:
+        """The limits that are more than bounds of variables, in order."""
+        return tuple(limit for k, limit in enumerate(self.limits) if k not in self.bound_limits)
+
+    @lazy
+    def peaks(self) -> tuple[Peak, ...]:
+        """The objectives that are peaks over the cycle, in order."""
+        return tuple(objective for objective in self.objectives if isinstance(objective, Peak))
 
     @lazy
     def told(self) -> frozenset[str]:
@@ -235,7 +163,7 @@ class Program:
     @lazy
     def held(self) -> frozenset[str]:
         """Variables that are held without being limited: their value is today's, not a choice."""
-        limited = {limit.row for limit in self.limits if limit.family == "variable"}
+        limited = {limit.row for limit in self.bound_limits.values()}
         return frozenset(v.name for v in self.variables if v.lower == v.upper and v.name not in limited)
 
     @lazy

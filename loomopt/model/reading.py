@@ -12,10 +12,9 @@ from loomopt.maths import recording
 from loomopt.maths.recording import Bind, Program, Recorded, Tape
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral, JobModel, Stills
-from loomopt.model.program import Limit
 from loomopt.model.session import current
 from loomopt.physics.balance import Given, total
-from loomopt.physics.cycle import Cycle, Floats, Node, Pieces
+from loomopt.physics.cycle import Cycle, Floats, Node, Pieces, Where
 from loomopt.physics.schema import Values
 
 GAUSS_NODES = 32
@@ -182,15 +181,12 @@ class Rows(abc.ABC):
         known = self.model.static(self.maths, self.given, self.stills, (name,))
         return known[name] if name in known else self.given.values[name]
 
-    def excess(self, limit: Limit, value: Number = None) -> Number:
-        """Return by how much a variable's or a single value's limit is exceeded, SI; of an equality the difference.
+    def highest(self, name: str, where: Where | None = None) -> Number:
+        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI.
 
-        value: of the limit in this number system, its own without one.
+        Only where the cycle has been looked at as a whole: in samples.
         """
-        names = [name for name in (limit.row, limit.weight) if name]
-        of_variables = limit.family == "variable"
-        known = {name: self.given.values[name] if of_variables else self.single(name) for name in names}
-        return limit.residual(known, self.maths.number(limit.value) if value is None else value)
+        raise NotImplementedError(f"{name} is read at nodes here")
 
 
 class Reading(Rows):

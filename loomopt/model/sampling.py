@@ -13,7 +13,6 @@ from loomopt.maths import peaks, systems
 from loomopt.maths.peaks import inside_samples, vertex
 from loomopt.maths.systems import Number
 from loomopt.model.model import Integral, JobModel, Stills
-from loomopt.model.program import Limit, Objective
 from loomopt.model.reading import DATUM, Quantities, Reading, Rows, quadrature
 from loomopt.model.session import current
 from loomopt.physics.balance import Given
@@ -106,28 +105,13 @@ class Sampler:
         return Reading(self.model, system, self.model.given(system, values), self.cycle, self.stills)
 
     @lazy
-    def _rows(self) -> "_SampledRows":
+    def rows(self) -> Rows:
+        """The design's rows in floats."""
         return _SampledRows(self)
 
     def single(self, name: str) -> float:
         """Return a figure, row or number of the design, SI."""
-        return float(self._rows.single(name))
-
-    def excess(self, limit: Limit) -> float:
-        """Return how far a limit is exceeded, in its natural size; of an equality with its sign."""
-        if limit.family == "cycle":
-            return (self.peak(limit.row, limit.where) - limit.bound) / limit.scale
-        return float(self._rows.excess(limit)) / limit.scale
-
-    def merit(self, objective: Objective) -> float:
-        """Return what an objective is worth, SI: of a magnitude its size, of a peak the whole cycle's."""
-        return sum(max(self._merit(objective, row) for row in group) for group in objective.groups)
-
-    def _merit(self, objective: Objective, row: str) -> float:
-        if objective.form == "peak":
-            return self.peak(row)
-        value = self.single(row)
-        return abs(value) if objective.form == "magnitude" else value
+        return float(self.rows.single(name))
 
     @lazy
     def quantities(self) -> Quantities:
@@ -326,7 +310,14 @@ class _SampledRows(Rows):
     def __init__(self, sampler: Sampler) -> None:
         super().__init__(sampler.model, systems.FLOAT, sampler.given, sampler.stills)
         self.sampler = sampler
-        self._single |= sampler.static
+
+    def _value(self, name: str) -> Number:
+        static = self.sampler.static
+        return static[name] if name in static else super()._value(name)
+
+    def highest(self, name: str, where: Where | None = None) -> float:
+        """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI."""
+        return self.sampler.peak(name, where)
 
     def mean(self, integral: Integral) -> float:
         """Return a mean over the cycle, SI."""

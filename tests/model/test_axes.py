@@ -18,7 +18,7 @@ def traded(name, target, **asked):
 def figure(scene, program, axis, design):
     """Return an axis of a design as its objective says it."""
     x = registry.of(scene).values(program, design)
-    return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
+    return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
 
 CASES = [

@@ -47,8 +47,8 @@ def objectives(program, x):
     """Return a design's objectives, in order, in their natural sizes."""
     sampler = sampler_at(program, x)
     assert sampler is not None
-    values = [sampler.peak(o.row) if o.form == "peak" else sampler.figures[o.row] for o in program.objectives]
-    return [(abs(v) if o.form == "magnitude" else v) / o.scale for v, o in zip(values, program.objectives, strict=True)]
+    values = [sampler.peak(o.row) if o.quantities else sampler.figures[o.row] for o in program.objectives]
+    return [(abs(v) if o.is_magnitude else v) / o.scale for v, o in zip(values, program.objectives, strict=True)]
 
 
 @pytest.mark.parametrize("name", OPTIMA)

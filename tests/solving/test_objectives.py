@@ -1,8 +1,7 @@
-"""Objectives of several rows, the worst of all or their sum: solved and certified, with prices, on plain formulas."""
+"""Objectives of several rows, the worst of which counts: solved and certified, with prices, on plain formulas."""
 
 import math
 
-import numpy as np
 import pytest
 from support import toy
 
@@ -33,16 +32,6 @@ def test_a_limit_of_the_worst_has_its_price():
     assert price.reading == "1 per unit"
 
 
-def test_a_sum_of_two_magnitudes_stands_at_the_steeper_kink():
-    rows = {"p": lambda v: v["x"] - 1, "q": lambda v: 2 * v["x"] - 3, "r": lambda v: (v["x"] - 2) ** 2 + v["y"] ** 2}
-    answer = toy.solve(toy.program("xy", rows, objectives=("|p + q|", "r")))
-    assert answer.status == "optimal", answer.message
-    assert answer.design == pytest.approx({"x": 1.5, "y": 0.0}, abs=1e-12)
-    assert answer.certificate.levels[1].held >= 1 / 3, "dr/dx = −1 against a kink of 1 ± 2"
-    for x in (1.5 + 1e-6, 1.5 - 1e-6):
-        assert not certify(toy.program("xy", rows, objectives=("|p + q|", "r")), {"x": x, "y": 0.0}, 1e-8).passed
-
-
 def test_the_worst_of_two_magnitudes_stands_between_them():
     rows = {"p": lambda v: v["x"] - 1, "q": lambda v: 2 * v["x"] - 3}
     answer = toy.solve(toy.program("x", rows, objectives=("|p, q|",)))
@@ -51,10 +40,9 @@ def test_the_worst_of_two_magnitudes_stands_between_them():
 
 def test_magnitudes_that_all_vanish_leave_nothing_to_gain():
     rows = {"p": lambda v: v["x"] - v["y"] - 1, "q": lambda v: v["x"] + v["y"] - 3, "r": lambda v: v["x"] ** 2}
-    for objective in ("|p + q|", "|p, q|"):
-        answer = toy.solve(toy.program("xy", rows, objectives=(objective, "r")))
-        assert answer.status == "optimal", answer.message
-        assert answer.design == pytest.approx({"x": 2.0, "y": 1.0}, abs=1e-9)
+    answer = toy.solve(toy.program("xy", rows, objectives=("|p, q|", "r")))
+    assert answer.status == "optimal", answer.message
+    assert answer.design == pytest.approx({"x": 2.0, "y": 1.0}, abs=1e-9)
 
 
 CORNERS = ((0.0, 0.0), (4.0, 0.0), (1.0, 3.0))
@@ -65,18 +53,6 @@ def distance(x, y):
     return lambda m, v, phi: (v["x"] - x) * m.cos(phi) + (v["y"] - y) * m.sin(phi)
 
 
-def test_the_least_sum_of_three_peaks_is_fermats_point():
-    """From it the corners of a triangle are seen 120 deg apart."""
-    waves = {f"d{k}": distance(*corner) for k, corner in enumerate(CORNERS)}
-    answer = toy.solve(toy.program("xy", waves=waves, objectives=("peak d0 + d1 + d2",)))
-    assert answer.status == "optimal", answer.message
-    at = np.array([answer.design["x"], answer.design["y"]])
-    ways = [(np.array(corner) - at) / np.linalg.norm(np.array(corner) - at) for corner in CORNERS]
-    cosines = [ways[j] @ ways[k] for j, k in ((0, 1), (1, 2), (2, 0))]
-    assert cosines == pytest.approx([-0.5] * 3, abs=1e-7)
-    assert answer.certificate.unique
-
-
 def test_the_least_of_the_largest_of_three_peaks_is_the_smallest_circle():
     waves = {f"d{k}": distance(*corner) for k, corner in enumerate(CORNERS)}
     answer = toy.solve(toy.program("xy", waves=waves, objectives=("peak d0, d1, d2",)))
@@ -85,22 +61,8 @@ def test_the_least_of_the_largest_of_three_peaks_is_the_smallest_circle():
     assert [answer.figures[f"d{k}"] for k in range(3)] == pytest.approx([math.sqrt(5)] * 3, rel=1e-9)
 
 
-def test_smooth_rows_may_be_summed_or_compared():
+def test_smooth_rows_may_be_compared():
     rows = {"p": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2, "q": lambda v: (v["x"] + 1) ** 2 + (v["y"] - 1) ** 2}
-    for objective in ("p + q", "p, q"):
-        answer = toy.solve(toy.program("xy", rows, objectives=(objective,)))
-        assert answer.status == "optimal", answer.message
-        assert answer.design == pytest.approx({"x": 0.0, "y": 0.5}, abs=1e-9)
-
-
-def test_of_a_sum_that_is_held_one_part_may_rise_as_the_other_falls():
-    """p + q = h is least along a line: the next level chooses on it, though p and q change there."""
-    rows = {
-        "p": lambda v: 2 * v["x"] + v["y"],
-        "q": lambda v: -v["x"] + v["y"],
-        "r": lambda v: (v["x"] - 2) ** 2 + v["y"] ** 2,
-        "h": lambda v: v["x"] + 2 * v["y"],
-    }
-    answer = toy.solve(toy.program("xy", rows, limits=(("h", -1, 1.0),), objectives=("p + q", "r")))
+    answer = toy.solve(toy.program("xy", rows, objectives=("p, q",)))
     assert answer.status == "optimal", answer.message
-    assert answer.design == pytest.approx({"x": 9 / 5, "y": -2 / 5}, abs=1e-9), "nearest to (2, 0) on x + 2 y = 1"
+    assert answer.design == pytest.approx({"x": 0.0, "y": 0.5}, abs=1e-9)

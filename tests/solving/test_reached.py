@@ -7,7 +7,8 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.jobs.beatup.program import BALANCED
-from loomopt.model.program import Goal, Limit, goals
+from loomopt.model.limits import DesignLimit
+from loomopt.model.program import Goal, goals
 from loomopt.physics.tolerances import FEASIBLE
 
 ASKED = {
@@ -50,8 +51,8 @@ def test_a_goal_is_reached_within_its_slack(goal, figures, reached):
 
 
 def test_limits_of_both_sides_are_one_goal_as_closely_held():
-    sides = [Limit("a", sign, "row", value, 4.0, "static") for sign, value in ((-1, -2.0), (1, 3.0))]
-    equal = Limit("b", 0, "row", 5.0, 2.0, "static")
+    sides = [DesignLimit("a", sign, "row", value, 4.0) for sign, value in ((-1, -2.0), (1, 3.0))]
+    equal = DesignLimit("b", 0, "row", 5.0, 2.0)
     assert goals([*sides, equal]) == (Goal("a", -2.0, 3.0, 4 * FEASIBLE), Goal("b", 5.0, 5.0, 2 * FEASIBLE))
     assert goals([]) == ()
 

@@ -4,7 +4,7 @@ import functools
 import math
 from collections import defaultdict
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -15,8 +15,11 @@ from loomopt.jobs.base import Job
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.curves import Columns
 from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit
 from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
-from loomopt.model.program import Limit, Move, Objective, Program, Variable
+from loomopt.model.moves import Move
+from loomopt.model.objectives import Objective
+from loomopt.model.program import Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
@@ -30,6 +33,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.scenes.schema import SceneSchema
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
+from support.worst import objective_of
 
 WIDE = 10.0
 Formula = Callable[[Values], Number]
@@ -120,9 +124,9 @@ def program(
     bounds, sizes = bounds or {}, defaultdict(lambda: 1.0, sizes or {})
     far = 2 * max(WIDE, *map(_room, (bounds.get(n, (0.0, WIDE)) for n in names)))
     ends = [(name, sign, value) for name, (low, high) in bounds.items() for sign, value in ((-1, low), (1, high))]
-    bound = tuple(Limit(n, sign, n, value, sizes[n], "variable") for n, sign, value in ends if math.isfinite(value))
+    bound = tuple(BoundLimit(n, sign, n, value, sizes[n]) for n, sign, value in ends if math.isfinite(value))
     others = tuple(
-        Limit(row, sign, row, value, sizes[row], "cycle" if row in waves else "static")
+        (CycleLimit if row in waves else DesignLimit)(row, sign, row, value, sizes[row])
         for row, sign, value in (*limits, (names[0], 1, far))
     )
     return Program(
@@ -139,14 +143,13 @@ def program(
 def objective(text: str, sizes: Numbers | None = None) -> Objective:
     """Return an objective: "row", "|row|" for a magnitude, "peak row" for a wave.
 
-    "a, b": the worst of both; "a + b": their sum.
+    "a, b": the worst of both.
     """
     form = "magnitude" if text[0] == "|" else "peak" if text.startswith("peak ") else "value"
     bare = text.strip("|").removeprefix("peak ")
-    rows = bare.replace(" + ", ", ").split(", ")
+    rows = bare.split(", ")
     size = (sizes or {}).get(rows[0], 1.0) if sizes else 1.0
-    found = Objective(bare, rows[0], form, size, others=tuple(rows[1:]))  # type: ignore[arg-type]
-    return replace(found, combine="sum") if " + " in text else found
+    return objective_of(form, bare, rows, size)
 
 
 def _variable(name: str, ends: tuple[float, float] | None, size: float) -> Variable:

@@ -243,11 +243,8 @@ def _dxf(path: Path, scene: Scene, design: Design, said: Subject | None) -> None
     atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
 
 
-DRAWINGS: dict[str, Callable[[Path, Scene, Design, Subject | None], None]] = {
-    ".svg": _svg,
-    ".dxf": _dxf,
-    ".csv": _joints,
-}
+Writer = Callable[[Path, Scene, Design, Subject | None], None]
+DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints}
 """Ending of a file → what writes a linkage to it."""
 
 

@@ -102,7 +102,7 @@ class Beatup(Job):
         """
         found = {**design, "s": design["m4e"] * design["r4e"] ** 2}
         asked = {row for objective in program.objectives for row in objective.rows}
-        asked |= {limit.row for limit in program.limits if limit.family != "variable"}
+        asked |= {limit.row for limit in program.row_limits}
         if design["m4e"] == 0.0 and asked.isdisjoint({"change", "r4e", opposite("r4e")}):
             found |= {v.name: v.upper for v in program.variables if v.name == "r4e"}
         return {v.name: found[v.name] for v in program.variables}

@@ -11,9 +11,12 @@ from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.jobs.task import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.model.drive import TORQUE
+from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
+from loomopt.model.moves import Move, Wish
 from loomopt.model.numbers import numbers, words
-from loomopt.model.program import Goal, Limit, Move, Numbers, Objective, Variable, Wish, goals
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value
+from loomopt.model.program import Goal, Numbers, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
 from loomopt.physics.tolerances import NO_MASS
@@ -155,7 +158,7 @@ class BeatupTask(Task):
         if self.direct:
             return found
         return found + [
-            Limit("m4e", sign, "s", value, self.inertia, "static", "r4e_square", relaxable=sign >= 0 or value > 0.0)
+            RatioLimit("m4e", sign, "s", value, self.inertia, "r4e_square", relaxable=sign >= 0 or value > 0.0)
             for sign, value in ends(*self.limited["m4e"])
         ]
 
@@ -178,12 +181,12 @@ class BeatupTask(Task):
 
     def objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order."""
-        peak = Objective(TORQUE, TORQUE, "peak", self.peak)
+        peak = Peak(TORQUE, TORQUE, self.peak)
         own = {
-            "balance": (Objective("M3_fdc", "M3_fdc", "magnitude", self.torque), peak),
+            "balance": (Magnitude("M3_fdc", "M3_fdc", self.torque), peak),
             "torque": (peak,),
-            "pulse": (Objective("pulse_rms", "pulse_mean_square", "value", self.mean_square, power=2),),
-            "retrofit": (Objective("change", "change", "value", 1.0),),
+            "pulse": (Value("pulse_rms", "pulse_mean_square", self.mean_square, power=2),),
+            "retrofit": (Value("change", "change", 1.0),),
         }
         return *own[self.target], *self.least()
 

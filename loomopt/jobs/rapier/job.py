@@ -60,7 +60,7 @@ class Rapier(Job):
 
     def design(self, program: Program, x: Numbers) -> dict[str, float]:
         """Return the design, SI, of NLP variables: the drive's own, and every other number that is freed."""
-        fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0} - set(STROKE)
+        fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0} - set(STROKE)
         own = {v.name for v in program.variables if v.lower < v.upper or v.name in fixed} - {"phi_stroke", "dwell"}
         values = {**program.parameters, **x}
         return {

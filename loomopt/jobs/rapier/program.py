@@ -24,9 +24,12 @@ from loomopt.jobs.rapier.model import (
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
 from loomopt.jobs.task import Asked, Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.maths.systems import FLOAT
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import Move
 from loomopt.model.numbers import numbers, words
-from loomopt.model.program import Limit, Move, Numbers, Objective, Variable
+from loomopt.model.objectives import Objective, Peak, Value
+from loomopt.model.program import Numbers, Variable
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive
@@ -204,7 +207,7 @@ class RapierTask(Task):
         """Return what the target keeps, each on the side where a designer could give way."""
         known = self.known
         kept = [name for name in self.kept if name not in self.free]
-        return [Limit(n, REQUIRED[n], n, known[n], self.operated_size(n), "variable") for n in kept]
+        return [BoundLimit(n, REQUIRED[n], n, known[n], self.operated_size(n)) for n in kept]
 
     def wanted(self) -> list[Limit]:
         """Return what of the bounds and of what is kept the target asks of figures."""
@@ -223,13 +226,13 @@ class RapierTask(Task):
         size, rows = 1.0, {"head at rest at phi_stroke": "rest"}
         if "stroke" in reached:
             size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}
-        found = [Limit(name, 0, row, 0.0, size, "static", relaxable=False, hidden=True) for name, row in rows.items()]
+        firm = {"relaxable": False, "hidden": True}
+        found: list[Limit] = [DesignLimit(name, 0, row, 0.0, size, **firm) for name, row in rows.items()]
         for side, name in dwell_arcs(self.sought, self.dwelt):
             if name in reached or name == DWELL:
                 text = f"head within s_dwell {'after' if side == AFTER else 'before'} front dead centre"
                 where = (DWELL, side)
-                row = Limit(text, 1, "dwell_travel", 1.0, 1.0, "cycle", relaxable=False, where=where, hidden=True)
-                found.append(row)
+                found.append(CycleLimit(text, 1, "dwell_travel", 1.0, 1.0, where=where, **firm))
         return found
 
     def margins(self) -> list[Limit]:
@@ -241,7 +244,7 @@ class RapierTask(Task):
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
         """Return the limits on one figure, row by row; a dwell is a variable's."""
         if name == "mu_min" and low is not None:
-            return [Limit(name, -1, "obliquity", low, 1.0, "cycle", complement=math.pi / 2)]
+            return [CycleLimit(name, -1, "obliquity", low, 1.0, complement=math.pi / 2)]
         if name in (DWELL, *SIDES):
             return []
         sides, rows = ends(low, high), self.read_from.get(name, (name,))
@@ -264,10 +267,10 @@ class RapierTask(Task):
         """Return the target's levels in order."""
         peak, stroke = self.sampler.peak("peak_acceleration") or 1.0, self.reading.stroke or 1.0
         own = {
-            "stroke-dwell": Objective("peak_acceleration", "peak_acceleration", "peak", peak),
-            "dwell": Objective("dwell", "dwell_rest", "value", 1.0),
-            "smooth": Objective("rms_jerk", "jerk_mean_square", "value", peak**2, power=2),
-            "match": Objective("match_rms", "match_mean_square", "value", stroke**2, power=2),
+            "stroke-dwell": Peak("peak_acceleration", "peak_acceleration", peak),
+            "dwell": Value("dwell", "dwell_rest", 1.0),
+            "smooth": Value("rms_jerk", "jerk_mean_square", peak**2, power=2),
+            "match": Value("match_rms", "match_mean_square", stroke**2, power=2),
         }
         return own[self.target], *self.least()
 

@@ -122,7 +122,7 @@ class Shedding(Job):
         """Return the design, SI, of NLP variables: the spring, what else is freed, and a free law's knots."""
         values, law = {**program.parameters, **x}, frame(program.model).law
         knots = set(law.names) if isinstance(law, Spline) else set()
-        fixed = {limit.row for limit in program.limits if limit.family == "variable" and limit.sign == 0}
+        fixed = {limit.row for limit in program.bound_limits.values() if limit.sign == 0}
         chosen = [v.name for v in program.variables if v.name in fixed or _chosen(v, values[v.name])]
         free = [name for name in chosen if name not in {*VARIABLES, *knots, CONTACT_SPEED}]
         found = {name: values[name] for name in (*VARIABLES, *free)}

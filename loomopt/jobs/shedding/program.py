@@ -16,9 +16,12 @@ from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, c
 from loomopt.jobs.task import Asked, Ends, Task, bound_limits, ends, size_read
 from loomopt.maths import systems
 from loomopt.model import drive
+from loomopt.model.limits import BoundLimit, Limit
 from loomopt.model.model import JobModel
+from loomopt.model.moves import Move
 from loomopt.model.numbers import numbers, words
-from loomopt.model.program import Goal, Limit, Move, Numbers, Objective, Variable, goals, nothing_follows
+from loomopt.model.objectives import Objective, Peak, Value
+from loomopt.model.program import Goal, Numbers, Variable, goals, nothing_follows
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.model.speeds import followed, speed_reached
 from loomopt.physics.cycle import Floats
@@ -238,12 +241,13 @@ class SheddingTask(Task):
 
     def bounds(self) -> list[Limit]:
         """Return the bounds of variables as limits; a requirement gives way on one side only."""
-        found, knots = [], set(self.law.names) if self.law else set()
+        found: list[Limit] = []
+        knots = set(self.law.names) if self.law else set()
         for v in (v for v in self.bounded if v.name not in knots):
             if v.lower == v.upper:
                 sign = -1 if v.name in self.kept else 1 if self.target == "speed" and v.name in VARIABLES else 0
                 bounded = v.called in self.scene.bounds or sign
-                found += [Limit(v.called, sign, v.name, v.lower, v.scale, "variable")] if bounded else []
+                found += [BoundLimit(v.called, sign, v.name, v.lower, v.scale)] if bounded else []
                 continue
             own = v.name not in SPEEDS or v.name in self.limited
             found += [replace(each, relaxable=own and each.value > 0.0, hidden=not own) for each in bound_limits(v)]
@@ -327,10 +331,10 @@ class SheddingTask(Task):
     def objectives(self) -> tuple[Objective, ...]:
         """Return the target's levels in order; what checks would have least comes after the spring."""
         if self.target == "force":
-            return (Objective("contact_max", "cam_force", "peak", self.sizes.force),)
+            return (Peak("contact_max", "cam_force", self.sizes.force),)
         if self.target == "speed":
-            return (Objective("speed", "cam_period", "value", 1 / self.fastest, power=-1),)
-        return Objective("K1", "K1", "value", self.sizes.stiffness), *self.least()
+            return (Value("speed", "cam_period", 1 / self.fastest, power=-1),)
+        return Value("K1", "K1", self.sizes.stiffness), *self.least()
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Return today's spring moved inside its bounds, stiff enough for contact; for the force, a short one too."""

@@ -9,6 +9,7 @@ from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model import numbers
+from loomopt.model.limits import CycleLimit
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import working
@@ -70,20 +71,21 @@ def _findings(
     sizes: dict[tuple[str, bool], float] = {}
     values: dict[str, float | None] = {**design, **figures, **sampler.static}
     for limit in program.limits:
-        if limit.hidden or (limit.family == "variable" and limit.name not in values):
+        if limit.hidden:
             continue
-        if limit.family == "cycle" and not sampler.model.has_quantity(limit.row):
-            # A row of the program alone: what it limits is told by the figure that it is read for.
+        if isinstance(limit, CycleLimit):
+            if not sampler.model.has_quantity(limit.row):
+                # A row of the program alone: what it limits is told by the figure that it is read for.
+                continue
+            values[limit.name] = limit.figure(sampler)
+        elif limit.name not in values:
             continue
-        if limit.family == "cycle":
-            peak = sampler.peak(limit.row, limit.where)
-            values[limit.name] = limit.sign * (peak - limit.complement)
-        chosen = limit.name in design and (limit.family == "variable" or bool(limit.weight))
+        chosen = limit.name in design and limit.is_of_variable
         key = limit.name, chosen
         for sign in (limit.sign,) if limit.sign else (-1, 1):
             other = sides.setdefault(key, {}).setdefault(sign, limit.value)
             sides[key][sign] = min(other, limit.value) if sign > 0 else max(other, limit.value)
-        size = abs(limit.value) if chosen and limit.value else 1.0 if limit.weight else limit.scale
+        size = abs(limit.value) if chosen and limit.value else limit.named_scale
         sizes[key] = max(sizes.get(key, 0.0), size)
     found = []
     for (name, chosen), ends in sides.items():

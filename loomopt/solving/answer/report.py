@@ -11,7 +11,6 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.evaluation import evaluated, evaluation
 from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Price, Relaxation, Solution, remedies
 from loomopt.solving.answer.words import Words
-from loomopt.solving.certificate.kkt import figure_of
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.search.search import Candidate, Search, compared
@@ -82,7 +81,7 @@ def _figures(search: Search, candidate: Candidate) -> dict[str, float | None]:
     sampler = sampler_at(search.program, candidate.point.x)
     if sampler is None:
         return {}
-    return {objective.figure: figure_of(sampler, objective) for objective in search.program.objectives}
+    return {objective.figure: objective.figure_of(sampler) for objective in search.program.objectives}
 
 
 def _is_there(candidate: Candidate, best: Candidate) -> bool:

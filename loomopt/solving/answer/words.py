@@ -4,7 +4,7 @@ import math
 
 from loomopt.base.quantities import quantity_of
 from loomopt.base.units import SI_UNIT, factor, show
-from loomopt.model.program import Limit
+from loomopt.model.limits import CycleLimit, Limit
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
@@ -106,6 +106,6 @@ class Words:
 
     def _width(self, limit: Limit) -> float:
         """Return what a relaxation is measured by, SI: the width of its bounds, else itself, else its natural size."""
-        bound = self.scene.bounds.get(limit.name) if limit.family != "cycle" else None
+        bound = self.scene.bounds.get(limit.name) if not isinstance(limit, CycleLimit) else None
         width = bound.max - bound.min if bound else 0.0
         return (width if 0.0 < width < math.inf else abs(limit.value)) or limit.scale

@@ -1,16 +1,16 @@
 """The active set of one design: rows that touch their limits, and the smooth pieces that make up each objective."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.limits import Limit
+from loomopt.model.objectives import Objective
+from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.tolerances import ACTIVE, FEASIBLE, SAME_NODE
+from loomopt.physics.tolerances import ACTIVE, SAME_NODE
 
-Groups = tuple[tuple[int, ...], ...]
-"""Places of rows: of each group of an objective, the pieces whose largest counts."""
 MOVED = 100 * SAME_NODE
 """How far, in u, an extreme may move with a design: what is farther is another."""
 
@@ -21,7 +21,7 @@ class Row:
 
     A limit's residual or an objective's piece, either of them maybe at an extreme of the cycle (`node`). reads: the
     value it is made of; place: of its limit, or of its objective (`limit` is None), in the program; excess: by how
-    much it is off its bound, or below the largest piece of its group.
+    much it is off its bound, or below the largest piece of its objective.
     """
 
     name: str
@@ -38,76 +38,48 @@ class Row:
 class ActiveSet:
     """Rows of a program at one design: those of limits first, then the pieces of each objective.
 
-    limits: how many rows limits have; levels: groups of pieces of each objective; zero: whether an objective is one of
-    magnitudes that all vanish, less than which there is none; excess: of every limit of the program, in its natural
-    size, of an equality the magnitude.
+    limits: how many rows limits have; levels: places of each objective's pieces; zero: whether an objective is a
+    magnitude that vanishes, less than which there is none; excess: of every limit of the program, in its natural size,
+    of an equality the magnitude.
     """
 
     rows: tuple[Row, ...]
     limits: int
-    levels: tuple[Groups, ...]
+    levels: tuple[tuple[int, ...], ...]
     zero: tuple[bool, ...]
     excess: tuple[float, ...]
-
-    def pieces(self, level: int) -> list[int]:
-        """Return the pieces of one objective, all groups'."""
-        return [k for group in self.levels[level] for k in group]
 
 
 def active_set(program: Program, sampler: Sampler) -> ActiveSet:
     """Return the active set of a design."""
-    signed = [sampler.excess(limit) for limit in program.limits]
-    excess = tuple(abs(e) if limit.sign == 0 else e for e, limit in zip(signed, program.limits, strict=True))
-    rows = [row for k, limit in enumerate(program.limits) for row in _limit_rows(sampler, k, limit, signed[k])]
+    excess = tuple(limit.violation(sampler) for limit in program.limits)
+    rows = [row for k, limit in enumerate(program.limits) for row in _limit_rows(sampler, k, limit)]
     count, levels, zero = len(rows), [], []
     for place, objective in enumerate(program.objectives):
-        groups = []
-        for group in objective.groups:
-            pieces = list(_pieces(sampler, place, objective, group))
-            groups.append(tuple(range(len(rows), len(rows) + len(pieces))))
-            rows += pieces
-        levels.append(tuple(groups))
-        magnitudes = objective.form == "magnitude"
-        zero.append(magnitudes and sum(map(len, groups)) == 2 * len(objective.rows))
+        pieces = _pieces(sampler, place, objective)
+        levels.append(tuple(range(len(rows), len(rows) + len(pieces))))
+        zero.append(objective.is_magnitude and len(pieces) == len(objective.sides))
+        rows += pieces
     return ActiveSet(tuple(rows), count, tuple(levels), tuple(zero), excess)
 
 
-def _limit_rows(sampler: Sampler, place: int, limit: Limit, excess: float) -> list[Row]:
+def _limit_rows(sampler: Sampler, place: int, limit: Limit) -> list[Row]:
     """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
-    if limit.sign != 0 and excess < -ACTIVE:
-        return []
-    row = Row(limit.name, limit.row, limit.scale, 1.0, place, excess, limit)
-    if limit.weight and sampler.single(limit.weight) == 0.0:
-        # Where the weight vanishes it can still grow, to second order: the limit keeps the row from below only.
-        least = replace(limit, sign=-1)
-        return [replace(row, limit=least, excess=sampler.excess(least))] if limit.sign <= 0 else []
-    if limit.family != "cycle":
-        return [row]
-    found = sampler.extremes(limit.row, limit.where)
-    touching = [e for e in found if e.height >= limit.bound - ACTIVE * limit.scale]
-    return [replace(row, sign=e.sign, node=e, excess=(e.height - limit.bound) / limit.scale) for e in touching]
+    return [
+        Row(of.name, of.row, of.scale, node.sign if node else 1.0, place, excess, of, node)
+        for of, excess, node in limit.touches(sampler)
+    ]
 
 
-def _pieces(sampler: Sampler, place: int, objective: Objective, group: tuple[str, ...]) -> Iterator[Row]:
-    """Yield the smooth pieces whose largest is what a group of an objective's rows is worth."""
-    found = [(name, *piece) for name in group for piece in _smooth(sampler, objective, name)]
-    top = max(value for _, value, _, _ in found)
-    for name, value, sign, node in found:
-        if len(found) == 1 or value >= top - ACTIVE * objective.scale:
-            excess = (value - top) / objective.scale
-            yield Row(objective.figure, name, objective.scale, sign, place, excess, node=node)
-
-
-def _smooth(sampler: Sampler, objective: Objective, name: str) -> list[tuple[float, float, Extreme | None]]:
-    """Return value, sign and node of each smooth function whose largest is what one row is worth."""
-    if objective.form == "peak":
-        return [(e.height, e.sign, e) for e in sampler.extremes(name)]
-    value = sampler.single(name)
-    if objective.form == "value":
-        return [(value, 1.0, None)]
-    if abs(value) <= FEASIBLE * objective.scale:
-        return [(abs(value), 1.0, None), (abs(value), -1.0, None)]
-    return [(abs(value), float(np.sign(value)), None)]
+def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[Row]:
+    """Return the smooth pieces the largest of which is what an objective is worth."""
+    found = objective.pieces(sampler)
+    top, scale = max(piece.value for piece in found), objective.scale
+    return [
+        Row(objective.figure, name, scale, sign, place, (value - top) / scale, node=node)
+        for name, value, sign, node in found
+        if len(found) == 1 or value >= top - ACTIVE * scale
+    ]
 
 
 def moved(rows: Sequence[Row], sampler: Sampler) -> tuple[Row, ...] | None:

@@ -147,7 +147,7 @@ def _residuals(local: Local, place: int, system: System, multipliers: Multiplier
     """Return one level's residuals, and the limit with the largest multiplier."""
     rows, of = local.active.rows, multipliers.of
     slack = max((abs(of[k] * rows[k].excess) for k in system.limits), default=0.0)
-    held = float(sum(abs(of[k]) for level in range(place) for k in local.active.pieces(level)))
+    held = float(sum(abs(of[k]) for level in range(place) for k in local.active.levels[level]))
     dearest = max(system.limits, key=lambda k: abs(of[k]), default=None)
     price, name = (0.0, "") if dearest is None else (float(abs(of[dearest])), rows[dearest].name)
     figure = local.program.objectives[place].figure

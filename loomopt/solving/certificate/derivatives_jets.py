@@ -151,7 +151,7 @@ class Forward(Derivatives):
         found = []
         for k, row in enumerate(self.rows):
             if row.node is None:
-                value = reading.excess(row.limit) if row.limit else row.sign * reading.single(row.reads)
+                value = row.limit.residual(reading) if row.limit else row.sign * reading.single(row.reads)
                 found.append((k, _jet(value / row.scale, width)))
         return found
 

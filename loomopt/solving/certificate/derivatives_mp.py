@@ -132,7 +132,7 @@ class Exact(Derivatives):
             bound = self.number(row.limit.bound) if row.limit else 0
             return (self.number(row.sign) * reading.at(row.reads, row.node.piece, self.u[k] + move) - bound) / size
         if row.limit:
-            return reading.excess(row.limit) / size
+            return row.limit.residual(reading) / size
         return self.number(row.sign) * reading.single(row.reads) / size
 
     def _settled(self, row: Row, node: Extreme, here: Reading) -> Number:

@@ -80,8 +80,8 @@ class Lagrangian:
             return None
         weights = {self.level: 1.0, **self.held}
         objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
-        value = sum(weight * (sampler.merit(objective) / objective.scale) for weight, objective in objectives)
-        return value + sum(price * sampler.excess(self.program.limits[k]) for k, price in self.prices.items())
+        value = sum(weight * (objective.merit(sampler) / objective.scale) for weight, objective in objectives)
+        return value + sum(price * self.program.limits[k].excess(sampler) for k, price in self.prices.items())
 
 
 Design = dict[str, float]
@@ -200,8 +200,7 @@ class FeasibleCurve:
         sampler = sampler_at(self.program, x)
         if sampler is None:
             return np.full(len(self.program.limits), np.inf)
-        found = [(limit, sampler.excess(limit)) for limit in self.program.limits]
-        return np.array([abs(excess) if limit.sign == 0 else excess for limit, excess in found])
+        return np.array([limit.violation(sampler) for limit in self.program.limits])
 
     @lazy
     def _back(self) -> Floats:
@@ -226,5 +225,5 @@ class FeasibleCurve:
 
 def _value(row: Row, sampler: Sampler) -> float:
     if row.limit and row.node is None:
-        return sampler.excess(row.limit)
+        return row.limit.excess(sampler)
     return row.sign * (row.node.value if row.node else sampler.single(row.reads)) / row.scale

@@ -1,7 +1,7 @@
 """One KKT system per level: multipliers ≥ 0 that balance the slopes of the objective and of what holds it.
 
-An objective is a sum of groups, each the largest of its smooth pieces: its subgradients weigh the pieces of each group
-by multipliers that sum to 1. A limit or an earlier objective that binds is an equality of free sign at later levels.
+An objective is the largest of its smooth pieces: its subgradients weigh them by multipliers that sum to 1. A limit or
+an earlier objective that binds is an equality of free sign at later levels.
 """
 
 import math
@@ -12,19 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from loomopt.maths.nnls import nnls
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import Limit
+from loomopt.model.objectives import Objective
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import POSITIVE
-from loomopt.solving.certificate.active_set import ActiveSet, Groups
+from loomopt.solving.certificate.active_set import ActiveSet
 from loomopt.solving.certificate.verdict import Binding
-
-
-def figure_of(sampler: Sampler, objective: Objective) -> float:
-    """Return the figure of an objective, SI: with its sign where it is a number of its own."""
-    if objective.form != "peak" and objective.figure in sampler.figures:
-        return sampler.figures[objective.figure]
-    return float(sampler.merit(objective) ** (1 / objective.power))
 
 
 def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: float) -> Binding:
@@ -33,11 +27,10 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
     A number that is kept, and would rather be on the other side of its limit, is told as a limit of that side.
     """
     limit = replace(limit, sign=-limit.sign) if multiplier < 0.0 else limit
-    weight = sampler.single(limit.weight) if limit.weight else 1.0
-    worth = abs(multiplier) * objective.scale / limit.scale * weight
+    worth = abs(multiplier) * objective.scale / limit.scale * limit.factor(sampler.rows)
     if objective.power != 1:
         # The row is a power of the figure: its slope with respect to the figure.
-        worth /= abs(objective.power * figure_of(sampler, objective) ** (objective.power - 1))
+        worth /= abs(objective.power * objective.figure_of(sampler) ** (objective.power - 1))
     side = limit.sign or (1 if multiplier > 0 else -1)
     return Binding(limit, side, objective, worth)
 
@@ -46,19 +39,14 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
 class System:
     """What one level's slopes are balanced from, as places of rows.
 
-    groups: pieces of the objective; inequalities, equalities: of limits; held: (n, rows) sums of earlier objectives'
-    pieces that must not change.
+    pieces: of the objective; inequalities, equalities: of limits; held: (n, rows) sums of earlier objectives' pieces
+    that must not change.
     """
 
-    groups: Groups
+    pieces: tuple[int, ...]
     inequalities: tuple[int, ...]
     equalities: tuple[int, ...]
     held: Floats
-
-    @property
-    def pieces(self) -> list[int]:
-        """The objective's pieces, all groups'."""
-        return [k for group in self.groups for k in group]
 
     @property
     def limits(self) -> tuple[int, ...]:
@@ -68,11 +56,11 @@ class System:
     def without(self, row: int) -> "System":
         """Return the system without one inequality."""
         kept = tuple(k for k in self.inequalities if k != row)
-        return System(self.groups, kept, self.equalities, self.held)
+        return System(self.pieces, kept, self.equalities, self.held)
 
     def without_held(self) -> "System":
         """Return the system without what earlier objectives hold."""
-        return System(self.groups, self.inequalities, self.equalities, self.held[:0])
+        return System(self.pieces, self.inequalities, self.equalities, self.held[:0])
 
 
 @dataclass(frozen=True)
@@ -88,17 +76,11 @@ class Multipliers:
         return set(np.flatnonzero(np.abs(self.of) > POSITIVE).tolist())
 
     def normalised(self, system: System) -> Floats:
-        """Return the multipliers of the Lagrangian in which each group's pieces weigh 1 together.
+        """Return the multipliers of the Lagrangian in which the objective's pieces weigh 1 together.
 
         Least squares leave a little of that sum where a slope is left; the limits' share it.
         """
-        weights = self.of.copy()
-        sums = np.array([weights[list(group)].sum() or 1.0 for group in system.groups])
-        pieces = [(k, total) for group, total in zip(system.groups, sums, strict=True) for k in group]
-        weights /= sums.mean() if len(sums) else 1.0
-        for k, total in pieces:
-            weights[k] = self.of[k] / total
-        return weights
+        return np.asarray(self.of / (self.of[list(system.pieces)].sum() or 1.0))
 
 
 def system(
@@ -116,21 +98,9 @@ def system(
 
 
 def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
-    """Return what an earlier objective keeps: where it is one group each piece that binds, else the groups' sum.
-
-    Within each of several groups the pieces that bind stay equal, while one group may rise as another falls. Where all
-    is zero, all stays so.
-    """
-    unit, groups = np.eye(len(active.rows)), active.levels[level]
-    if active.zero[level]:
-        return [unit[k] for k in active.pieces(level)]
-    binding = [[k for k in group if k in bound] for group in groups]
-    if len(groups) == 1:
-        return [unit[k] for k in binding[0]]
-    if not all(binding):
-        return []
-    apart = [unit[k] - unit[of[0]] for of in binding for k in of[1:]]
-    return [*apart, np.sum([unit[of[0]] for of in binding], axis=0)]
+    """Return what an earlier objective keeps: each piece that binds; where it is zero, both."""
+    unit = np.eye(len(active.rows))
+    return [unit[k] for k in active.levels[level] if active.zero[level] or k in bound]
 
 
 def solved(gradients: Floats, system: System) -> Multipliers:
@@ -171,8 +141,8 @@ def _equations(gradients: Floats, system: System) -> tuple[Floats, Floats, int]:
     Those of free sign come last: equalities, then what earlier levels hold.
     """
     count, size = gradients.shape
-    norms = [np.isin(np.arange(count), group).astype(float) for group in system.groups]
-    slopes = np.vstack([gradients.T, np.array(norms).reshape(-1, count)])
+    norm = np.isin(np.arange(count), system.pieces).astype(float)
+    slopes = np.vstack([gradients.T, norm])
     one_sided = [*system.pieces, *system.inequalities]
     columns = np.hstack([slopes[:, one_sided], slopes[:, list(system.equalities)], slopes @ system.held.T])
-    return columns, np.concatenate([np.zeros(size), np.ones(len(norms))]), len(one_sided)
+    return columns, np.append(np.zeros(size), 1.0), len(one_sided)

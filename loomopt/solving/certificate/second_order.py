@@ -126,14 +126,14 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     """Return the critical cone of one level.
 
     Binding are limits with a multiplier, equalities, what earlier levels hold, and the differences between pieces that
-    share the largest value of their group.
+    share the largest value.
     """
     active, bound = local.active, multipliers.positive
     fixed = {k for k, row in enumerate(active.rows) if row.limit and row.limit.row in local.program.fixed}
     limits = sorted({*system.equalities, *fixed, *(k for k in range(active.limits) if k in bound)})
     unit = np.eye(len(active.rows))
-    shared = [[k for k in group if k in bound] for group in system.groups]
-    apart = [unit[k] - unit[of[0]] for of in shared for k in of[1:]]
+    shared = [k for k in system.pieces if k in bound]
+    apart = [unit[k] - unit[shared[0]] for k in shared[1:]]
     sums = np.array([*(unit[k] for k in limits), *system.held, *apart]).reshape(-1, len(active.rows))
     jacobian = np.vstack([sums @ local.slopes, local.shut])
     left, sizes, rows = np.linalg.svd(jacobian)
@@ -313,5 +313,5 @@ def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], sl
 
 
 def held_multiplier(active: ActiveSet, level: int, multipliers: Multipliers) -> float:
-    """Return the multiplier by which an earlier objective is held: that of each of its groups."""
-    return float(sum(multipliers.of[k] for k in active.pieces(level)) / len(active.levels[level]))
+    """Return the multiplier by which an earlier objective is held."""
+    return float(sum(multipliers.of[k] for k in active.levels[level]))

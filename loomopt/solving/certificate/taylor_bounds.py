@@ -201,8 +201,8 @@ def judged(sampler: Sampler, rows: Sequence[CycleRow], accuracy: float) -> str:
 
 def cycle_rows(program: Program) -> list[CycleRow]:
     """Return each whole-cycle quantity of a program that counts, with its natural size and the pieces it counts on."""
-    found: list[CycleRow] = [(row, o.scale, None) for o in program.objectives if o.form == "peak" for row in o.rows]
-    found += [(limit.row, limit.scale, limit.where) for limit in program.limits if limit.family == "cycle"]
+    found: list[CycleRow] = [(row, o.scale, None) for o in program.objectives for row in o.quantities]
+    found += [(limit.row, limit.scale, limit.where) for limit in program.cycle_limits.values()]
     return list(dict.fromkeys(found))
 
 

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import Limit
+from loomopt.model.objectives import Objective, Sought
 from loomopt.physics.tolerances import ROUNDED
 
 
@@ -85,10 +86,6 @@ class Certificate:
         return max((max(level.stationarity, level.complementarity) for level in self.levels), default=0.0)
 
 
-Sense = Literal["least", "least magnitude", "most"]
-"""What of a figure is sought."""
-
-
 @dataclass(frozen=True)
 class GlobalLevel:
     """What is shown of one objective at all admissible designs that are as good at the levels before it.
@@ -99,7 +96,7 @@ class GlobalLevel:
     """
 
     objective: str
-    sense: Sense
+    sense: Sought
     best: float
     bound: float
     gap: float

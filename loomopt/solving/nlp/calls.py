@@ -113,7 +113,7 @@ class Calls:
         upper = np.array([v.upper / v.scale for v in variables])
         if not self.elastic:
             return lower, upper
-        sides = [(limit.row, limit.sign) for limit in self.program.limits if limit.family == "variable"]
+        sides = [(limit.row, limit.sign) for limit in self.program.bound_limits.values()]
         down, up = ({name for name, sign in sides if sign in (side, 0)} for side in (-1, 1))
         least = np.where(lower >= 0.0, ELASTIC_SHARE * lower, -np.inf)
         return (
@@ -148,26 +148,15 @@ class Calls:
             return x
         return {v.name: min(max(x[v.name], v.lower), v.upper) for v in self.program.variables}
 
-    def first_extra(self, nlp: Transcription, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> Floats:
+    def first_extra(self, nlp: Transcription, sampler: Sampler) -> Floats:
         """Return epigraph variables just above the start's own values, or ones for an elastic start."""
         if self.ways:
             beside = self.ways.beside
             return beside.extra if beside else np.ones(nlp.rows.extras)
-        first = np.array([self._worst(k, sampler, peaks) for k in range(len(self.epigraphs))])
+        levels = [self.program.objectives[epigraph.objective] for epigraph in self.epigraphs]
+        first = np.array([level.merit(sampler) / level.scale for level in levels])
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
-
-    def _worst(self, place: int, sampler: Sampler, peaks: Sequence[Sequence[Extreme]]) -> float:
-        """Return what an epigraph variable stands above, in the objective's natural size."""
-        epigraph = self.epigraphs[place]
-        objective = self.program.objectives[epigraph.objective]
-        if objective.form == "peak":
-            own = zip(self.families, peaks, strict=True)
-            values = [of[0].height for family, of in own if family.epigraph == place]
-        else:
-            values = [sampler.single(row) for row in epigraph.rows]
-            values = [abs(value) for value in values] if objective.form == "magnitude" else values
-        return max(values) / objective.scale
 
     def excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
         """Return by how much an extreme exceeds its bound, relative to the row's size."""

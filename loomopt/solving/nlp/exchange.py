@@ -132,11 +132,11 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     of the rounds before.
     """
     nlp = calls.transcribed(here.sampler, here.nodes, warm=bool(here.multipliers))
-    extra = calls.first_extra(nlp, here.sampler, here.peaks) if here.extra is None else here.extra
+    extra = calls.first_extra(nlp, here.sampler) if here.extra is None else here.extra
     answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, here.multipliers)
     iterations += answer.iterations
     if answer.status not in SUCCESS and here.multipliers:
-        extra = calls.first_extra(nlp, here.sampler, here.peaks)
+        extra = calls.first_extra(nlp, here.sampler)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
         iterations += answer.iterations
     if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):

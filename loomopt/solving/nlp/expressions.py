@@ -16,7 +16,6 @@ from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.solving.nlp.lifted import Lifts, Options, chosen, identity
-from loomopt.solving.nlp.rows import SIGNS
 from loomopt.solving.nlp.stations import Family, followed
 from loomopt.solving.nlp.structure import NodeParameters, Structure
 
@@ -221,13 +220,13 @@ class _Built:
         if self.structure.elastic:
             weights = self.structure.layout.read(self.vector, "way weight")
             return total([weight * way for weight, way in zip(weights, self.extra, strict=True)])
-        levels: list[list[Any]] = [[] for _ in self.program.objectives]
-        for t, epigraph in zip(self.extra, self.structure.epigraphs, strict=True):
-            levels[epigraph.objective].append(t)
-        for k, level in enumerate(self.program.objectives):
-            if level.is_smooth:
-                levels[k] = [self.rows.single(row) / self.scales[k] for row in level.rows]
-        return total([weight * total(level) for weight, level in zip(self.weights, levels, strict=True)])
+        pairs = zip(self.extra, self.structure.epigraphs, strict=True)
+        tops = {epigraph.objective: t for t, epigraph in pairs}
+        levels = [
+            self.rows.single(level.row) / self.scales[k] if level.is_smooth else tops[k]
+            for k, level in enumerate(self.program.objectives)
+        ]
+        return total([weight * level for weight, level in zip(self.weights, levels, strict=True)])
 
     def given_way(self, place: int) -> Any:
         """Return by how much a limit gives way, in its natural size; of an equality with its sign."""
@@ -238,10 +237,10 @@ class _Built:
         """Return the rows of limits that are one row each, as a column: by entry CasADi would take as long again."""
         import casadi as ca
 
-        limits, static = self.program.limits, self.structure.rows.limits
+        limits, static = self.program.single_limits, self.structure.rows.limits
         self.rows.read([limits[k].row for k in static])
         columns = [
-            (self.rows.excess(limits[k], self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
+            (limits[k].residual(self.rows, self.bounds[k]), self.limit_scales[k], self.given_way(k)) for k in static
         ]
         excess, scales, ways = (
             (ca.vertcat(*column) for column in zip(*columns, strict=True)) if columns else [ca.SX()] * 3
@@ -252,9 +251,8 @@ class _Built:
         """Return the smooth pieces below epigraph variables: both signs of a magnitude, each value of several."""
         found = []
         for t, epigraph in zip(self.extra, self.structure.epigraphs, strict=not self.structure.elastic):
-            form = self.program.objectives[epigraph.objective].form
-            scale = self.scales[epigraph.objective]
-            found += [sign * self.rows.single(row) / scale - t for row in epigraph.rows for sign in SIGNS[form]]
+            scale, sides = self.scales[epigraph.objective], self.program.objectives[epigraph.objective].sides
+            found += [sign * self.rows.single(row) / scale - t for row, sign in sides]
         return found
 
     def held(self) -> list[Any]:

@@ -20,21 +20,19 @@ from loomopt.solving.nlp.layout import Layout
 from loomopt.solving.nlp.stations import epigraphs, families, held, station_switches
 
 Flags = NDArray[np.bool_]
-SIGNS = {"magnitude": (1, -1), "value": (1,), "peak": ()}
-"""Signs of the rows below an epigraph variable by its objective's form; those of a peak are whole-cycle rows."""
 
 
 @dataclass(frozen=True)
 class RowMap:
     """Where the variables and rows of one NLP stand.
 
-    limits: places in the program of those that are a row each; pieces: of each epigraph variable, how many rows there
-    are below it and signs of each; stations: rows of each family there; slots: its rows at nodes; variables, extras,
-    lifted: how many there are of each.
+    limits: places in the program of those that are a row each; pieces: how many rows there are below each epigraph
+    variable; stations: rows of each family there; slots: its rows at nodes; variables, extras, lifted: how many there
+    are of each.
     """
 
     limits: tuple[int, ...] = ()
-    pieces: tuple[tuple[int, int], ...] = ()
+    pieces: tuple[int, ...] = ()
     stations: tuple[int, ...] = ()
     slots: int = 0
     variables: int = 0
@@ -45,8 +43,8 @@ class RowMap:
     def _g(self) -> Layout:
         layout = Layout()
         layout.add("limits", len(self.limits))
-        for k, shape in enumerate(self.pieces):
-            layout.add(f"pieces {k}", *shape)
+        for k, count in enumerate(self.pieces):
+            layout.add(f"pieces {k}", count)
         for k, count in enumerate(self.stations):
             layout.add(f"stations {k}", count)
         layout.add("nodes", len(self.stations), self.slots)
@@ -80,8 +78,8 @@ class RowMap:
         return self._g.part(g, "limits")
 
     def of_pieces(self, g: Any, epigraph: int) -> Any:
-        """Return the rows below an epigraph variable: an array (rows, signs)."""
-        return self._g.array(g, f"pieces {epigraph}")
+        """Return the rows below an epigraph variable, in order of its objective's sides."""
+        return self._g.part(g, f"pieces {epigraph}")
 
     def at_stations(self, g: Any, family: int) -> Any:
         """Return the rows of a family at stations."""
@@ -130,15 +128,13 @@ def row_map(program: Program, slots: int, elastic: bool = False) -> RowMap:
 
     Bounds of variables are the solver's own, and no rows, unless they may give way.
     """
-    own = ("static", "variable") if elastic else ("static",)
     above = epigraphs(program, elastic)
-    forms = [program.objectives[epigraph.objective].form for epigraph in above]
     names = [variable.name for variable in program.variables]
     switches = station_switches(program.model, names)
     ways = {way for ways in program.ways.values() for way in ways}
     return RowMap(
-        tuple(k for k, limit in enumerate(program.limits) if limit.family in own),
-        tuple((len(epigraph.rows), len(SIGNS[form])) for epigraph, form in zip(above, forms, strict=True)),
+        tuple(program.single_limits if elastic else program.design_limits),
+        tuple(len(program.objectives[epigraph.objective].sides) for epigraph in above),
         tuple(len(held(switches, family)) for family in families(program, elastic)),
         slots,
         len(names),
@@ -183,7 +179,7 @@ class Multipliers:
         return dict(zip(self.rows.limits, self.rows.of_limits(self.lam_g).tolist(), strict=True))
 
     def of_pieces(self, epigraph: int) -> Floats:
-        """Return those of the rows below an epigraph variable, (rows, signs)."""
+        """Return those of the rows below an epigraph variable."""
         found: Floats = self.rows.of_pieces(self.lam_g, epigraph)
         return found
 

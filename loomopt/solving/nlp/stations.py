@@ -44,17 +44,16 @@ class Family(NamedTuple):
 def epigraphs(program: Program, elastic: bool = False) -> tuple[Epigraph, ...]:
     """Return the epigraph variables of a program's objectives, in order; an elastic one has no objectives."""
     levels = [] if elastic else list(enumerate(program.objectives))
-    return tuple(Epigraph(k, group) for k, level in levels if not level.is_smooth for group in level.groups)
+    return tuple(Epigraph(k, level.rows) for k, level in levels if not level.is_smooth)
 
 
 def families(program: Program, elastic: bool = False) -> list[Family]:
     """Return the whole-cycle rows a program needs: first those of objectives, then those of limits."""
     above = enumerate(epigraphs(program, elastic))
-    peaks = [(k, epigraph) for k, epigraph in above if program.objectives[epigraph.objective].form == "peak"]
-    limits = [(k, limit) for k, limit in enumerate(program.limits) if limit.family == "cycle"]
-    known = program.model.known_of
+    peaks = [(k, row) for k, epigraph in above for row in program.objectives[epigraph.objective].quantities]
+    limits, known = program.cycle_limits.items(), program.model.known_of
     return [
-        *(Family(row, epigraph=k, known=known(row)) for k, epigraph in peaks for row in epigraph.rows),
+        *(Family(row, epigraph=k, known=known(row)) for k, row in peaks),
         *(Family(limit.row, limit=k, where=limit.where, known=known(limit.row)) for k, limit in limits),
     ]
 

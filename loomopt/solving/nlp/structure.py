@@ -191,7 +191,7 @@ class Structure:
         write(p, "values", list(program.parameters.values()))
         write(p, "hints", list(sampler.hints.values()))
         write(p, "variable scale", [variable.scale for variable in program.variables])
-        write(p, "limit", [x.bound if x.family == "cycle" else x.value for x in program.limits])
+        write(p, "limit", [limit.bound for limit in program.limits])
         write(p, "limit scale", [limit.scale for limit in program.limits])
         write(p, "objective weight", weights)
         write(p, "way weight", costs)
@@ -220,7 +220,7 @@ class Structure:
 
 def means(program: Program, elastic: bool) -> list[Integral]:
     """Return the means that a limit reads, or an objective; an elastic program has no objectives."""
-    read = {limit.row for limit in program.limits}
+    read = {row for limit in program.limits for row in limit.reads}
     read |= set() if elastic else {row for objective in program.objectives for row in objective.rows}
     return [mean for mean in program.model.integrals if {mean.name, mean.root} & read]
 

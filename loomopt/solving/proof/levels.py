@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 from loomopt.jobs.base import Job
 from loomopt.maths.intervals import Floats
-from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.objectives import Objective
+from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
-from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel, Sense
+from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
 from loomopt.solving.proof.rows import OpenError
@@ -55,7 +56,7 @@ class Levels:
     def __init__(self, program: Program, job: Job, x: Mapping[str, float], gap: float) -> None:
         self.program, self.gap = program, gap
         sampler = Sampler(program.model, {**program.parameters, **x})
-        self.merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+        self.merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
         self.why = job.open_boxes or _unserved(program, sampler)
         self._levels: list[_Level] = []
         if self.why:
@@ -98,15 +99,13 @@ def _unserved(program: Program, sampler: Sampler) -> str:
         return "corners of the cycle are found by iteration, which boxes do not enclose"
     if names := ", ".join(state.name for state in program.model.states):
         return f"the steady state of {names} is not bounded by boxes of designs"
-    if any(len(objective.groups) > 1 for objective in program.objectives):
-        return "an objective that is a sum is not bounded by boxes"
     return ""
 
 
 def _most(program: Program, merits: list[float]) -> dict[str, float]:
     """Return what variables that are the first objective need not exceed, SI: the answer's own."""
     first = program.objectives[0]
-    if first.form != "value" or first.row not in {v.name for v in program.variables}:
+    if not first.is_smooth or first.row not in {v.name for v in program.variables}:
         return {}
     return {first.row: (merits[0] + HELD) * first.scale}
 
@@ -123,8 +122,7 @@ class _Level:
         reader = Reader(task, place + 1, at)
         weights = multipliers(reader, at, place)
         self.question = Question(reader, place, lowest, weights, held, self._better)
-        # Less than nothing there is none of.
-        nothing_less = self.objective.form != "value" and self.best <= FEASIBLE
+        nothing_less = self.best <= self.objective.least + FEASIBLE
         self.tree = Tree.empty(len(task.names)) if nothing_less else Tree.whole(task.low, task.high)
 
     @property
@@ -153,8 +151,8 @@ class _Level:
             x = self.task.design(middles[:, k])
             try:
                 sampler = Sampler(program.model, {**program.parameters, **x})
-                kept = all(_kept(sampler, limit) for limit in program.limits)
-                merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+                kept = all(limit.violation(sampler) <= FEASIBLE for limit in program.limits)
+                merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
             except (ArithmeticError, TypeError, ValueError):
                 continue
             same = all(merit <= held for merit, held in zip(merits, self.question.held, strict=False))
@@ -166,18 +164,11 @@ class _Level:
         """Return what the tree shows."""
         objective = self.objective
         least = min(self.question.cut, self.tree.bound)
-        # A magnitude and a peak are never negative.
-        bound = _figure(objective, least if objective.form == "value" else max(least, 0.0))
+        bound = _figure(objective, max(least, objective.least))
         best = _figure(objective, self.best)
         gap = self.gap if self.proven and self.tree.boxes else abs(best - bound) / _size(objective, best)
         band = abs(_figure(objective, self.best + HELD) - best)
-        return GlobalLevel(objective.figure, self._sense, best, bound, gap, band, self.proven)
-
-    @property
-    def _sense(self) -> Sense:
-        if self.objective.form == "magnitude":
-            return "least magnitude"
-        return "least" if self.objective.power > 0 else "most"
+        return GlobalLevel(objective.figure, objective.sought, best, bound, gap, band, self.proven)
 
     def why(self) -> str:
         """Return why the level is not proven."""
@@ -187,11 +178,6 @@ class _Level:
     def _gap_said(self) -> str:
         gap = self.shown().gap
         return f"gap {100 * gap:.2g} %" if math.isfinite(gap) else "no bound yet"
-
-
-def _kept(sampler: Sampler, limit: Limit) -> bool:
-    excess = sampler.excess(limit)
-    return (abs(excess) if limit.sign == 0 else excess) <= FEASIBLE
 
 
 def _figure(objective: Objective, merit: float) -> float:

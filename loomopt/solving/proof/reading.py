@@ -1,6 +1,7 @@
 """Rows of a program in intervals: single values, and means over the cycle enclosed strip by strip."""
 
-from collections.abc import Iterator, Sequence
+import operator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,8 +10,11 @@ from numpy.typing import NDArray
 from loomopt.maths import systems
 from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 from loomopt.maths.systems import Number
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import CycleLimit
+from loomopt.model.objectives import Objective
+from loomopt.model.reading import Rows
 from loomopt.model.sampling import Extreme, Sampler
+from loomopt.physics.cycle import Where
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ACTIVE
 from loomopt.solving.proof.nodes import Layout, Spots, layouts
@@ -26,19 +30,20 @@ LIMIT = -1
 class Line(NamedTuple):
     """One row, or the nodes of one whole-cycle row.
 
-    of: its level, or LIMIT; row: what it reads; sign, scale: row = sign · value / scale; limit: whose excess it is;
-    extremes: of the answer, beside the worst node of each box; cycle: whether it is a whole-cycle row; placed: whether
-    it depends on the order of corners.
+    of: its level, or LIMIT; row: what it reads; sign, scale: row = sign · value / scale; single: reads a value of the
+    design, None for a whole-cycle row, which is above its bound on the pieces `where`, with extremes of the answer
+    beside the worst node of each box; placed: whether it depends on the order of corners.
     """
 
     of: int
     row: str
     sign: float
     scale: float
-    limit: Limit | None = None
+    placed: bool
+    single: Callable[[Rows], Number] | None = None
+    bound: float = 0.0
+    where: Where | None = None
     extremes: tuple[Extreme, ...] = ()
-    cycle: bool = False
-    placed: bool = False
 
     @property
     def rows(self) -> int:
@@ -77,23 +82,23 @@ class Reader:
 
     def _of_limits(self) -> Iterator[Line]:
         for limit in self.task.limits:
-            cycle = limit.family == "cycle"
-            placed = cycle or any(self._stands(row) for row in (limit.row, limit.weight) if row)
-            found = self._sampler.extremes(limit.row, limit.where) if cycle else []
-            near = tuple(e for e in found if e.height >= limit.bound - ACTIVE * limit.scale)
-            for sign in (1.0, -1.0) if limit.sign == 0 else (1.0,):
-                yield Line(LIMIT, limit.row, sign, limit.scale, limit, near, cycle, placed)
+            if isinstance(limit, CycleLimit):
+                near = tuple(limit.near(self._sampler))
+                yield Line(LIMIT, limit.row, 1.0, limit.scale, True, None, limit.bound, limit.where, near)
+            else:
+                placed = any(map(self._stands, limit.reads))
+                for sign in (1.0, -1.0) if limit.sign == 0 else (1.0,):
+                    yield Line(LIMIT, limit.row, sign, limit.scale, placed, limit.residual)
 
     def _of_levels(self, objectives: Sequence[Objective]) -> Iterator[Line]:
         for place, objective in enumerate(objectives):
-            cycle = objective.form == "peak"
-            top = self._sampler.merit(objective) - ACTIVE * objective.scale
-            for row in objective.rows:
-                found = self._sampler.extremes(row) if cycle else []
-                near = tuple(e for e in found if e.height >= top)
-                placed = cycle or self._stands(row)
-                for sign in (1.0, -1.0) if objective.form == "magnitude" else (1.0,):
-                    yield Line(place, row, sign, objective.scale, None, near, cycle, placed)
+            top = objective.merit(self._sampler) - ACTIVE * objective.scale
+            for row, sign in objective.sides:
+                read = operator.methodcaller("single", row)
+                yield Line(place, row, sign, objective.scale, self._stands(row), read)
+            for row in objective.quantities:
+                near = tuple(e for e in self._sampler.extremes(row) if e.height >= top)
+                yield Line(place, row, 1.0, objective.scale, True, extremes=near)
 
     def _stands(self, row: str) -> bool:
         """Say whether a row depends on the order of corners: one at an event of the motion, a mean over the cycle."""
@@ -135,8 +140,8 @@ class Reader:
         """Return the nodes of every whole-cycle row, by its place."""
         found = {}
         for place, line in enumerate(self._lines):
-            if line.cycle:
-                worst = layout.worst(self.task, line.row, middles, line.limit.where if line.limit else None)
+            if line.single is None:
+                worst = layout.worst(self.task, line.row, middles, line.where)
                 if line.extremes and layout is self._own:
                     worst = layout.spots(line.extremes).beside(worst, middles.shape[1])
                 found[place] = worst
@@ -159,14 +164,13 @@ class Reader:
             sure += [ordered if line.placed else np.ones(boxes, dtype=bool)] * line.rows
             if line.placed and layout is None:
                 found.append(_unknown((line.rows, boxes)))
-            elif line.cycle:
+            elif line.single is None:
                 value = rows.quantity(line.row, spots[place].angle(corners), spots[place].switches)
-                value = value * interval(spots[place].sign) - (line.limit.bound if line.limit else 0.0)
+                value = value * interval(spots[place].sign) - line.bound
                 lacking = line.rows - spots[place].count
                 found += [_unknown((lacking, boxes)), value / line.scale] if lacking else [value / line.scale]
             else:
-                value = rows.excess(line.limit) if line.limit else rows.single(line.row)
-                found.append(value * line.sign / line.scale)
+                found.append(line.single(rows) * line.sign / line.scale)
         return found, sure
 
     def _ratios(self, numbers: dict[str, Number]) -> list[Number]:

@@ -10,7 +10,9 @@ from loomopt.maths import intervals, systems
 from loomopt.maths.intervals import Floats, Interval
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
-from loomopt.model.program import Limit, Move, Program, Variable
+from loomopt.model.limits import Limit
+from loomopt.model.moves import Move
+from loomopt.model.program import Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.solving.proof.rows import BoxRows, OpenError
 
@@ -91,7 +93,7 @@ class Task:
     @property
     def limits(self) -> list[Limit]:
         """The limits that are rows: those of variables are the box itself, or ratios."""
-        return [limit for limit in self.program.limits if limit.family != "variable"]
+        return list(self.program.row_limits)
 
     def numbers(self, low: Floats, high: Floats) -> dict[str, Number]:
         """Return all numbers over boxes: variables with their slopes; low, high: (names, boxes), SI."""
@@ -156,9 +158,9 @@ def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tup
     maths: Maths = box_system()
     rows = BoxRows(program.model, maths, program.model.given(maths, values), {})
     ends = values[name]
-    for limit in program.limits:
-        if limit.row == name and limit.family == "static":
-            bound = maths.number(limit.value) * (rows.single(limit.weight) if limit.weight else 1.0)
+    for limit in program.design_limits.values():
+        if limit.row == name:
+            bound = maths.number(limit.value) * limit.factor(rows)
             low = bound.low if limit.sign <= 0 else ends.low
             high = bound.high if limit.sign >= 0 else ends.high
             ends = ends.meet(Interval(low, high))
@@ -187,7 +189,7 @@ def silent(program: Program) -> Scale | None:
     ends = {v.name: (v.lower, v.upper) for v in program.variables}
     for move in program.moves:
         known = all(name in ends and ends[name][0] > 0 and math.isfinite(ends[name][1]) for name in move.along)
-        if move.kind == "scale" and known and _changes_nothing(program, move):
+        if known and not move.is_apart and _changes_nothing(program, move):
             bounds = {name: ends[name] for name in move.along}
             return Scale(bounds, min(bounds, key=lambda name: bounds[name][1] / bounds[name][0]))
     return None
@@ -233,15 +235,12 @@ def _rows(program: Program, sampler: Sampler) -> Iterator[tuple[Number, bool]]:
     if not all(map(math.isfinite, sampler.static.values())):
         raise ValueError("a row has no real value")
     reading = sampler.read(systems.mpmath())
-    for limit in program.limits:
-        if limit.family == "static":
-            yield reading.excess(limit), limit.value == 0.0
-    cycle = [limit.row for limit in program.limits if limit.family == "cycle"]
+    for limit in program.design_limits.values():
+        yield limit.residual(reading), limit.value == 0.0
+    cycle = [limit.row for limit in program.cycle_limits.values()]
     for objective in program.objectives:
-        if objective.form == "peak":
-            cycle += objective.rows
-        else:
-            yield from ((reading.single(row), False) for row in objective.rows)
+        cycle += objective.quantities
+        yield from ((reading.single(row), False) for row in dict(objective.sides))
     for name in dict.fromkeys(cycle):
         for piece in range(sampler.cycle.pieces):
             yield from ((reading.at(name, piece, reading.maths.number(u)), False) for u in PLACES)

@@ -16,7 +16,8 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model import model
-from loomopt.model.program import Limit, Program
+from loomopt.model.limits import CycleLimit, Limit
+from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import working
 from loomopt.physics.cycle import Where
@@ -110,10 +111,10 @@ def _readings(
 
 def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
     """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
-    for limit in (limit for limit in program.limits if limit.family != "variable"):
+    for limit in program.row_limits:
         hidden = limit.row if limit.name in program.told else limit.name
         text = hidden if limit.hidden else words.limit(limit)
-        if limit.family == "cycle":
+        if isinstance(limit, CycleLimit):
             peak = own.sampler.peak(limit.row, limit.where)
             yield _over_cycle(own, _Claim(limit.name, text, limit.row, limit.bound, peak, limit.where))
         else:
@@ -139,8 +140,8 @@ def _over_cycle(read: _Read, claim: _Claim) -> Proof:
 
 def _single(read: _Read, limit: Limit, text: str) -> Proof:
     """Enclose one value of the design alone."""
-    residual = read.boxes.excess(limit) + read.boxes.maths.number(0.0)
-    weight = float(read.boxes.single(limit.weight)) if limit.weight else 1.0
+    residual = limit.residual(read.boxes) + read.boxes.maths.number(0.0)
+    weight = float(limit.factor(read.boxes))
     residual = residual / weight if weight else residual
     value = abs(float(read.boxes.single(limit.row)))
     size = max(value / (weight or 1.0), abs(limit.value), limit.scale / (weight or 1.0))

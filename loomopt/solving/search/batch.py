@@ -4,7 +4,6 @@ The nodes are those of one design's cycle and move with the corners of each; whe
 another order its nodes do not lie evenly. So this says where to look, and judges nothing.
 """
 
-import functools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -14,10 +13,10 @@ from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral
-from loomopt.model.program import Limit, Objective, Program
+from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Sampler
-from loomopt.physics.cycle import Floats, Node, Pieces
+from loomopt.physics.cycle import Floats, Node, Pieces, Where
 
 SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
 """A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
@@ -31,6 +30,7 @@ class BatchReading(Reading):
         given = program.model.given(system, values)
         super().__init__(program.model, system, given, like.cycle, like.stills)
         self.like, self.count = like, max(np.size(_plain(value)) for value in values.values())
+        self._looked: tuple[Pieces, dict[str, Number]] = np.zeros(0, dtype=np.intp), {}
 
     def node(self, pieces: Pieces, u: Floats) -> Node:
         """Return nodes (pieces, u), each (nodes,), of all designs."""
@@ -44,6 +44,21 @@ class BatchReading(Reading):
         read = self.model.together(self.maths, self.given, node)
         shape = np.shape(_plain(node.phi))
         return {name: _shaped(read(name), shape) for name in names}
+
+    def look(self, names: Sequence[str], pieces: Pieces, u: Floats) -> None:
+        """Look at quantities at nodes (pieces, u) of the whole cycle, their poses computed once for all."""
+        self._looked = pieces, self.quantities(names, self.node(pieces, u))
+
+    def highest(self, name: str, where: Where | None = None) -> Number:
+        """Return the largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
+        pieces, looked = self._looked
+        values, signed = looked[name], name in self.model.signed
+        on = np.flatnonzero(self.like.on(name, where)[pieces])
+        plain = _plain(values)[on]
+        heights = plain if signed else np.abs(plain)
+        top = on[np.argmax(np.where(np.isfinite(heights), heights, np.inf), axis=0)]
+        highest = values[top, np.arange(plain.shape[1])]
+        return highest if signed else np.where(_plain(highest) < 0.0, -1.0, 1.0) * highest
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, all nodes of all designs at once, (designs,), SI."""
@@ -86,21 +101,21 @@ class Batch:
         self.program, self.like = program, like
         self.pieces, self.u = like.grid(SCREENED_NODES)
         self.names = [variable.name for variable in program.variables]
-        own = [limit for limit in program.limits if limit.family != "variable"]
-        self.limits = [limit for limit in own if limit.family != "cycle" or like.on(limit.row, limit.where).any()]
+        absent = {k for k, limit in program.cycle_limits.items() if not like.on(limit.row, limit.where).any()}
+        places = (k for k in range(len(program.limits)) if k not in absent and k not in program.bound_limits)
+        self.limits = [program.limits[k] for k in places]
+        self.whole = {limit.row for k, limit in program.cycle_limits.items() if k not in absent}
 
     def judged(self, x: Floats, directions: Floats | None = None) -> Judged:
         """Return what designs x, (designs, variables) SI, are worth; directions: (variables, n) for jets, SI."""
         self.like.session.positions += len(x) * len(self.u)
         with np.errstate(all="ignore"):
             reading = self._reading(x, directions)
-            names = {limit.row for limit in self.limits if limit.family == "cycle"}
-            peaks = [] if directions is not None else [o for o in self.program.objectives if o.form == "peak"]
-            names |= {row for objective in peaks for row in objective.rows}
-            whole = reading.quantities(sorted(names), reading.node(self.pieces, self.u))
-            residuals = [_wide(self._residual(reading, whole, limit), len(x)) for limit in self.limits]
-            levels = [] if directions is not None else [self._level(reading, whole, o) for o in self.program.objectives]
-            columns = [np.broadcast_to(level, (len(x),)) for level in levels]
+            objectives = self.program.objectives if directions is None else ()
+            names = self.whole | {row for objective in objectives for row in objective.quantities}
+            reading.look(sorted(names), self.pieces, self.u)
+            residuals = [_wide(limit.residual(reading) / limit.scale, len(x)) for limit in self.limits]
+            columns = [np.broadcast_to(level.worth(reading) / level.scale, (len(x),)) for level in objectives]
         found = np.stack(columns, axis=1) if columns else np.zeros((len(x), 0))
         return Judged(np.where(np.isfinite(found), found, np.inf), residuals, [o.sign == 0 for o in self.limits])
 
@@ -110,36 +125,6 @@ class Batch:
             system, columns = systems.jets(), variables(columns, directions, curved=False)
         known = {**self.program.parameters, **self.like.hints}
         return BatchReading(self.program, system, {**known, **dict(zip(self.names, columns, strict=True))}, self.like)
-
-    def _residual(self, reading: BatchReading, whole: Mapping[str, Number], limit: Limit) -> Number:
-        """Return by how much a limit is exceeded, (designs,), in its natural size; of an equality the difference."""
-        if limit.family == "cycle":
-            return (self._highest(whole[limit.row], limit) - limit.bound) / limit.scale
-        return reading.excess(limit) / limit.scale
-
-    def _highest(self, values: Number, limit: Limit) -> Number:
-        """Return the largest of what is compared with a limit's bound, (designs,)."""
-        on = np.flatnonzero(self.like.on(limit.row, limit.where)[self.pieces])
-        plain = _plain(values)[on]
-        heights = plain if limit.row in self.program.model.signed else np.abs(plain)
-        top = on[np.argmax(np.where(np.isfinite(heights), heights, np.inf), axis=0)]
-        highest = values[top, np.arange(plain.shape[1])]
-        if limit.row in self.program.model.signed:
-            return highest
-        return np.where(_plain(highest) < 0.0, -1.0, 1.0) * highest
-
-    def _level(self, reading: BatchReading, whole: Mapping[str, Number], objective: Objective) -> Floats:
-        """Return an objective, (designs,), in its natural size."""
-        found: list[Floats] = []
-        for group in objective.groups:
-            if objective.form == "peak":
-                on = {row: self.like.on(row)[self.pieces] for row in group}
-                rows = [self.like.heights(row, whole[row][on[row]]).max(axis=0) for row in group]
-            else:
-                rows = [np.asarray(reading.single(row), dtype=np.float64) for row in group]
-                rows = [np.abs(row) for row in rows] if objective.form == "magnitude" else rows
-            found.append(functools.reduce(np.maximum, rows))
-        return np.asarray(sum(found) / objective.scale)
 
     def tops(self, x: Floats) -> Floats:
         """Return designs with the variables that stand where a quantity is largest put there, roughly."""

@@ -14,13 +14,15 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.model import Instant, JobModel, Row
-from loomopt.model.program import LEAST_CHANGE, Objective, Program, Variable
+from loomopt.model.moves import LEAST_CHANGE
+from loomopt.model.objectives import Value
+from loomopt.model.program import Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.search.search import Candidate, Search, as_read, corrected, judged_as_is, objectives, tried
-from loomopt.solving.search.tie_break import unchanging, wished
+from loomopt.solving.search.tie_break import unchanging
 
 CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
@@ -29,7 +31,7 @@ the first. IPOPT fails at a large one from afar; from one to the next, pivots le
 
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
-CHANGED = Objective(CHANGE, CHANGE, "value", 1.0)
+CHANGED = Value(CHANGE, CHANGE, 1.0)
 MODELS = 8
 """Models with the change as a row that are kept: a front has one for every set of variables that are held."""
 
@@ -143,13 +145,14 @@ def changing(
     if not free:
         return None
     given = {_today(name): known[name] for name in free} | {_wide(name): widths[name] for name in free}
+    bounds = program.bound_limits
     held = tuple(replace(v, lower=x[v.name], upper=x[v.name]) if v.name in kept else v for v in program.variables)
     return replace(
         program,
         model=_measuring(program.model, tuple(free)),
         variables=held,
         parameters={**program.parameters, **given},
-        limits=tuple(limit for limit in program.limits if limit.family != "variable" or limit.row not in kept),
+        limits=tuple(limit for k, limit in enumerate(program.limits) if k not in bounds or limit.row not in kept),
         objectives=(*program.objectives, CHANGED),
         moves=(),
     )
@@ -188,8 +191,9 @@ def _width(variable: Variable) -> float:
 
 def _kept(program: Program, x: Mapping[str, float], certificate: Certificate) -> frozenset[str]:
     """Return the variables that moves settle one by one at x (SI): by another rule, or apart from all that is open."""
-    axes = [(name, wished(program, move, x)) for move in program.moves if move.kind == "axis" for name in move.along]
-    others = {name for name, wish in axes if wish and wish.toward != "today"}
+    values = {**program.parameters, **x}
+    axes = [(name, move.wished(values)) for move in program.moves if move.is_apart for name in move.along]
+    others = {name for name, wish in axes if wish and not wish.is_least_change}
     names, level = _level(certificate)
     sizes = np.linalg.norm(level, axis=0)
     apart = {name for name, size in zip(names, sizes, strict=True) if size >= 1.0 - RANK}

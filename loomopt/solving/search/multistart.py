@@ -182,8 +182,7 @@ def unbeatable(search: Search) -> bool:
     lower = {v.name: v.lower for v in search.program.variables}
     least = 0.0
     for level in search.program.objectives:
-        alone = lower.get(level.row, -math.inf) if level.form == "value" and len(level.rows) == 1 else -math.inf
-        least = search.settings.penalty * least + (0.0 if level.form == "magnitude" else alone / level.scale)
+        least = search.settings.penalty * least + level.least_within(lower) / level.scale
     return min((candidate.value for candidate in search.reached), default=math.inf) <= least + BETTER
 
 

@@ -135,7 +135,7 @@ def objectives(program: Program, x: Mapping[str, float]) -> tuple[float, ...]:
     sampler = sampler_at(program, x)
     if sampler is None:
         return (math.inf,) * len(program.objectives)
-    return tuple(sampler.merit(objective) / objective.scale for objective in program.objectives)
+    return tuple(objective.merit(sampler) / objective.scale for objective in program.objectives)
 
 
 def compared(one: Candidate, other: Candidate) -> int:

@@ -3,12 +3,11 @@
 It goes only along moves verified flat at this design: objectives unchanged to 1e-10, every limit still held.
 """
 
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from loomopt.model.program import Limit, Move, Program, Wish
+from loomopt.model.program import Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
@@ -32,8 +31,8 @@ def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ..
     """Return x (SI) after all moves along which nothing is lost, and what was chosen."""
     settled = []
     for move in program.moves:
-        wish = wished(program, move, x)
-        goal = goal_of(move, wish, x) if wish else {}
+        wish = move.wished({**program.parameters, **x})
+        goal = move.goal(wish, x) if wish else {}
         if wish is None or not goal or not is_flat(program, x, goal):
             continue
         share = _reach(program, x, goal)
@@ -44,44 +43,6 @@ def moved(program: Program, x: Numbers) -> tuple[dict[str, float], tuple[str, ..
     return dict(x), tuple(settled)
 
 
-def wished(program: Program, move: Move, x: Numbers) -> Wish | None:
-    """Return the first wish of a move that holds at x (SI)."""
-    values = {**program.parameters, **x}
-    return next((wish for wish in move.wishes if not wish.when or values[wish.when] > wish.above), None)
-
-
-def goal_of(move: Move, wish: Wish, x: Numbers) -> dict[str, float]:
-    """Return where a wish would go from x (SI), within the move's bounds; nothing where there is no room."""
-    if move.kind == "scale":
-        return _scaled(move, wish, x)
-    goal = {}
-    for name in move.along:
-        low, high = move.bounds[name]
-        if low < high:
-            ends = {"least": low, "most": high, "today": min(max(move.today[name], low), high)}
-            goal[name] = ends[wish.toward]
-    return goal
-
-
-def _scaled(move: Move, wish: Wish, x: Numbers) -> dict[str, float]:
-    """Return x scaled in common: nearest to today's, in bound widths, or as small or as large as the bounds allow."""
-    widths = {name: move.bounds[name][1] - move.bounds[name][0] for name in move.along}
-    if min(widths.values()) <= 0.0 or not any(x[name] for name in move.along):
-        return {}
-    least, most = _factors(move, x)
-    factor = least if wish.toward == "least" else most
-    if wish.toward == "today":
-        pull = math.fsum(x[n] * move.today[n] / widths[n] ** 2 for n in move.along)
-        factor = min(max(pull / math.fsum((x[n] / widths[n]) ** 2 for n in move.along), least), most)
-    return {n: min(max(x[n] * factor, move.bounds[n][0]), move.bounds[n][1]) for n in move.along}
-
-
-def _factors(move: Move, x: Numbers) -> tuple[float, float]:
-    """Return the least and the largest common factor that bounds allow; above the largest where they leave none."""
-    scales = [sorted((move.bounds[n][0] / x[n], move.bounds[n][1] / x[n])) for n in move.along if x[n]]
-    return max(low for low, _ in scales), min(high for _, high in scales)
-
-
 def unchanging(
     program: Program, x: Numbers, asked: Callable[[Numbers], bool] = lambda way: True
 ) -> list[dict[str, float]]:
@@ -90,25 +51,8 @@ def unchanging(
     Neither an objective, nor a limit that is touched, but for the bounds of what moves. asked: says of a direction
     whether it is of interest, every one without it.
     """
-    ways = ((move, way) for move in program.moves for way in _directions(move, x) if asked(way))
-    return [way for move, way in ways if _is_same(program, x, list(_ends(move, way, x)))]
-
-
-def _directions(move: Move, x: Numbers) -> Iterator[dict[str, float]]:
-    """Yield the directions, SI, of a move that has room, but not without end."""
-    room = [name for name in move.along if 0.0 < move.bounds[name][1] - move.bounds[name][0] < math.inf]
-    if move.kind == "axis":
-        yield from ({name: 1.0} for name in room)
-    elif len(room) == len(move.along) and any(x[name] for name in room):
-        yield {name: x[name] for name in room}
-
-
-def _ends(move: Move, way: Numbers, x: Numbers) -> Iterator[dict[str, float]]:
-    """Yield where a direction of a move ends at its bounds."""
-    if move.kind == "scale":
-        yield from ({name: factor * x[name] for name in way} for factor in _factors(move, x))
-    else:
-        yield from ({name: end} for name in way for end in move.bounds[name])
+    ways = ((move, way) for move in program.moves for way in move.directions(x) if asked(way))
+    return [way for move, way in ways if _is_same(program, x, list(move.ends(way, x)))]
 
 
 def _is_same(program: Program, x: Numbers, ends: Sequence[Numbers]) -> bool:
@@ -120,17 +64,14 @@ def _is_same(program: Program, x: Numbers, ends: Sequence[Numbers]) -> bool:
             return False
     except (ValueError, ZeroDivisionError):
         return False
+    # The bounds of what moves may be touched on the way.
+    bounds = program.bound_limits
     return all(
         abs(other - one) <= UNCHANGED
         for end, after in zip(ends, there, strict=True)
-        for limit, one, other in zip(program.limits, before, after, strict=True)
-        if one >= -ACTIVE and not _bounds(limit, end)
+        for k, (one, other) in enumerate(zip(before, after, strict=True))
+        if one >= -ACTIVE and not (k in bounds and bounds[k].row in end)
     )
-
-
-def _bounds(limit: Limit, goal: Numbers) -> bool:
-    """Say whether a limit is the bound of a variable that moves."""
-    return limit.family == "variable" and limit.row in goal
 
 
 def _part_way(x: Numbers, goal: Numbers, share: float) -> dict[str, float]:
@@ -152,13 +93,7 @@ def _objectives(program: Program, x: Numbers) -> Floats:
     """Return the objectives in their natural sizes; for a peak, the whole curve at nodes that move with the design."""
     sampler = sampled(program.model, {**program.parameters, **x})
     pieces, u = sampler.grid(NODES)
-    parts = []
-    for objective in program.objectives:
-        if objective.form == "peak":
-            parts += [sampler.at(row, pieces, u) / objective.scale for row in objective.rows]
-        else:
-            parts.append(np.array([sampler.merit(objective) / objective.scale]))
-    return np.concatenate(parts)
+    return np.concatenate([each.watched(sampler, pieces, u) / each.scale for each in program.objectives])
 
 
 def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
@@ -181,5 +116,4 @@ def _reach(program: Program, x: Numbers, goal: Numbers) -> float:
 def _excesses(program: Program, x: Numbers) -> list[float]:
     """Return by how much every limit is exceeded, in its natural size; an equality how far it is missed."""
     sampler = sampled(program.model, {**program.parameters, **x})
-    found = [(limit, sampler.excess(limit)) for limit in program.limits]
-    return [abs(excess) if limit.sign == 0 else excess for limit, excess in found]
+    return [limit.violation(sampler) for limit in program.limits]

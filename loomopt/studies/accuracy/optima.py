@@ -90,8 +90,8 @@ def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
 def _unrefined(target: Target, sampler: Sampler) -> float:
     """Return by how much refined peaks, as a certificate reads them, miss those of 40 digits, in natural sizes."""
     program, worst = target.program, 0.0
-    rows = {row: o.scale for o in program.objectives if o.form == "peak" for row in o.rows}
-    rows |= {limit.row: limit.scale for limit in program.limits if limit.family == "cycle"}
+    rows = {row: o.scale for o in program.objectives for row in o.quantities}
+    rows |= {limit.row: limit.scale for limit in program.cycle_limits.values()}
     for name, scale in rows.items():
         worst = max(worst, abs(float(reference_digits.peak(sampler, name) - sampler.peak(name)) / scale))
     return worst

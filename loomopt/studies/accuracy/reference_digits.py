@@ -3,7 +3,7 @@
 Each whole-cycle value stands on its own extreme, found by Newton's method in these digits.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,6 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.program import Program
 from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.balance import total
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp.point import Point
@@ -111,24 +110,16 @@ class _Rows:
                 self.free.append(variable)
         self.start = [self.number(x[variable.name]) / self.number(variable.scale) for variable in self.free]
         self.sampler = Sampler(program.model, {**program.parameters, **x})
-        priced = [(program.limits[k], abs(price)) for k, price in prices.of_limits.items()]
+        priced = [(program.single_limits[k], abs(price)) for k, price in prices.of_limits.items()]
         self.static = [limit for limit, price in priced if limit.sign == 0 or price > BINDING]
         above = epigraphs(program)
-        self.zero = list(self._zero(above))
-        self.tops = [k for k, top in enumerate(above) if program.objectives[top.objective].form == "peak"]
+        levels = [(k, program.objectives[epigraph.objective]) for k, epigraph in enumerate(above)]
+        self.zero = [o for k, o in levels if o.is_magnitude and np.abs(prices.of_pieces(k)).min() > BINDING]
+        self.tops = [k for k, level in levels if level.quantities]
         self.levels = [above[k].objective for k in self.tops]
         self.families = families(program)
         self.binding = self._binding()
         self.start += [self._top(above[k]) for k in self.tops]
-
-    def _zero(self, above: Sequence[Epigraph]) -> Iterator[tuple[str, float]]:
-        """Yield rows whose magnitude is an objective and which bind with both signs, and their natural sizes, SI."""
-        for k, epigraph in enumerate(above):
-            objective = self.program.objectives[epigraph.objective]
-            if objective.form == "magnitude":
-                prices = np.abs(self.point.multipliers.of_pieces(k)).min(axis=1)
-                pairs = zip(epigraph.rows, prices, strict=True)
-                yield from ((row, objective.scale) for row, price in pairs if price > BINDING)
 
     def _binding(self) -> list[list[Extreme]]:
         """Return the nodes that bind of each family, those of rows at corners too."""
@@ -172,8 +163,8 @@ class _Rows:
     def values(self, unknown: Sequence[Number]) -> list[Number]:
         """Return every row: 0 where it is met."""
         exact, number = self.design(unknown), self.number
-        found = [exact.excess(limit) / number(limit.scale) for limit in self.static]
-        found += [exact.single(row) / number(scale) for row, scale in self.zero]
+        found = [limit.residual(exact) / number(limit.scale) for limit in self.static]
+        found += [exact.single(o.row) / number(o.scale) for o in self.zero]
         for family, binding in zip(self.families, self.binding, strict=True):
             bound, scale = self._bound(family, unknown[len(self.free) :])
             for node in binding:
@@ -181,11 +172,11 @@ class _Rows:
         return found
 
     def level(self, place: int, unknown: Sequence[Number], exact: Reading | None = None) -> Number:
-        """Return an objective in its natural size: its peaks together, or its row."""
-        tops = zip(self.levels, unknown[len(self.free) :], strict=True)
-        peaks, level = [top for of, top in tops if of == place], self.program.objectives[place]
-        if peaks:
-            return total(peaks)
+        """Return an objective in its natural size: its peak, or its row."""
+        tops = dict(zip(self.levels, unknown[len(self.free) :], strict=True))
+        if place in tops:
+            return tops[place]
+        level = self.program.objectives[place]
         return (exact or self.design(unknown)).single(level.row) / self.number(level.scale)
 
     def slopes(self, unknown: Sequence[Number]) -> Floats:

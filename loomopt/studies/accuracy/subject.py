@@ -126,7 +126,7 @@ class Target:
     @functools.cached_property
     def optimum(self) -> reference_digits.Optimum | None:
         """The optimum in 40 digits; None without a certified answer, or of several rows that are no peaks."""
-        known = all(o.form == "peak" or not o.others for o in self.program.objectives)
+        known = all(len(o.rows) == 1 for o in self.program.objectives)
         if self.answer.status != "optimal" or not known:
             return None
         return reference_digits.optimum(self.program, self.answer.point, self.variables(self.answer))
@@ -148,7 +148,7 @@ class Target:
         number = systems.mpmath(REFERENCE_DIGITS).number
         scaled = {v.name: number(x[v.name]) / number(v.scale) for v in self.program.variables}
         for move in self.program.moves:
-            if move.kind == "axis":
+            if move.is_apart:
                 scaled |= dict.fromkeys(move.along, number(0.0))
                 continue
             length = sum(scaled[name] ** 2 for name in move.along) ** number(0.5)
@@ -159,5 +159,5 @@ class Target:
         """Return the figure of the last objective at variables (SI), true over the whole cycle."""
         sampler = Sampler(self.program.model, {**self.program.parameters, **x})
         objective = self.program.objectives[-1]
-        value = sampler.merit(objective)
+        value = objective.merit(sampler)
         return value if objective.power == 1 else math.pow(value, 1 / objective.power)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from loomopt.base.errors import BadInput
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
-from loomopt.model.program import Objective, Program
+from loomopt.model.objectives import Objective
+from loomopt.model.program import Program
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import evaluation
@@ -162,11 +163,9 @@ class Judge:
 
     def _worse(self, objective: Objective, now: float, then: float) -> float:
         """Return by how much a figure has become worse, SI."""
-        if objective.form == "magnitude":
-            return abs(then) - abs(now)
         axis = self.scene.schema.axes.get(objective.figure)
         most = objective.power < 0 or (axis is not None and axis.senses[0] == "most")
-        return now - then if most else then - now
+        return objective.worsening(now, then, most)
 
     def _excess(self, there: Evaluation) -> float:
         """Return by how much a design exceeds the limit that it exceeds most, in its natural size."""
@@ -203,8 +202,7 @@ def _limit_sizes(program: Program) -> dict[str, float]:
     """Return the natural size of each limit; of one on a product, what the designer's own number is limited to."""
     found: dict[str, float] = {}
     for limit in program.limits:
-        size = abs(limit.value) or 1.0 if limit.weight else limit.scale
-        found[limit.name] = max(found.get(limit.name, 0.0), size)
+        found[limit.name] = max(found.get(limit.name, 0.0), limit.named_scale)
     return found
 
 

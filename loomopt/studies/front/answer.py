@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.axes import Traded
-from loomopt.model.program import Limit, Program
+from loomopt.model.limits import Limit
+from loomopt.model.program import Program
 from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
@@ -85,10 +86,10 @@ class Terms:
         """Return the limit on an axis beside its figure."""
         axis, most = cap
         values = {**self.program.parameters, **self.job.values(self.program, design)}
-        merit = sampled(self.program.model, values).merit(axis.objective)
+        merit = axis.objective.merit(sampled(self.program.model, values))
         ok = merit <= most + FEASIBLE * axis.objective.scale
         name, figure, end = axis.axis.name, axis.figure(merit), _end(axis, most)
-        if axis.objective.form == "magnitude":
+        if axis.objective.is_magnitude:
             return Finding(name, found.figures.get(name) or figure, -end, end, ok)
         low, high = (None, end) if axis.sign > 0 else (end, None)
         return Finding(name, figure, low, high, ok)
@@ -192,7 +193,7 @@ def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
             continue
         axis, cap = caps[each.limit.name]
         name, limit, figure = axis.axis.name, each.limit, _end(axis, cap)
-        if axis.objective.form != "magnitude":
+        if not axis.objective.is_magnitude:
             limit = replace(limit, sign=axis.sign, value=figure)
         worth = each.worth * abs(axis.slope(figure))
         yield replace(each, limit=replace(limit, name=name), side=limit.sign, worth=worth)

@@ -189,13 +189,13 @@ class Solver:
         sampler = sampled(search.program.model, {**search.program.parameters, **best.x})
         for axis, cap in zip(self.axes, asking.caps, strict=True):
             size = axis.objective.scale
-            if cap is not None and sampler.merit(axis.objective) / size > cap / size + FEASIBLE:
+            if cap is not None and axis.objective.merit(sampler) / size > cap / size + FEASIBLE:
                 return f"{axis.axis.name} comes out above what was asked"
         return ""
 
     def _figure(self, axis: Traded, program: Program, x: Mapping[str, float]) -> float:
         """Return an axis at variables x (SI): of a magnitude without its sign."""
-        return axis.figure(sampled(program.model, {**program.parameters, **x}).merit(axis.objective))
+        return axis.figure(axis.objective.merit(sampled(program.model, {**program.parameters, **x})))
 
     def _multipliers(self, best: Candidate, figures: Mapping[str, float], asking: Asking) -> dict[Multiplier, float]:
         """Return what each limit is worth for the first objective it moves, SI, and the slope along the front."""
@@ -222,7 +222,7 @@ class Solver:
             limit = row.limit
             if limit and limit.name not in own and limit.row not in program.fixed:
                 count[Side(limit.name, ENDS[limit.sign]), _place(sampler, row)] += 1
-        for k in found.pieces(0):
+        for k in found.levels[0]:
             count[Side(self.axes[0].axis.name, PEAK), _place(sampler, found.rows[k])] += 1
         return sorted(Touched(side, place, times).written() for (side, place), times in count.items())
 

@@ -47,7 +47,7 @@ def _nodes(families: list[list[list[Any]]]) -> Nodes:
 
 def _task(program: Program) -> str:
     """Return what is alike in programs of one structure and in every process: names, no formulas."""
-    objectives = [(each.rows, each.form, each.combine) for each in program.objectives]
+    objectives = [each.structure for each in program.objectives]
     limits = [limit.structure for limit in program.limits]
     names = [variable.name for variable in program.variables], list(program.parameters)
     return hashlib.sha256(repr((names, limits, objectives)).encode()).hexdigest()[:16]

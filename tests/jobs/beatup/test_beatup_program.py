@@ -6,7 +6,10 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
-from loomopt.model.program import Limit, Objective, Program, Variable, Wish
+from loomopt.model.limits import BoundLimit, DesignLimit, Limit, RatioLimit
+from loomopt.model.moves import AxisMove, ScaleMove, Wish
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value
+from loomopt.model.program import Program, Variable
 from loomopt.physics.tolerances import NO_MASS
 
 BEATUP = registry.load("beatup")
@@ -17,7 +20,7 @@ ROOM = 12.4 * 0.08**2
 
 
 def limits(program, name):
-    return [(limit.sign, limit.value, limit.row, limit.family) for limit in program.limits if limit.name == name]
+    return [(limit.sign, limit.value, limit.row, type(limit)) for limit in program.limits if limit.name == name]
 
 
 def named(program):
@@ -29,8 +32,8 @@ def test_where_the_mass_matters_only_by_its_inertia_that_is_the_variable():
     assert list(named(found)) == [*LENGTHS, "r4e", "s"]
     inertia = named(found)["s"]
     assert (inertia.lower, inertia.upper, inertia.range) == (-math.inf, math.inf, (0.0, pytest.approx(ROOM)))
-    assert limits(found, "m4e") == [(-1, 0.0, "s", "static"), (1, 12.4, "s", "static")]
-    assert [limit.weight for limit in found.limits if limit.name == "m4e"] == ["r4e_square"] * 2
+    assert limits(found, "m4e") == [(-1, 0.0, "s", RatioLimit), (1, 12.4, "s", RatioLimit)]
+    assert [limit.reads for limit in found.limits if limit.name == "m4e"] == [("s", "r4e_square")] * 2
     assert not {"m4e", *LENGTHS} & set(found.parameters)
     assert [limit.relaxable for limit in found.limits if limit.name == "m4e"] == [False, True]
 
@@ -58,28 +61,28 @@ def test_a_check_that_nothing_limits_leaves_the_variables_alone():
 
 def test_objectives_are_the_targets_levels():
     def levels(target):
-        return [(each.figure, each.row, each.form, each.power) for each in JOB.program(BEATUP, target).objectives]
+        return [(each.figure, each.row, type(each), each.power) for each in JOB.program(BEATUP, target).objectives]
 
-    peak = ("peak_torque", "peak_torque", "peak", 1)
-    assert levels("balance") == [("M3_fdc", "M3_fdc", "magnitude", 1), peak]
+    peak = ("peak_torque", "peak_torque", Peak, 1)
+    assert levels("balance") == [("M3_fdc", "M3_fdc", Magnitude, 1), peak]
     assert levels("torque") == [peak]
-    assert levels("pulse") == [("pulse_rms", "pulse_mean_square", "value", 2)]
-    assert levels("retrofit") == [("change", "change", "value", 1)]
+    assert levels("pulse") == [("pulse_rms", "pulse_mean_square", Value, 2)]
+    assert levels("retrofit") == [("change", "change", Value, 1)]
 
 
 def test_what_a_target_demands_of_the_reed_torque():
-    assert limits(JOB.program(BEATUP, "retrofit"), "M3_fdc") == [(0, 0.0, "M3_fdc", "static")]
-    one_percent = [(-1, -7.45, "M3_fdc", "static"), (1, 7.45, "M3_fdc", "static")]
+    assert limits(JOB.program(BEATUP, "retrofit"), "M3_fdc") == [(0, 0.0, "M3_fdc", DesignLimit)]
+    one_percent = [(-1, -7.45, "M3_fdc", DesignLimit), (1, 7.45, "M3_fdc", DesignLimit)]
     assert limits(JOB.program(BEATUP, "torque"), "M3_fdc") == one_percent
     none = BEATUP.set("targets.torque.M3_tolerance", "0 N*m")
-    assert limits(JOB.program(none, "torque"), "M3_fdc") == [(0, 0.0, "M3_fdc", "static")]
+    assert limits(JOB.program(none, "torque"), "M3_fdc") == [(0, 0.0, "M3_fdc", DesignLimit)]
     assert limits(JOB.program(BEATUP, "balance"), "M3_fdc") == []
 
 
 def test_the_least_transmission_angle_is_two_rows_and_margins_never_give_way():
     found = JOB.program(BEATUP, "balance")
     angle = pytest.approx(math.radians(56.5))
-    assert limits(found, "mu_min") == [(-1, angle, "mu_near", "static"), (-1, angle, "mu_far", "static")]
+    assert limits(found, "mu_min") == [(-1, angle, "mu_near", DesignLimit), (-1, angle, "mu_far", DesignLimit)]
     margins = [limit for limit in found.limits if limit.name.startswith("assembly: ")]
     assert [(limit.sign, limit.value, limit.relaxable) for limit in margins] == [(-1, 0.0, False)] * 3
     assert all(limit.relaxable for limit in found.limits if limit.name == "mu_min")
@@ -89,7 +92,7 @@ def test_a_freed_number_of_an_effect_is_a_variable_under_its_label():
     free = BEATUP.set("bounds.J4", {"min": "0.5 kg*m^2", "max": "0.7 kg*m^2"})
     found = JOB.program(free, "balance")
     assert named(found)["inertia.J4"] == Variable("inertia.J4", 0.5, 0.7, 0.7, (0.5, 0.7), "J4")
-    assert limits(found, "J4") == [(-1, 0.5, "inertia.J4", "variable"), (1, 0.7, "inertia.J4", "variable")]
+    assert limits(found, "J4") == [(-1, 0.5, "inertia.J4", BoundLimit), (1, 0.7, "inertia.J4", BoundLimit)]
     assert "inertia.J4" not in found.parameters
     held = JOB.program(free.set("bounds.J4.free", False), "balance")
     assert (named(held)["inertia.J4"].lower, named(held)["inertia.J4"].upper) == (0.62, 0.62)
@@ -116,9 +119,9 @@ def test_starts_use_part_of_the_counterweight_and_never_none_alone():
 
 def test_moves_are_data_the_counterweights_first():
     found = JOB.program(BEATUP, "balance").moves
-    assert [(move.name, move.along, move.kind) for move in found] == [
-        ("counterweight", ("r4e",), "axis"),
-        ("scale", LENGTHS, "scale"),
+    assert [(move.name, move.along, type(move)) for move in found] == [
+        ("counterweight", ("r4e",), AxisMove),
+        ("scale", LENGTHS, ScaleMove),
     ]
     used, none = found[0].wishes
     assert used == Wish("most", "least added mass, so the largest radius", "s", used.above)

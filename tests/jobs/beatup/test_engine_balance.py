@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.model.program import Objective
+from loomopt.model.objectives import Value
 from loomopt.solving.nlp import exchange
 from reference.beatup import DESIGN, Machine
 
@@ -156,7 +156,7 @@ def test_a_variable_of_the_task_may_come_first(monkeypatch):
     job = registry.find("beatup")
     program = job.program(scene, "torque")
     size = next(v.scale for v in program.variables if v.name == "s")
-    changed = replace(program, objectives=(Objective("s", "s", "value", size), *program.objectives))
+    changed = replace(program, objectives=(Value("s", "s", size), *program.objectives))
     monkeypatch.setattr(type(job), "program", lambda *_: changed)
     answer = lo.solve(scene, "torque", starts=1)
     assert answer.status == "optimal", answer.message

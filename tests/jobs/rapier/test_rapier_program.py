@@ -8,6 +8,8 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.model import read
 from loomopt.jobs.rapier.program import constructed
+from loomopt.model.limits import CycleLimit, DesignLimit
+from loomopt.model.objectives import Peak, Value
 from loomopt.model.program import Variable
 
 SCENE = registry.load("rapier")
@@ -16,7 +18,9 @@ FIVE_BAR = ("l4", "l5", "l6", "l3p", "C0x", "C0y")
 
 
 def limits(program, name):
-    return [(each.sign, each.row, each.family, each.where) for each in program.limits if each.name == name]
+    return [
+        (each.sign, each.row, type(each), getattr(each, "where", None)) for each in program.limits if each.name == name
+    ]
 
 
 def named(program):
@@ -26,20 +30,20 @@ def named(program):
 @pytest.mark.parametrize(
     ("target", "objective", "more"),
     [
-        ("stroke-dwell", ("peak_acceleration", "peak", 1), {"dwell_after", "dwell_before"}),
-        ("dwell", ("dwell_rest", "value", 1), {"dwell"}),
-        ("smooth", ("jerk_mean_square", "value", 2), {"dwell_after", "dwell_before"}),
+        ("stroke-dwell", ("peak_acceleration", Peak, 1), {"dwell_after", "dwell_before"}),
+        ("dwell", ("dwell_rest", Value, 1), {"dwell"}),
+        ("smooth", ("jerk_mean_square", Value, 2), {"dwell_after", "dwell_before"}),
     ],
 )
 def test_what_targets_keep_are_variables_without_room_and_what_follows_is_free(target, objective, more):
     found = JOB.program(SCENE, target)
-    assert [(each.row, each.form, each.power) for each in found.objectives] == [objective]
+    assert [(each.row, type(each), each.power) for each in found.objectives] == [objective]
     kept = {"stroke", "s_dwell"} | (more - {"dwell"})
     assert all(named(found)[name].lower == named(found)[name].upper == SCENE.operation[name] for name in kept)
     assert named(found)["phi_stroke"] == Variable("phi_stroke", 0.0, 2 * math.pi, 1.0, (0.0, 2 * math.pi))
     assert {"phi_stroke", *more, *kept} <= set(named(found))
-    assert limits(found, "head at rest at phi_stroke") == [(0, "rest", "static", None)]
-    assert limits(found, "stroke is reached") == [(0, "stroke_short", "static", None)]
+    assert limits(found, "head at rest at phi_stroke") == [(0, "rest", DesignLimit, None)]
+    assert limits(found, "stroke is reached") == [(0, "stroke_short", DesignLimit, None)]
 
 
 def test_stroke_gives_way_both_ways_s_dwell_upward_and_dwells_downward():
@@ -52,7 +56,7 @@ def test_stroke_gives_way_both_ways_s_dwell_upward_and_dwells_downward():
 def test_a_dwell_is_a_limit_on_the_travel_over_its_own_pieces(target):
     for side, name in ((1.0, "after"), (-1.0, "before")):
         text = f"head within s_dwell {name} front dead centre"
-        assert limits(JOB.program(SCENE, target), text) == [(1, "dwell_travel", "cycle", ("dwell", side))]
+        assert limits(JOB.program(SCENE, target), text) == [(1, "dwell_travel", CycleLimit, ("dwell", side))]
 
 
 def test_dyads_close_with_a_margin_and_the_sleys_only_where_it_may_change():
@@ -71,12 +75,12 @@ def test_effects_are_in_the_program_only_where_something_of_theirs_is_asked():
     assert JOB.program(loaded, "stroke-dwell").model.loads == ()
     asked = JOB.program(loaded.set("limits.tape_force.max", "1 kN"), "stroke-dwell")
     assert [load.name for load in asked.model.loads] == ["head_inertia"]
-    assert limits(asked, "tape_force") == [(1, "tape_force", "cycle", None)]
+    assert limits(asked, "tape_force") == [(1, "tape_force", CycleLimit, None)]
 
 
 def test_a_limit_on_the_transmission_angle_is_one_on_what_it_lacks_of_a_right_angle():
     found = JOB.program(SCENE.set("limits.mu_min.min", "40 deg"), "stroke-dwell")
-    (limit,) = (each for each in found.limits if each.name == "mu_min")
+    (limit,) = (each for each in found.cycle_limits.values() if each.name == "mu_min")
     assert (limit.row, limit.sign, limit.complement) == ("obliquity", -1, math.pi / 2)
     assert limit.bound == pytest.approx(math.radians(50))
     both = JOB.program(SCENE.set("limits.sley_mu_min.min", "40 deg"), "stroke-dwell")

@@ -8,6 +8,8 @@ from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
 from loomopt.jobs.shedding.scene import Frame
+from loomopt.model.limits import CycleLimit, DesignLimit
+from loomopt.model.objectives import Peak, Value
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
 from loomopt.solving.nlp.stations import families
 
@@ -17,7 +19,7 @@ COIL = registry.load("shedding-printed-travel").with_effect("coil")
 
 
 def limits(program, name):
-    return [(each.sign, each.value, each.row, each.family) for each in program.limits if each.name == name]
+    return [(each.sign, each.value, each.row, type(each)) for each in program.limits if each.name == name]
 
 
 def named(program):
@@ -27,21 +29,21 @@ def named(program):
 @pytest.mark.parametrize(
     ("target", "objective"),
     [
-        ("stiffness", ("K1", "K1", "value", 1)),
-        ("law", ("K1", "K1", "value", 1)),
-        ("force", ("contact_max", "cam_force", "peak", 1)),
-        ("speed", ("speed", "cam_period", "value", -1)),
+        ("stiffness", ("K1", "K1", Value, 1)),
+        ("law", ("K1", "K1", Value, 1)),
+        ("force", ("contact_max", "cam_force", Peak, 1)),
+        ("speed", ("speed", "cam_period", Value, -1)),
     ],
 )
 def test_objectives_are_the_targets_levels(target, objective):
     (found,) = JOB.program(SCENE, target).objectives
-    assert (found.figure, found.row, found.form, found.power) == objective
+    assert (found.figure, found.row, type(found), found.power) == objective
 
 
 def test_contact_is_one_limit_all_round_and_never_gives_way_itself():
     found = JOB.program(SCENE, "stiffness")
-    assert limits(found, "N_min") == [(-1, 0.0, "lift", "cycle")]
-    (own,) = (each for each in found.limits if each.name == "N_min")
+    assert limits(found, "N_min") == [(-1, 0.0, "lift", CycleLimit)]
+    (own,) = (each for each in found.cycle_limits.values() if each.name == "N_min")
     assert (own.relaxable, own.hidden, own.where) == (False, False, None)
     asked = JOB.program(SCENE.set("operation.N_min", "50 N"), "stiffness")
     more, contact = (next(each for each in asked.limits if each.name == name) for name in ("N_min", "contact"))
@@ -90,8 +92,8 @@ def test_a_free_law_has_its_inner_knots_for_variables_and_stays_a_law(symmetric)
     scene = SCENE.update({"targets.law.symmetric": symmetric, "targets.law.intervals": 8})
     found, knots = JOB.program(scene, "law"), range(1, 4 if symmetric else 8)
     assert [name for name in named(found) if name.startswith("law_")] == [f"law_{k}" for k in knots]
-    assert limits(found, "law_end") == [(0, 1.0, "law_end", "static")]
-    assert limits(found, "law_end_slope") == ([] if symmetric else [(0, 0.0, "law_end_slope", "static")])
+    assert limits(found, "law_end") == [(0, 1.0, "law_end", DesignLimit)]
+    assert limits(found, "law_end_slope") == ([] if symmetric else [(0, 0.0, "law_end_slope", DesignLimit)])
     assert [row for name in ("law_slope_1", "law_slope_4") for _, _, row, _ in limits(found, name)] == [
         "law_slope_1",
         "law_slope_4",
@@ -106,13 +108,15 @@ def test_a_free_law_has_its_inner_knots_for_variables_and_stays_a_law(symmetric)
 
 def test_freed_segments_leave_the_rest_to_the_near_dwell():
     found = JOB.program(SCENE.free("rise"), "stiffness")
-    ends = [(sign, pytest.approx(math.radians(value)), "near_dwell", "static") for sign, value in ((-1, 50), (1, 90))]
+    ends = [
+        (sign, pytest.approx(math.radians(value)), "near_dwell", DesignLimit) for sign, value in ((-1, 50), (1, 90))
+    ]
     assert limits(found, "near_dwell") == ends
     assert {"rise", "far_dwell", "return"} <= set(named(found))
     assert "near_dwell" not in named(found)
     assert limits(JOB.program(SCENE, "stiffness"), "near_dwell") == []
     held = JOB.program(SCENE.set("bounds.rise.free", True), "stiffness")
-    assert limits(held, "near_dwell") == [(0, pytest.approx(math.radians(60)), "near_dwell", "static")]
+    assert limits(held, "near_dwell") == [(0, pytest.approx(math.radians(60)), "near_dwell", DesignLimit)]
     document = {table: dict(own) for table, own in SCENE.document.items()}
     del document["bounds"]["near_dwell"]
     unbound = registry.scene(document).set("bounds.rise.free", True)
@@ -123,8 +127,8 @@ def test_freed_segments_leave_the_rest_to_the_near_dwell():
 def test_what_coils_demand_is_in_the_program_and_their_mass_comes_after_the_spring():
     found = JOB.program(COIL, "stiffness")
     assert [each.row for each in found.objectives] == ["K1", "spring_mass"]
-    assert limits(found, "coil_index") == [(-1, 4.0, "coil_index", "static"), (1, 12.0, "coil_index", "static")]
-    assert limits(found, "coils give K1") == [(0, 0.0, "coils give K1", "static")]
+    assert limits(found, "coil_index") == [(-1, 4.0, "coil_index", DesignLimit), (1, 12.0, "coil_index", DesignLimit)]
+    assert limits(found, "coils give K1") == [(0, 0.0, "coils give K1", DesignLimit)]
     own = {each.name: each.relaxable for each in found.limits}
     assert (own["surge_ratio"], own["coil_index"], own["coils give K1"]) == (True, False, False)
     moves = [(move.name, move.along) for move in found.moves]

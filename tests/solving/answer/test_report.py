@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from support import toy
 
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import BoundLimit, CycleLimit, RatioLimit
+from loomopt.model.objectives import Value
 from loomopt.solving.answer import evaluation, report
 from loomopt.solving.answer.solution import Clash, Relaxation
 from loomopt.solving.certificate.verdict import Binding, Certificate
@@ -96,7 +97,7 @@ def told(certificate, here=None, limits=(("p", 1, 5.0),)):
 
 
 def binding(limit, worth, objective="f"):
-    return Binding(limit, 1, Objective(objective, objective, "value", 1.0), worth)
+    return Binding(limit, 1, Value(objective, objective, 1.0), worth)
 
 
 def test_an_optimum_names_the_limits_that_stop_its_first_objective():
@@ -170,22 +171,22 @@ def test_a_failure_passes_on_the_solvers_word_with_advice(status, said):
 # Limits that bear another name than what they read -----------------------------------------------------------------
 
 
-def named(family, name, row, sign, value):
+def named(kind, name, row, sign, value):
     """Return the findings of one limit at x = 2, y = 3, whose name is not its row's."""
     program = toy.program("xy", ROWS, WAVES)
-    limit = Limit(name, sign, row, value, 1.0, family)
+    limit = kind(name, sign, row, value, 1.0)
     job = toy.ToyJob(replace(program, limits=(limit,)))
     found = evaluation.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
     return [(each.name, each.value, each.ok) for each in found]
 
 
 def test_a_whole_cycle_limit_may_bear_its_own_name():
-    assert named("cycle", "top", "w", 1, 2.5) == [("top", pytest.approx(2.0), True)]
+    assert named(CycleLimit, "top", "w", 1, 2.5) == [("top", pytest.approx(2.0), True)]
 
 
 def test_a_bound_of_a_variable_that_the_design_does_not_name_is_not_told():
-    assert named("variable", "helper", "x", 1, 1.0) == []
-    assert named("variable", "x", "x", 1, 1.0) == [("x", 2.0, False)]
+    assert named(BoundLimit, "helper", "x", 1, 1.0) == []
+    assert named(BoundLimit, "x", "x", 1, 1.0) == [("x", 2.0, False)]
 
 
 @pytest.mark.parametrize(("excess", "ok"), [(0.9e-12, True), (1.1e-12, False)])
@@ -202,6 +203,6 @@ def test_a_limit_may_be_missed_by_just_a_billionth(sign):
 @pytest.mark.parametrize(("excess", "ok"), [(0.9e-9, True), (1.1e-9, False)])
 def test_a_weighed_limit_is_held_to_a_billionth_of_one(excess, ok):
     program = toy.program("xy", ROWS, WAVES)
-    job = toy.ToyJob(replace(program, limits=(Limit("p", 1, "p", 0.0, 50.0, "static", weight="y"),)))
+    job = toy.ToyJob(replace(program, limits=(RatioLimit("p", 1, "p", 0.0, 50.0, "y"),)))
     found = evaluation.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
     assert [each.ok for each in found] == [ok]

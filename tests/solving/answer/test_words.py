@@ -5,7 +5,8 @@ import math
 import pytest
 
 import loomopt as lo
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import BoundLimit
+from loomopt.model.objectives import Magnitude, Peak, Value
 from loomopt.solving.answer.solution import Relaxation, remedies
 from loomopt.solving.answer.words import Words, outward
 from loomopt.solving.certificate.verdict import Binding
@@ -68,7 +69,7 @@ def test_values_are_shown_as_the_scene_writes_them():
 
 
 def limit(name="l1", sign=-1, value=0.03, scale=1.0):
-    return Limit(name, sign, name, value, scale, "variable")
+    return BoundLimit(name, sign, name, value, scale)
 
 
 @pytest.mark.parametrize(("sign", "text"), [(-1, "l1 >= 30 mm"), (0, "l1 = 30 mm"), (1, "l1 <= 30 mm")])
@@ -82,8 +83,8 @@ def test_a_margin_is_its_own_phrase(words):
 
 
 def test_a_price_is_what_all_rows_of_a_limit_are_worth_together(words):
-    torque = Objective("peak_torque", "peak_torque", "peak", 1.0)
-    other = Objective("M3_fdc", "M3_fdc", "magnitude", 1.0)
+    torque = Peak("peak_torque", "peak_torque", 1.0)
+    other = Magnitude("M3_fdc", "M3_fdc", 1.0)
     bindings = [Binding(limit(), -1, torque, 3000.0), Binding(limit(), -1, torque, 1160.0)]
     price = words.price([*bindings, Binding(limit(), -1, other, 7.0)])
     assert (price.limit, price.side, price.value, price.text) == ("l1", "min", 0.03, "l1 >= 30 mm")
@@ -96,7 +97,7 @@ def test_a_price_is_what_all_rows_of_a_limit_are_worth_together(words):
 
 def test_a_compound_unit_stands_in_brackets_after_the_stroke():
     words = Words(lo.load("shedding"))
-    stiffness = Objective("K1", "K1", "value", 1.0)
+    stiffness = Value("K1", "K1", 1.0)
     price = words.price([Binding(limit("K1", 1, 9e4), 1, stiffness, 1.0)])
     assert price.unit == {"K1": "N/m/(N/m)"}
 

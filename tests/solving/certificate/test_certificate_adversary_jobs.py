@@ -44,8 +44,8 @@ def objectives(program, x):
     assert sampler is not None
     found = []
     for o in program.objectives:
-        value = sampler.peak(o.row) if o.form == "peak" else sampler.figures[o.row]
-        found.append((abs(value) if o.form == "magnitude" else value) / o.scale)
+        value = sampler.peak(o.row) if o.quantities else sampler.figures[o.row]
+        found.append((abs(value) if o.is_magnitude else value) / o.scale)
     return found
 
 

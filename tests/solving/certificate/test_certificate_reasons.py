@@ -101,7 +101,7 @@ def tried(monkeypatch, of, found):
     monkeypatch.setattr(kkt, "solved", solved)
     monkeypatch.setattr(second_order, "judged", curved)
     here = local()
-    system = kkt.System(((3,),), (0, 1, 2), (), np.zeros((0, 4)))
+    system = kkt.System((3,), (0, 1, 2), (), np.zeros((0, 4)))
     kept, _ = certificate._best(here, 0, system, first)
     return ("first" if kept is first else int(kept.of[0])), left_out
 
@@ -122,7 +122,7 @@ def test_residuals_name_the_dearest_limit():
     assert (found.objective, found.stationarity, found.price, found.dearest) == ("f", 0.125, 2.0, "y")
     assert found.complementarity == pytest.approx(4e-8)
     assert found.held == 0.0
-    bare = kkt.System(((3,),), (), (), np.zeros((0, 4)))
+    bare = kkt.System((3,), (), (), np.zeros((0, 4)))
     none = certificate._residuals(here, 0, bare, Multipliers(np.zeros(4), 0.0), 0.0)
     assert (none.complementarity, none.price, none.dearest) == (0.0, 0.0, "")
 

@@ -38,7 +38,7 @@ def test_limits_share_a_slope_by_their_own():
     assert found.residual < 1e-14
     assert found.positive == {0, 1, 3}
     without = system.without(1)
-    assert (without.inequalities, without.groups) == ((0, 2), system.groups)
+    assert (without.inequalities, without.pieces) == ((0, 2), system.pieces)
     assert kkt.solved(at(program, XY)[1], without).residual > 0.5
 
 
@@ -52,24 +52,13 @@ def test_an_equality_may_pull_either_way_and_a_limit_may_not():
     assert found.of[0] == 0.0
 
 
-def test_pieces_of_one_group_share_a_multiplier_of_one():
+def test_pieces_of_an_objective_share_a_multiplier_of_one():
     """max(x, −2 x + y, −y) at 0: weights 2/4, 1/4, 1/4."""
     rows = {"p": lambda v: v["x"], "q": lambda v: -2 * v["x"] + v["y"], "r": lambda v: -v["y"]}
     _, system, found = level(toy.program("xy", rows, objectives=("p, q, r",)), XY)
-    assert system.groups == ((0, 1, 2),)
+    assert system.pieces == (0, 1, 2)
     assert found.of == pytest.approx([0.5, 0.25, 0.25])
     assert found.residual < 1e-14
-
-
-def test_the_pieces_of_each_group_of_a_sum_share_a_multiplier_of_one():
-    """|x| + |x − 2 y + 1| − like: at x = 0, y = 0 the first has its kink, the second a slope that y must balance."""
-    rows = {"p": lambda v: 4 * v["x"], "q": lambda v: v["x"] + 2}
-    _, system, found = level(toy.program("xy", rows, objectives=("|p + q|",)), XY)
-    assert system.groups == ((0, 1), (2,))
-    assert found.of == pytest.approx([0.375, 0.625, 1.0]), "4 (0.375 − 0.625) + 1 = 0"
-    assert found.residual < 1e-14
-    steep = {"p": lambda v: v["x"], "q": lambda v: 2 * v["x"] + 2}
-    assert level(toy.program("xy", steep, objectives=("|p + q|",)), XY)[2].residual > 0.1
 
 
 def multipliers(*of):
@@ -98,18 +87,10 @@ def test_a_peak_of_several_pieces_is_held_piece_by_piece():
     assert kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held.tolist() == [[1, 0, 0]]
 
 
-def test_of_a_sum_only_the_sum_is_held():
-    """a may rise as b falls: what is held is their sum, and that pieces of one group stay equal."""
-    program = toy.program("xy", TWO, objectives=("a + b", "c"))
-    active, _ = at(program, XY)
-    assert kkt.system(active, 1, [multipliers(1.0, 1.0, 0.0)]).held.tolist() == [[1, 1, 0]]
-    both = toy.program("xy", TWO, objectives=("|a + b|", "c"))
-    one = at(both, {"x": 0.0, "y": 0.5})[0]
-    held = kkt.system(one, 1, [multipliers(0.5, 0.5, 1.0, 0.0)]).held
-    assert held.tolist() == [[-1, 1, 0, 0], [1, 0, 1, 0]]
-    none = kkt.system(at(both, XY)[0], 1, [multipliers(0.5, 0.5, 1.0, 0.0, 0.0)])
-    assert none.held.tolist() == np.eye(5)[:4].tolist(), "where all is zero, all stays so"
-    assert kkt.system(active, 1, [multipliers(0.0, 0.0, 0.0)]).held.shape == (0, 3)
+def test_both_pieces_of_a_magnitude_that_vanishes_are_held():
+    active, _ = at(toy.program("xy", TWO, objectives=("|a|", "c")), XY)
+    held = kkt.system(active, 1, [multipliers(1.0, 0.0, 0.0)]).held
+    assert held.tolist() == [[1, 0, 0], [0, 1, 0]]
 
 
 def test_a_row_binds_above_a_hundred_millionth():
@@ -118,14 +99,10 @@ def test_a_row_binds_above_a_hundred_millionth():
 
 
 def test_multipliers_are_normalised_to_pieces_that_weigh_one_together():
-    """A slope that is left takes its share of the sum: here 0.5 of the first group, 0.25 of the second."""
-    groups = ((1, 2), (3,))
-    system = kkt.System(groups, (0,), (), np.zeros((0, 4)))
-    found = multipliers(3.0, 0.1, 0.4, 0.25).normalised(system)
-    assert found == pytest.approx([3.0 / 0.375, 0.2, 0.8, 1.0])
-    bare = kkt.System((), (0, 1), (), np.zeros((0, 2)))
-    assert multipliers(3.0, 2.0).normalised(bare).tolist() == [3.0, 2.0]
-    empty = kkt.System(((1,),), (0,), (), np.zeros((0, 2)))
+    """A slope that is left takes its share of the sum: here 0.5."""
+    system = kkt.System((1, 2), (0,), (), np.zeros((0, 3)))
+    assert multipliers(3.0, 0.1, 0.4).normalised(system) == pytest.approx([6.0, 0.2, 0.8])
+    empty = kkt.System((1,), (0,), (), np.zeros((0, 2)))
     assert multipliers(3.0, 0.0).normalised(empty).tolist() == [3.0, 0.0], "no sum to share"
 
 
@@ -137,7 +114,7 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
     slopes = rng.normal(size=(rows, size)) * 10.0 ** rng.integers(-3, 4, (rows, 1))
     prices = 10.0 ** rng.integers(-4, 2, rows)
     gradients = np.vstack([slopes, -prices @ slopes])
-    one = System(((rows,),), tuple(range(rows)), (), np.zeros((0, rows + 1)))
+    one = System((rows,), tuple(range(rows)), (), np.zeros((0, rows + 1)))
     found = solved(gradients, one)
     named = replaceable(gradients, one, found, STATIONARY)
     without = [
@@ -151,6 +128,6 @@ def test_a_row_is_replaceable_where_others_can_do_without_it(seed):
 def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
     """Slopes (1, 0), twice that, and (0, 1): the first two can stand for each other, the third for none."""
     gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
-    one = System(((3,),), (0, 1, 2), (), np.zeros((0, 4)))
+    one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
     found = Multipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
     assert replaceable(gradients, one, found, STATIONARY) == [0, 1]

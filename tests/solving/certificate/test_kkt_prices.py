@@ -5,14 +5,15 @@ from dataclasses import replace
 import pytest
 from support import toy
 
-from loomopt.model.program import Limit, Objective
+from loomopt.model.limits import DesignLimit, RatioLimit
+from loomopt.model.objectives import Magnitude, Peak, Value, Worst
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate.kkt import figure_of, priced
+from loomopt.solving.certificate.kkt import priced
 
 WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}
 ROWS = {"square": lambda v: v["x"] ** 2, "size": lambda v: v["x"], "inverse": lambda v: 1 / v["x"]}
 SAMPLER = Sampler(toy.program("x", ROWS, WAVES, objectives=("square",)).model, {"x": -4.0})
-LIMIT = Limit("size", 1, "size", -4.0, 2.0, "static")
+LIMIT = DesignLimit("size", 1, "size", -4.0, 2.0)
 
 
 def worth(objective, multiplier=0.5, limit=LIMIT):
@@ -20,17 +21,17 @@ def worth(objective, multiplier=0.5, limit=LIMIT):
 
 
 def test_a_multiplier_is_in_natural_sizes():
-    assert worth(Objective("size", "size", "value", 6.0)).worth == pytest.approx(0.5 * 6 / 2)
-    assert worth(Objective("size", "size", "value", 6.0), -0.5).worth == pytest.approx(1.5)
+    assert worth(Value("size", "size", 6.0)).worth == pytest.approx(0.5 * 6 / 2)
+    assert worth(Value("size", "size", 6.0), -0.5).worth == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize(
     ("objective", "expected"),
     [
-        (Objective("size", "square", "value", 1.0, power=2), 0.25 / 8),
-        (Objective("w", "w", "peak", 1.0), 0.25),
-        (Objective("mean", "square", "value", 1.0, power=2), 0.25 / 8),
-        (Objective("size", "inverse", "value", 1.0, power=-1), 0.25 * 16),
+        (Value("size", "square", 1.0, power=2), 0.25 / 8),
+        (Peak("w", "w", 1.0), 0.25),
+        (Value("mean", "square", 1.0, power=2), 0.25 / 8),
+        (Value("size", "inverse", 1.0, power=-1), 0.25 * 16),
     ],
 )
 def test_a_power_is_undone(objective, expected):
@@ -39,21 +40,20 @@ def test_a_power_is_undone(objective, expected):
 
 
 def test_a_weighed_limit_is_worth_its_weight():
-    weighed = replace(LIMIT, weight="square")
-    assert worth(Objective("size", "size", "value", 6.0), limit=weighed).worth == pytest.approx(1.5 * 16)
+    weighed = RatioLimit("size", 1, "size", -4.0, 2.0, "square")
+    assert worth(Value("size", "size", 6.0), limit=weighed).worth == pytest.approx(1.5 * 16)
 
 
 def test_the_side_is_the_limits_or_where_an_equality_pushes():
-    objective = Objective("size", "size", "value", 1.0)
+    objective = Value("size", "size", 1.0)
     assert [worth(objective, m, replace(LIMIT, sign=s)).side for s, m in ((1, 1), (-1, 1), (0, 1), (0, -1))] == [
         1, -1, 1, -1,
     ]  # fmt: skip
 
 
 def test_the_figure_of_an_objective():
-    assert figure_of(SAMPLER, Objective("size", "size", "magnitude", 1.0)) == -4.0
-    assert figure_of(SAMPLER, Objective("nobody", "size", "magnitude", 1.0)) == 4.0
-    assert figure_of(SAMPLER, Objective("size", "w", "peak", 1.0)) == pytest.approx(4.0)
-    assert figure_of(SAMPLER, Objective("mean", "square", "value", 1.0, power=2)) == pytest.approx(4.0)
-    both = Objective("both", "square", "value", 1.0, others=("size",), combine="sum")
-    assert figure_of(SAMPLER, both) == pytest.approx(12.0)
+    assert Magnitude("size", "size", 1.0).figure_of(SAMPLER) == -4.0
+    assert Magnitude("nobody", "size", 1.0).figure_of(SAMPLER) == 4.0
+    assert Peak("size", "w", 1.0).figure_of(SAMPLER) == pytest.approx(4.0)
+    assert Value("mean", "square", 1.0, power=2).figure_of(SAMPLER) == pytest.approx(4.0)
+    assert Worst("both", "size", 1.0, ("square",)).figure_of(SAMPLER) == pytest.approx(16.0)

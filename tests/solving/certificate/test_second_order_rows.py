@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.program import Move, Wish
+from loomopt.model.moves import AxisMove, Wish
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
@@ -163,14 +163,14 @@ def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read
     assert read == [(0, {1: 0.75}, {}, {"x": 0.0, "y": 2.0}, 0.125)]
 
 
-def test_earlier_levels_are_held_by_what_each_of_their_groups_carries(read):
+def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
     rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "g": lambda v: v["x"] - v["y"]}
-    local = local_at(toy.program("xy", rows, objectives=("p + q", "g")), x=1.0, y=0.0)
+    local = local_at(toy.program("xy", rows, objectives=("p, q", "g")), x=1.0, y=1.0)
     found = Multipliers(np.array([3.0, 5.0, 1.0]), 0.0)
-    assert second_order.held_multiplier(local.active, 0, found) == 4.0
+    assert second_order.held_multiplier(local.active, 0, found) == 8.0
     higher(local, 1, found, [np.array([1.0, 0.0])])
     higher(local, 0, found, [np.array([1.0, 0.0])])
-    assert [(level, held) for level, _, held, _, _ in read] == [(1, {0: 4.0}), (0, {})]
+    assert [(level, held) for level, _, held, _, _ in read] == [(1, {0: 8.0}), (0, {})]
 
 
 # Moves --------------------------------------------------------------------------------------------------------------
@@ -179,7 +179,7 @@ def test_earlier_levels_are_held_by_what_each_of_their_groups_carries(read):
 def sliding(bend):
     """Return two levels, of which x² + bend · y² is the first; z changes nothing and is a move."""
     rows = {"f": lambda v: v["x"] ** 2 + bend * v["y"] ** 2, "g": lambda v: v["x"] ** 3}
-    move = Move("slide", ("z",), "axis", (Wish("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
+    move = AxisMove("slide", ("z",), (Wish("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
     return toy.program("xyz", rows, objectives=("f", "g"), moves=(move,), sizes={"z": 3.0})
 
 

@@ -51,7 +51,7 @@ def test_third_derivatives_of_a_peak_are_those_of_its_top_wherever_it_moves(deri
     program = toy.program("xy", {}, {"w": tilted}, objectives=("peak w",))
     x, y = 1.2, 0.4
     local = local_by(derivatives, program, {"x": x, "y": y})
-    row = local.active.pieces(0)[0]
+    row = local.active.levels[0][0]
     ahead, _ = local.derivatives.thirds(np.array([1.0, 0.0]), np.eye(2))
     along, errors = local.derivatives.thirds(np.array([0.0, 1.0]), np.eye(2))
     assert ahead[row] == pytest.approx(np.array([[6 * y, 6 * x], [6 * x, 0.0]]), rel=1e-9, abs=1e-9)

@@ -28,16 +28,16 @@ def put(program, elastic=False):
     nodes = [found[:2] for found in calls.peaks(sampler)]
     nlp, _ = transcribe(program, sampler, 6, elastic)
     nlp.solver(False, Settings())
-    extra = calls.first_extra(nlp, sampler, calls.peaks(sampler))
+    extra = calls.first_extra(nlp, sampler)
     return nlp, calls.arguments(nlp, sampler, x, extra, nodes), sampler, nodes, extra
 
 
 def expected_rows(program, sampler, nodes, extra):
     """Return the rows in the order of the NLP, by plain NumPy: static limits, magnitudes, nodes of each family."""
-    rows = [sampler.excess(limit) for limit in program.limits if limit.family == "static"]
+    rows = [limit.excess(sampler) for limit in program.design_limits.values()]
     for place, epigraph in enumerate(epigraphs(program)):
         objective = program.objectives[epigraph.objective]
-        if objective.form == "magnitude":
+        if objective.is_magnitude:
             value = sampler.single(objective.row) / objective.scale
             rows += [sign * value - extra[place] for sign in (1, -1)]
     for family, chosen in zip(families(program), nodes, strict=True):

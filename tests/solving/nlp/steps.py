@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Arcs, Chain, Group
+from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import JobModel, Quantity, Row
-from loomopt.model.program import Limit, Objective, Program, Variable
+from loomopt.model.objectives import Value
+from loomopt.model.program import Program, Variable
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Node
 from loomopt.physics.effects.kinds import Motion
@@ -108,10 +110,10 @@ def program(bend=0.0, lifted=True, limits=(("wave", 1, 1.5), ("h3", 1, 1.2)), wh
     """Return the least bowl below limits (row, sign, value)."""
     variables = tuple(Variable(name, -10.0, 10.0, 2.0, (-1.0, 1.0)) for name in NAMES)
     rows = tuple(
-        Limit(row, sign, row, value, 1.0, "cycle" if row in ("wave", "swing") else "static", where=where)
+        CycleLimit(row, sign, row, value, 1.0, where=where)
+        if row in ("wave", "swing")
+        else DesignLimit(row, sign, row, value, 1.0)
         for row, sign, value in limits
     )
     start = {name: 0.1 * k for k, name in enumerate(NAMES)}
-    return Program(
-        model(bend, lifted), variables, {"raise": 1.25}, rows, (Objective("bowl", "bowl", "value", 1.0),), (start,)
-    )
+    return Program(model(bend, lifted), variables, {"raise": 1.25}, rows, (Value("bowl", "bowl", 1.0),), (start,))

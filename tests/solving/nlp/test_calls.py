@@ -5,9 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.worst import WorstPeak
 from waves import model, objective, program
 
-from loomopt.model.program import Limit, Objective, Variable
+from loomopt.model.limits import BoundLimit
+from loomopt.model.objectives import Magnitude, Peak, Worst
+from loomopt.model.program import Variable
 from loomopt.model.sampling import Extreme
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Known, Settings
@@ -27,7 +30,7 @@ def put(task, elastic=False, nodes=2):
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
     nlp = calls.transcribed(sampler, chosen, warm=False)
-    extra = calls.first_extra(nlp, sampler, peaks)
+    extra = calls.first_extra(nlp, sampler)
     return calls, nlp, calls.arguments(nlp, sampler, X, extra, chosen), chosen
 
 
@@ -82,23 +85,24 @@ def test_only_what_is_built_anew_is_charged():
 
 def test_epigraph_variables_begin_a_little_above_what_they_stand_for():
     levels = (
-        Objective("circle", "circle", "peak", 2.0, others=("shifted",)),
-        Objective("x", "x", "magnitude", 4.0, others=("y",), combine="sum"),
-        Objective("apart", "y", "value", 1.0, others=("sum",)),
+        WorstPeak("circle", "circle", 2.0, ("shifted",)),
+        Magnitude("x", "x", 4.0),
+        Worst("apart", "y", 1.0, ("sum",)),
     )
     calls, _, arguments, _ = put(program((), levels))
     shifted = np.hypot(X["x"] - 3, X["y"] - 1) / 2
-    worst = np.array([shifted, 0.5 / 4, 2.0 / 4, -1.5])
+    worst = np.array([shifted, 0.5 / 4, -1.5])
     begun = arguments["x0"][2:]
-    assert begun == pytest.approx([*(1.01 * worst[:3] + 0.01), -1.5 / 1.01 + 0.01], rel=1e-12)
+    assert begun == pytest.approx([*(1.01 * worst[:2] + 0.01), -1.5 / 1.01 + 0.01], rel=1e-12)
     assert np.all(begun > worst)
-    assert len(calls.epigraphs) == 4
+    assert len(calls.epigraphs) == 3
 
 
 def test_the_highest_extreme_is_what_an_epigraph_variable_stands_above():
     calls, nlp, arguments, _ = put(program((), (objective("wave", "peak"),)))
-    first = calls.first_extra(nlp, calls.sampler(X), [[Extreme(0, 0.1, -4.0), Extreme(0, 0.6, 3.0)]])
-    assert first == pytest.approx([1.01 * 4.0 + 0.01], rel=1e-14)
+    sampler = calls.sampler(X)
+    first = calls.first_extra(nlp, sampler)
+    assert first == pytest.approx([1.01 * sampler.extremes("wave")[0].height + 0.01], rel=1e-14)
     assert (arguments["lbx"][2], arguments["ubx"][2]) == (-np.inf, np.inf)
 
 
@@ -147,7 +151,7 @@ def test_bounds_that_may_give_way_are_none_but_a_positive_one_stays_positive():
     task = program()
     variables = (Variable("x", 1.0, 4.0, 2.0, (2, 4)), Variable("y", -1.0, 1.0, 1.0, (0, 1)))
     sides = [("x", -1, 1.0), ("x", 1, 4.0), ("y", -1, -1.0)]
-    limits = tuple(Limit(n, sign, n, value, 1.0, "variable") for n, sign, value in sides)
+    limits = tuple(BoundLimit(n, sign, n, value, 1.0) for n, sign, value in sides)
     _, _, arguments, _ = put(replace(task, variables=variables, limits=limits), elastic=True)
     assert arguments["lbx"][:2] == pytest.approx([0.5e-3, -np.inf])
     assert arguments["ubx"][:2] == pytest.approx([np.inf, 1.0])
@@ -168,7 +172,7 @@ def test_more_equalities_than_free_variables_leave_nothing_to_solve():
 
 
 def test_an_extreme_exceeds_its_epigraph_or_its_limit_in_natural_size():
-    levels = (Objective("circle", "circle", "peak", 2.0), objective("bowl"))
+    levels = (Peak("circle", "circle", 2.0), objective("bowl"))
     task = program([("wave", 1, 3.0)], levels)
     task = replace(task, limits=(replace(task.limits[0], scale=5.0),))
     calls = calls_of(task)

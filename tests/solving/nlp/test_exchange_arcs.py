@@ -23,7 +23,7 @@ def drive():
 
 def test_the_dwell_rows_see_their_own_arc_only(drive):
     built, sampled = drive
-    for limit in (limit for limit in built.limits if limit.where):
+    for limit in (limit for limit in built.cycle_limits.values() if limit.where):
         phi = np.radians(np.linspace(0, 30, 20_001)) * limit.where[1]
         pose = built.model.instant(systems.numpy(), sampled.given, Node(phi, {})).pose
         assert sampled.peak(limit.row, limit.where) == pytest.approx(np.abs(pose.q).max() / 0.006, rel=1e-9)

@@ -39,8 +39,8 @@ def test_slopes_are_those_of_40_digits(effects, target, changes):
     program = program_of(effects, target, changes)
     nlp, arguments, sampler, nodes, _ = put(program)
     slopes = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[1])[:, : len(program.variables)]
-    limits = [limit for limit in program.limits if limit.family == "static"]
-    exact = differences(program, sampler, lambda at: [at.excess(limit) / limit.scale for limit in limits])
+    limits = list(program.design_limits.values())
+    exact = differences(program, sampler, lambda at: [limit.residual(at) / limit.scale for limit in limits])
     assert slopes[: len(limits)] == pytest.approx(exact, rel=1e-9, abs=1e-9)
     begin = len(slopes) - 6 * len(nodes)
     for place, (family, chosen) in enumerate(zip(families(program), nodes, strict=True)):
@@ -75,10 +75,10 @@ def test_objective_is_the_weighted_sum_of_its_levels(target):
     nlp, arguments, sampler, _, extra = put(program)
     value = float(ca.Function("f", [nlp.nlp["x"], nlp.nlp["p"]], [nlp.nlp["f"]])(arguments["x0"], arguments["p"]))
     weights = Calls(program, Settings()).weights
-    levels, epigraph = [], iter(extra)
-    for level in program.objectives:
-        smooth = level.form == "value"
-        levels.append(sampler.figures[level.row] / level.scale if smooth else next(epigraph))
+    epigraph = iter(extra)
+    levels = [
+        sampler.figures[level.row] / level.scale if level.is_smooth else next(epigraph) for level in program.objectives
+    ]
     assert value == pytest.approx(np.dot(weights, levels), rel=1e-12)
 
 
@@ -113,17 +113,13 @@ def built(task, extra, elastic=False):
     return float(value), np.asarray(slope).ravel(), rows
 
 
-def test_levels_are_weighed_and_groups_summed():
-    levels = (
-        objective("x", "magnitude", ("y",), "sum"),
-        objective("circle", "peak", ("shifted",)),
-        objective("bowl", "value", ("other bowl",), "sum"),
-    )
-    value, slope, rows = built(program((), levels), [0.7, 2.5, 4.0])
-    bowls = (0.5 - 3) ** 2 + (-2 - 2) ** 2 + (0.5 + 1) ** 2 + 4.0
-    assert value == pytest.approx(1e6 * (0.7 + 2.5) + 1e3 * 4.0 + bowls, rel=1e-14)
-    assert list(slope[2:]) == [1e6, 1e6, 1e3]
-    assert rows[:4] == pytest.approx([0.5 - 0.7, -0.5 - 0.7, -2 - 2.5, 2 - 2.5], rel=1e-14)
+def test_levels_are_weighed_and_summed():
+    levels = (objective("x", "magnitude", ("y",)), objective("circle", "peak", ("shifted",)), objective("bowl"))
+    value, slope, rows = built(program((), levels), [2.5, 4.0])
+    bowl = (0.5 - 3) ** 2 + (-2 - 2) ** 2
+    assert value == pytest.approx(1e6 * 2.5 + 1e3 * 4.0 + bowl, rel=1e-14)
+    assert list(slope[2:]) == [1e6, 1e3]
+    assert rows[:4] == pytest.approx([0.5 - 2.5, -0.5 - 2.5, -2 - 2.5, 2 - 2.5], rel=1e-14)
     assert rows[[4, 10]] == pytest.approx([np.hypot(0.5, 2) - 4, np.hypot(2.5, 3) - 4], rel=1e-9)
     assert not rows[[5, 6, 7, 8, 9, 11, 12, 13, 14, 15]].any()
 

@@ -22,7 +22,7 @@ def begun(task, nodes=1):
     peaks = calls.peaks(sampler)
     chosen = [of[:nodes] for of in peaks]
     nlp = calls.transcribed(sampler, chosen, warm=False)
-    return calls, nlp, sampler, calls.first_extra(nlp, sampler, peaks), chosen
+    return calls, nlp, sampler, calls.first_extra(nlp, sampler), chosen
 
 
 def run(task):

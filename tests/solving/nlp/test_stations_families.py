@@ -5,19 +5,19 @@ from waves import objective, program
 from loomopt.solving.nlp.stations import Epigraph, Family, epigraphs, families
 
 
-def test_one_variable_stands_above_each_group_and_one_family_for_each_row():
+def test_one_variable_stands_above_each_objective_and_one_family_for_each_quantity():
     peaks = {"row": "circle", "form": "peak", "others": ("shifted",)}
     limit = [("wave", 1, 9.0)]
     worst = program(limit, (objective(**peaks), objective("bowl")))
     assert epigraphs(worst) == (Epigraph(0, ("circle", "shifted")),)
     assert families(worst) == [Family("circle", 0), Family("shifted", 0), Family("wave", limit=0)]
-    both = program(limit, (objective("bowl"), objective(**peaks, combine="sum")))
-    assert epigraphs(both) == (Epigraph(1, ("circle",)), Epigraph(1, ("shifted",)))
+    both = program(limit, (objective("bowl"), objective("circle", "peak"), objective("shifted", "peak")))
+    assert epigraphs(both) == (Epigraph(1, ("circle",)), Epigraph(2, ("shifted",)))
     assert families(both) == [Family("circle", 0), Family("shifted", 1), Family("wave", limit=0)]
     magnitudes = program(limit, (objective("x", "magnitude", ("y",)), objective("x", "value", ("y",))))
     assert epigraphs(magnitudes) == (Epigraph(0, ("x", "y")), Epigraph(1, ("x", "y")))
     assert families(magnitudes) == [Family("wave", limit=0)]
-    assert epigraphs(program(limit, (objective("x", "value", ("y",), "sum"),))) == ()
+    assert epigraphs(program(limit, (objective("x"), objective("y")))) == ()
     assert epigraphs(worst, elastic=True) == ()
     assert families(worst, elastic=True) == [Family("wave", limit=0)]
 

@@ -120,7 +120,7 @@ def test_every_number_has_its_place():
     assert layout.read(p, "values") == list(task.parameters.values())
     assert layout.read(p, "variable scale") == [v.scale for v in task.variables]
     assert layout.read(p, "limit scale") == [limit.scale for limit in task.limits]
-    assert layout.read(p, "limit") == [k.bound if k.family == "cycle" else k.value for k in task.limits]
+    assert layout.read(p, "limit") == [limit.bound for limit in task.limits]
     assert layout.read(p, "objective weight") == Calls(task, Settings()).weights
     assert layout.read(p, "objective scale") == [level.scale for level in task.objectives]
     (event,) = task.model.events_read

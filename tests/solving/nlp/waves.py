@@ -4,10 +4,14 @@ import functools
 from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 
+from support.worst import objective_of
+
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.model import Instant, JobModel, Quantity, Row
-from loomopt.model.program import Limit, Objective, Program, Variable
+from loomopt.model.objectives import Objective
+from loomopt.model.program import Program, Variable
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Motion
@@ -74,8 +78,8 @@ def model(arcs: tuple[Arcs, ...] = (), signed: Collection[str] = ()) -> JobModel
     return JobModel(Still(("still", tuple(signed))), own_quantities=quantities, own_rows=rows, arcs=arcs)
 
 
-def objective(row: str, form: str = "value", others: tuple[str, ...] = (), combine: str = "worst") -> Objective:
-    return Objective(row, row, form, 1.0, others=others, combine=combine)  # type: ignore[arg-type]
+def objective(row: str, form: str = "value", others: tuple[str, ...] = ()) -> Objective:
+    return objective_of(form, row, (row, *others))
 
 
 BOWL = (objective("bowl"),)
@@ -90,7 +94,8 @@ def program(
 ) -> Program:
     """Return a program of x and y; limits: (row, sign, value)."""
     variables = tuple(Variable(name, -box, box, 1.0, (-box, box)) for name in "xy")
-    rows = tuple(Limit(row, s, row, v, 1.0, "cycle" if row in WAVES else "static") for row, s, v in limits)
+    kinds = {row: CycleLimit if row in WAVES else DesignLimit for row, _, _ in limits}
+    rows = tuple(kinds[row](row, s, row, v, 1.0) for row, s, v in limits)
     return Program(physics or MODEL, variables, {}, rows, objectives, (dict(zip("xy", start, strict=True)),))
 
 

@@ -61,9 +61,7 @@ def designs(program: Program, count: int, seed: int = 0):
             x["s"] = min(x["s"], max(limit.value for limit in program.limits if limit.name == "m4e") * x["r4e"] ** 2)
         try:
             sampler = Sampler(program.model, {**program.parameters, **x}, 180)
-            kept = all(
-                sampler.excess(limit) <= 0 for limit in program.limits if limit.sign and limit.family == "static"
-            )
+            kept = all(limit.excess(sampler) <= 0 for limit in program.design_limits.values() if limit.sign)
         except (ArithmeticError, TypeError, ValueError):
             continue
         if kept:

@@ -27,7 +27,7 @@ def test_the_worst_node_of_a_middle_is_close_to_its_true_peak():
             float(s[0, 0]) * c for s, c in zip(spot.shares, corners, strict=True)
         )
         switch = {name: float(column[0, 0]) for name, column in spot.switches.items()}
-        height = spot.sign[0, 0] * sampler._rows.quantity("peak_torque", float(angle), switch)
+        height = spot.sign[0, 0] * sampler.rows.quantity("peak_torque", float(angle), switch)
         peak = sampler.peak("peak_torque")
         assert 0.97 * peak <= height <= peak * (1 + 1e-12)
 

@@ -27,7 +27,7 @@ def test_rows_hold_what_designs_in_the_box_are_worth(given):
             sampler = Sampler(program.model, task.values(middle[:, k] + steps[:, k]))
         except (ArithmeticError, TypeError, ValueError):
             continue
-        merits = [sampler.merit(objective) / objective.scale for objective in program.objectives]
+        merits = [objective.merit(sampler) / objective.scale for objective in program.objectives]
         for level, merit in enumerate(merits):
             own = [row for row, of in enumerate(read.of) if of == level]
             # No piece exceeds the objective, by its values and by its slopes.

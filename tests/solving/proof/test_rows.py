@@ -24,7 +24,7 @@ def test_means_hold_the_quadrature_of_designs_in_the_box():
     steps = (2 * rng.random(middle.shape) - 1) * half
     for k in range(count):
         sampler = Sampler(found.program.model, task.values(middle[:, k] + steps[:, k]))
-        true = sampler.merit(objective) / objective.scale
+        true = objective.merit(sampler) / objective.scale
         assert read.value.low[-1, k] <= true <= read.value.high[-1, k]
         slopes = read.slope.low[:, -1, k] * steps[:, k], read.slope.high[:, -1, k] * steps[:, k]
         least, most = (float(each(*slopes).sum()) for each in (np.minimum, np.maximum))
@@ -38,7 +38,7 @@ def test_a_mean_of_one_design_is_close_to_its_quadrature():
     reader = Reader(found.task, 1, at)
     read = reader.read(at[:, None], at[:, None])
     objective = found.program.objectives[0]
-    true = Sampler(found.program.model, found.task.values(at)).merit(objective) / objective.scale
+    true = objective.merit(Sampler(found.program.model, found.task.values(at))) / objective.scale
     assert read.value.high[-1, 0] - read.value.low[-1, 0] < 2e-3 * true
     assert read.value.low[-1, 0] <= true <= read.value.high[-1, 0]
 

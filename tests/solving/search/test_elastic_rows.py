@@ -54,7 +54,7 @@ def test_rows_at_corners_are_priced_with_their_limit():
     """A free law with a demand: rows of it and, hidden, of contact at 22 knots each, then slots."""
     scene = registry.load("shedding").update({"targets.law.intervals": 12, "operation.N_min": "100 N"})
     made = registry.of(scene).program(scene, "law")
-    single = [limit for limit in made.limits if limit.family != "cycle"]
+    single = list(made.single_limits.values())
     demand, contact = (made.limits[family.limit] for family in families(made, elastic=True))
     assert (demand.hidden, contact.hidden) == (False, True)
     for place, named in ((0, True), (21, True), (22, False), (43, False), (44, True), (45, True), (46, False)):
@@ -67,7 +67,7 @@ def test_rows_at_corners_are_priced_with_their_limit():
 def test_without_multipliers_nothing_has_a_price():
     made = program()
     assert priced(made, ()) == ()
-    cycles = tuple(limit for limit in made.limits if limit.family == "cycle")
+    cycles = tuple(made.cycle_limits.values())
     assert priced(replace(made, limits=cycles), ()) == ()
 
 

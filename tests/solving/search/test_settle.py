@@ -5,14 +5,14 @@ import pytest
 from support import toy
 
 import loomopt as lo
-from loomopt.model.program import Move, Wish
-from loomopt.solving.search.tie_break import _directions, _ends, goal_of, moved, unchanging, wished
+from loomopt.model.moves import AxisMove, ScaleMove, Wish
+from loomopt.solving.search.tie_break import moved, unchanging
 from reference.beatup import DESIGN, LENGTHS, Machine
 
 
 def slide(goal, low=-100.0, high=100.0):
     """Return the move of y alone that wants it at goal."""
-    return Move("slide", ("y",), "axis", (Wish("today", "tidier"),), {"y": goal}, {"y": (low, high)})
+    return AxisMove("slide", ("y",), (Wish("today", "tidier"),), {"y": goal}, {"y": (low, high)})
 
 
 def scene_of(M0):
@@ -137,9 +137,9 @@ def test_nothing_is_said_to_be_settled_where_nothing_moved():
 # Goals of a move --------------------------------------------------------------------------------------------------
 
 
-def a_move(kind="axis", toward="today", along=("y",), today=None, bounds=None, **wish):
+def a_move(kind=AxisMove, toward="today", along=("y",), today=None, bounds=None, **wish):
     today, bounds = today or dict.fromkeys(along, 1.0), bounds or dict.fromkeys(along, (0.5, 4.0))
-    return Move("slide", along, kind, (Wish(toward, "tidier", **wish),), today, bounds)
+    return kind("slide", along, (Wish(toward, "tidier", **wish),), today, bounds)
 
 
 @pytest.mark.parametrize(
@@ -148,12 +148,12 @@ def a_move(kind="axis", toward="today", along=("y",), today=None, bounds=None, *
 )
 def test_an_axis_goes_to_its_ends_or_to_today_within_its_bounds(toward, today, expected):
     move = a_move(toward=toward, today={"y": today})
-    assert goal_of(move, move.wishes[0], {"y": 2.0}) == {"y": expected}
+    assert move.goal(move.wishes[0], {"y": 2.0}) == {"y": expected}
 
 
 def test_an_axis_without_room_stays():
     move = a_move(along=("x", "y"), bounds={"x": (2.0, 2.0), "y": (0.0, 3.0)})
-    assert goal_of(move, move.wishes[0], {"x": 2.0, "y": 2.0}) == {"y": 1.0}
+    assert move.goal(move.wishes[0], {"x": 2.0, "y": 2.0}) == {"y": 1.0}
 
 
 LENGTHY = {"x": (1.0, 9.0), "y": (1.0, 5.0)}
@@ -161,42 +161,41 @@ LENGTHY = {"x": (1.0, 9.0), "y": (1.0, 5.0)}
 
 @pytest.mark.parametrize(("toward", "factor"), [("least", 0.5), ("most", 1.25)])
 def test_a_scale_goes_as_far_as_every_bound_allows(toward, factor):
-    move = a_move("scale", toward, ("x", "y"), bounds=LENGTHY)
+    move = a_move(ScaleMove, toward, ("x", "y"), bounds=LENGTHY)
     expected = {"x": 2 * factor, "y": 4 * factor}
-    assert goal_of(move, move.wishes[0], {"x": 2.0, "y": 4.0}) == pytest.approx(expected)
+    assert move.goal(move.wishes[0], {"x": 2.0, "y": 4.0}) == pytest.approx(expected)
 
 
 def test_a_scale_nearest_to_today_weighs_each_length_by_the_width_of_its_bound():
-    move = a_move("scale", "today", ("x", "y"), {"x": 3.0, "y": 4.0}, LENGTHY)
+    move = a_move(ScaleMove, "today", ("x", "y"), {"x": 3.0, "y": 4.0}, LENGTHY)
     x, widths = {"x": 2.0, "y": 4.0}, {"x": 8.0, "y": 4.0}
     factors = np.linspace(0.5, 1.25, 100_001)
     far = sum(((factors * x[n] - move.today[n]) / widths[n]) ** 2 for n in x)
     best = factors[np.argmin(far)]
-    goal = goal_of(move, move.wishes[0], x)
+    goal = move.goal(move.wishes[0], x)
     assert goal == pytest.approx({name: best * value for name, value in x.items()}, rel=1e-5)
-    away = a_move("scale", "today", ("x", "y"), {"x": 30.0, "y": 40.0}, LENGTHY)
-    assert goal_of(away, away.wishes[0], x) == pytest.approx({"x": 2.5, "y": 5.0})
+    away = a_move(ScaleMove, "today", ("x", "y"), {"x": 30.0, "y": 40.0}, LENGTHY)
+    assert away.goal(away.wishes[0], x) == pytest.approx({"x": 2.5, "y": 5.0})
 
 
 def test_a_scale_without_room_or_size_stays():
-    held = a_move("scale", "today", ("x", "y"), bounds={"x": (2.0, 2.0), "y": (1.0, 5.0)})
-    assert goal_of(held, held.wishes[0], {"x": 2.0, "y": 4.0}) == {}
-    none = a_move("scale", "today", ("x", "y"), bounds=LENGTHY)
-    assert goal_of(none, none.wishes[0], {"x": 0.0, "y": 0.0}) == {}
+    held = a_move(ScaleMove, "today", ("x", "y"), bounds={"x": (2.0, 2.0), "y": (1.0, 5.0)})
+    assert held.goal(held.wishes[0], {"x": 2.0, "y": 4.0}) == {}
+    none = a_move(ScaleMove, "today", ("x", "y"), bounds=LENGTHY)
+    assert none.goal(none.wishes[0], {"x": 0.0, "y": 0.0}) == {}
 
 
 def test_a_negative_coordinate_scales_with_the_lengths():
-    move = a_move("scale", "most", ("x", "y"), bounds={"x": (-3.0, 3.0), "y": (1.0, 5.0)})
-    assert goal_of(move, move.wishes[0], {"x": -2.0, "y": 2.0}) == pytest.approx({"x": -3.0, "y": 3.0})
+    move = a_move(ScaleMove, "most", ("x", "y"), bounds={"x": (-3.0, 3.0), "y": (1.0, 5.0)})
+    assert move.goal(move.wishes[0], {"x": -2.0, "y": 2.0}) == pytest.approx({"x": -3.0, "y": 3.0})
 
 
 def test_the_first_wish_that_holds_is_followed():
     wishes = Wish("most", "heavy", when="x", above=1.0), Wish("least", "light", when="x", above=0.5), Wish("today", "")
-    move = Move("slide", ("y",), "axis", wishes, {"y": 1.0}, {"y": (0.0, 2.0)})
-    program = toy.program("xy", FLAT, moves=(move,))
-    found = [wished(program, move, {"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
+    move = AxisMove("slide", ("y",), wishes, {"y": 1.0}, {"y": (0.0, 2.0)})
+    found = [move.wished({"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
     assert found == ["most", "least", "today"]
-    assert wished(program, Move("slide", ("y",), "axis", wishes[:2], {}, {}), {"x": 0.0}) is None
+    assert AxisMove("slide", ("y",), wishes[:2], {}, {}).wished({"x": 0.0}) is None
 
 
 def test_a_peak_is_compared_all_round_not_by_its_height():
@@ -262,13 +261,13 @@ def test_a_way_is_followed_to_its_wish_and_not_to_where_limits_hold_again_beyond
 
 
 def test_a_direction_ends_at_its_bounds_or_at_the_factors_they_allow():
-    axis, scale = a_move(), a_move("scale", along=("x", "y"), bounds=LENGTHY)
-    assert list(_ends(axis, {"y": 1.0}, {"y": 2.0})) == [{"y": 0.5}, {"y": 4.0}]
-    assert list(_ends(scale, {"x": 2.0, "y": 4.0}, {"x": 2.0, "y": 4.0})) == [
+    axis, scale = a_move(), a_move(ScaleMove, along=("x", "y"), bounds=LENGTHY)
+    assert list(axis.ends({"y": 1.0}, {"y": 2.0})) == [{"y": 0.5}, {"y": 4.0}]
+    assert list(scale.ends({"x": 2.0, "y": 4.0}, {"x": 2.0, "y": 4.0})) == [
         {"x": 1.0, "y": 2.0},
         {"x": 2.5, "y": 5.0},
     ]
-    assert list(_directions(scale, {"x": 2.0, "y": 4.0})) == [{"x": 2.0, "y": 4.0}]
-    assert list(_directions(scale, {"x": 0.0, "y": 0.0})) == []
+    assert list(scale.directions({"x": 2.0, "y": 4.0})) == [{"x": 2.0, "y": 4.0}]
+    assert list(scale.directions({"x": 0.0, "y": 0.0})) == []
     endless = a_move(along=("x", "y"), bounds={"x": (0.0, np.inf), "y": (0.0, 1.0)})
-    assert list(_directions(endless, {"x": 2.0, "y": 0.5})) == [{"y": 1.0}]
+    assert list(endless.directions({"x": 2.0, "y": 0.5})) == [{"y": 1.0}]

@@ -3,7 +3,7 @@
 from loomopt.base.records import lazy
 from loomopt.jobs.task import Task
 from loomopt.model.model import JobModel
-from loomopt.model.program import Objective
+from loomopt.model.objectives import Objective, Peak
 from loomopt_press.model import model
 
 
@@ -17,4 +17,4 @@ class PressTask(Task):
 
     def objectives(self) -> tuple[Objective, ...]:
         """Return the peak crank torque, and what checks would have least."""
-        return Objective("peak_torque", "peak_torque", "peak", self.figure_size("peak_torque")), *self.least()
+        return Peak("peak_torque", "peak_torque", self.figure_size("peak_torque")), *self.least()

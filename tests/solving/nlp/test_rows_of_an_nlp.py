@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 import steps
 import waves
+from support.worst import WorstPeak
 
-from loomopt.model.program import Objective
+from loomopt.model.objectives import Magnitude, Worst
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Settings
 from loomopt.solving.nlp.rows import Multipliers, RowMap, binding, row_map
 
 LEVELS = (
-    Objective("x", "x", "magnitude", 4.0, others=("y",), combine="sum"),
-    Objective("apart", "y", "value", 1.0, others=("sum",)),
-    Objective("circle", "circle", "peak", 2.0, others=("shifted",)),
+    Magnitude("x", "x", 4.0),
+    Worst("apart", "y", 1.0, ("sum",)),
+    WorstPeak("circle", "circle", 2.0, ("shifted",)),
 )
 PLAIN = waves.program([("sum", 0, 1.0), ("wave", 1, 3.0), ("apart", 1, 2.0), ("circle", 1, 9.0)], LEVELS)
 STATIONS = steps.program(limits=(("wave", 1, 1.5), ("h3", 1, 1.2), ("swing", 1, 2.0)), where=("step", 2.0))
@@ -60,7 +61,7 @@ def test_a_built_nlp_has_the_rows_that_are_foretold(task, elastic):
     peaks = calls.peaks(sampler)
     nodes = [of[:1] for of in calls.loose(sampler, peaks)]
     nlp = calls.transcribed(sampler, nodes, warm=False)
-    arguments = calls.arguments(nlp, sampler, task.starts[0], calls.first_extra(nlp, sampler, peaks), nodes)
+    arguments = calls.arguments(nlp, sampler, task.starts[0], calls.first_extra(nlp, sampler), nodes)
     values = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[0]).ravel()
     assert nlp.rows == row_map(task, nlp.rows.slots, elastic)
     assert nlp.rows.size == len(values) == len(arguments["ubg"])
@@ -71,7 +72,7 @@ def test_a_built_nlp_has_the_rows_that_are_foretold(task, elastic):
     ways = nlp.structure.ways
     given = [extra[list(ways.get(k, ()))] for k in nlp.rows.limits]
     expected = [
-        sampler.excess(limit) - (way[0] - way[1:].sum() if len(way) else 0.0)
+        limit.excess(sampler) - (way[0] - way[1:].sum() if len(way) else 0.0)
         for limit, way in zip(limits, given, strict=True)
     ]
     assert nlp.rows.of_limits(values) == pytest.approx(np.array(expected), abs=1e-12)
@@ -80,8 +81,8 @@ def test_a_built_nlp_has_the_rows_that_are_foretold(task, elastic):
 
 
 def test_pieces_are_of_each_row_and_each_sign():
-    """|x| + |y|, then the worse of y and x + y, then two peaks, which have no pieces."""
-    assert row_map(PLAIN, 6).pieces == ((1, 2), (1, 2), (2, 1), (2, 0))
+    """|x|, then the worse of y and x + y, then two peaks, which have no pieces."""
+    assert row_map(PLAIN, 6).pieces == (2, 2, 0)
     assert row_map(PLAIN, 6).limits == (0, 2)
     assert row_map(PLAIN, 6).stations == (0, 0, 0, 0)
     assert row_map(PLAIN, 6, elastic=True).pieces == ()

@@ -1,0 +1,210 @@
+"""Limits of a design task: each kind is a class that says how far a design exceeds it, and where it touches it.
+
+A limit is one row of the design, read in any number system, or it holds over the whole cycle, at the extremes of a
+quantity. What solves, proves or reports asks for no more than that: a new kind of either is a class of its own.
+"""
+
+import abc
+from collections.abc import Hashable
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import ClassVar, NamedTuple
+
+from loomopt.maths.systems import Number
+from loomopt.model.reading import Rows
+from loomopt.model.sampling import Extreme, Sampler
+from loomopt.physics.cycle import Where
+from loomopt.physics.tolerances import ACTIVE
+
+
+class Touch(NamedTuple):
+    """A smooth row of a limit that a design touches.
+
+    limit: as it holds there; excess: by how much it is exceeded, in its natural size; node: of a whole-cycle row.
+    """
+
+    limit: "Limit"
+    excess: float
+    node: Extreme | None = None
+
+
+@dataclass(frozen=True)
+class Limit(abc.ABC):
+    """A limit as `sign · (row − value) ≤ 0`: sign +1 for a maximum, −1 for a minimum, 0 for an equality.
+
+    name: as the scene calls it; row: what it reads; value: SI; scale: natural size of the row; relaxable: whether a
+    designer could give way; hidden: it states what a named one means.
+    """
+
+    name: str
+    sign: int
+    row: str
+    value: float
+    scale: float
+    _: KW_ONLY
+    relaxable: bool = True
+    hidden: bool = False
+
+    is_of_variable: ClassVar[bool] = False
+    """Whether what the designer calls by its name is a variable, not a figure."""
+
+    @property
+    def bound(self) -> float:
+        """What its row is compared with, SI."""
+        return self.value
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The rows and quantities that it reads."""
+        return (self.row,)
+
+    @property
+    def side(self) -> tuple[type["Limit"], str, int]:
+        """What it shares with the other rows of one side of a limit: they give way together."""
+        return type(self), self.name, self.sign
+
+    @property
+    def structure(self) -> Hashable:
+        """What the built NLP depends on: everything but the numbers."""
+        return type(self).__name__, self.name, self.sign, self.reads, self.relaxable
+
+    @property
+    def named_scale(self) -> float:
+        """The natural size, SI, of what the designer calls by its name."""
+        return self.scale
+
+    @abc.abstractmethod
+    def residual(self, rows: Rows) -> Number:
+        """Return how far it is exceeded, SI, in the number system of the rows; of an equality the difference."""
+
+    def excess(self, sampler: Sampler) -> float:
+        """Return how far a design exceeds it, in its natural size; of an equality the difference."""
+        return float(self.residual(sampler.rows)) / self.scale
+
+    def violation(self, sampler: Sampler) -> float:
+        """Return how far a design exceeds it, in its natural size; of an equality how far it is missed."""
+        excess = self.excess(sampler)
+        return abs(excess) if self.sign == 0 else excess
+
+    def factor(self, rows: Rows) -> Number:
+        """Return what its value is multiplied by before the row is compared with it."""
+        return 1.0
+
+    def touches(self, sampler: Sampler) -> list[Touch]:
+        """Return the smooth rows of it that a design touches, none where it keeps clear of it."""
+        excess = self.excess(sampler)
+        return [] if self.sign != 0 and excess < -ACTIVE else self._touches(sampler, excess)
+
+    def _touches(self, sampler: Sampler, excess: float) -> list[Touch]:
+        return [Touch(self, excess)]
+
+
+class SingleLimit(Limit):
+    """A limit that is one row of the design."""
+
+    def residual(self, rows: Rows, bound: Number = None) -> Number:
+        """Return how far it is exceeded, SI, in the number system of the rows; of an equality the difference.
+
+        bound: its value as a number of that system, its own without one.
+        """
+        value, bound = self._read(rows), rows.maths.number(self.value) if bound is None else bound
+        bound = self._compared(rows, bound)
+        return bound - value if self.sign < 0 else value - bound
+
+    @abc.abstractmethod
+    def _read(self, rows: Rows) -> Number:
+        """Return the row, SI."""
+
+    def _compared(self, rows: Rows, bound: Number) -> Number:
+        """Return what the row is compared with, SI."""
+        return bound
+
+
+class BoundLimit(SingleLimit):
+    """A bound of a variable, its row."""
+
+    is_of_variable = True
+
+    def _read(self, rows: Rows) -> Number:
+        return rows.given.values[self.row]
+
+
+class DesignLimit(SingleLimit):
+    """A limit of a value of the design alone: a figure, a row, a mean over the cycle."""
+
+    def _read(self, rows: Rows) -> Number:
+        return rows.single(self.row)
+
+
+@dataclass(frozen=True)
+class RatioLimit(DesignLimit):
+    """A limit of a number that is row/weight, without the quotient: `sign · (row − value · weight) ≤ 0`.
+
+    weight: a value of the design alone, not negative; the number has no part in the design where it vanishes.
+    """
+
+    weight: str
+
+    is_of_variable = True
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The row and its weight."""
+        return self.row, self.weight
+
+    @property
+    def named_scale(self) -> float:
+        """The natural size of the quotient: what it is limited to, SI."""
+        return abs(self.value) or 1.0
+
+    def factor(self, rows: Rows) -> Number:
+        """Return the weight."""
+        return rows.single(self.weight)
+
+    def _compared(self, rows: Rows, bound: Number) -> Number:
+        return bound * self.factor(rows)
+
+    def _touches(self, sampler: Sampler, excess: float) -> list[Touch]:
+        if sampler.single(self.weight) != 0.0:
+            return super()._touches(sampler, excess)
+        # Where the weight vanishes it can still grow, to second order: the limit keeps the row from below only.
+        least = replace(self, sign=-1)
+        return [Touch(least, least.excess(sampler))] if self.sign <= 0 else []
+
+
+@dataclass(frozen=True)
+class CycleLimit(Limit):
+    """A limit of a quantity over the whole cycle, |quantity| ≤ bound (of a signed quantity, quantity ≤ bound).
+
+    The bound is the value itself or, for a minimum, what it leaves of the complement. where: (switch, its value) on
+    the pieces that it holds for.
+    """
+
+    _: KW_ONLY
+    complement: float = 0.0
+    where: Where | None = None
+
+    @property
+    def bound(self) -> float:
+        """The largest |quantity| that it allows, SI."""
+        return self.complement + self.sign * self.value
+
+    @property
+    def structure(self) -> Hashable:
+        """What the built NLP depends on: where it holds, too."""
+        return super().structure, self.where
+
+    def residual(self, rows: Rows) -> Number:
+        """Return how far the quantity exceeds it at its worst, SI."""
+        return rows.highest(self.row, self.where) - self.bound
+
+    def figure(self, sampler: Sampler) -> float:
+        """Return what of a design the value is compared with, SI."""
+        return self.sign * (sampler.peak(self.row, self.where) - self.complement)
+
+    def near(self, sampler: Sampler) -> list[Extreme]:
+        """Return the extremes of the quantity that come near the bound, or exceed it."""
+        found = sampler.extremes(self.row, self.where)
+        return [e for e in found if e.height >= self.bound - ACTIVE * self.scale]
+
+    def _touches(self, sampler: Sampler, excess: float) -> list[Touch]:
+        return [Touch(self, (e.height - self.bound) / self.scale, e) for e in self.near(sampler)]

@@ -1,0 +1,216 @@
+"""Objectives of a design task, one level of a target each: every kind is a class that says what a design is worth.
+
+An objective is the largest of smooth functions of the design: rows with a sign, or the extremes of quantities over the
+cycle. What solves and proves asks for these alone: a new kind is a class of its own.
+"""
+
+import abc
+import functools
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from loomopt.maths.systems import Number
+from loomopt.model.limits import CycleLimit, DesignLimit, Limit
+from loomopt.model.reading import Rows
+from loomopt.model.sampling import Extreme, Sampler
+from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.tolerances import FEASIBLE
+
+Sought = Literal["least", "least magnitude", "most"]
+"""What of a figure is sought."""
+
+
+class Piece(NamedTuple):
+    """A smooth function that an objective is made of: sign · row, or sign · quantity at a node; value: SI."""
+
+    row: str
+    value: float
+    sign: float = 1.0
+    node: Extreme | None = None
+
+
+@dataclass(frozen=True)
+class Objective(abc.ABC):
+    """One level of a target, the least of which is sought.
+
+    figure: what the designer reads; row: what it is read from; scale: natural size of the row, SI; power: the figure's
+    power that the row is.
+    """
+
+    figure: str
+    row: str
+    scale: float
+    _: KW_ONLY
+    power: int = 1
+
+    is_smooth: ClassVar[bool] = False
+    """Whether it is one smooth function of the design."""
+    is_magnitude: ClassVar[bool] = False
+    """Whether both signs of its row count."""
+    least: ClassVar[float] = -math.inf
+    """What it is never less than."""
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """All rows and quantities that it reads."""
+        return (self.row,)
+
+    @property
+    def sides(self) -> tuple[tuple[str, float], ...]:
+        """Rows of the design with their signs: it is no less than any of them."""
+        return ()
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Quantities whose extremes over the cycle it is no less than."""
+        return ()
+
+    @property
+    def structure(self) -> Hashable:
+        """What the built NLP depends on: everything but the numbers."""
+        return type(self).__name__, self.rows
+
+    @property
+    def sought(self) -> Sought:
+        """Which end of the figure is sought."""
+        return "least" if self.power > 0 else "most"
+
+    def worth(self, rows: Rows) -> Number:
+        """Return what it is worth, SI, of a design or of many at once."""
+        found = [*(sign * rows.single(row) for row, sign in self.sides), *map(rows.highest, self.quantities)]
+        return functools.reduce(np.maximum, found)
+
+    def merit(self, sampler: Sampler) -> float:
+        """Return what a design is worth, SI."""
+        return float(self.worth(sampler.rows))
+
+    def figure_of(self, sampler: Sampler) -> float:
+        """Return the figure of a design, SI: with its sign where it is a number of its own."""
+        own = sampler.figures.get(self.figure)
+        return float(self.merit(sampler) ** (1 / self.power)) if own is None else own
+
+    def worsening(self, now: float, then: float, most: bool) -> float:
+        """Return by how much the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
+        return now - then if most else then - now
+
+    def least_within(self, lower: Mapping[str, float]) -> float:
+        """Return what lower bounds of the variables alone leave it to be at least, SI."""
+        return -math.inf
+
+    def watched(self, sampler: Sampler, pieces: Pieces, u: Floats) -> Floats:
+        """Return what changes where it does, SI: itself; of a peak the quantity at nodes (pieces, u)."""
+        return np.array([self.merit(sampler)])
+
+    def pieces(self, sampler: Sampler) -> list[Piece]:
+        """Return the smooth functions the largest of which it is at a design."""
+        found = [Piece(row, sign * sampler.single(row), sign) for row, sign in self.sides]
+        return found + [Piece(row, e.height, e.sign, e) for row in self.quantities for e in sampler.extremes(row)]
+
+    @abc.abstractmethod
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return what keeps it at `most`, SI, as limits of a name."""
+
+
+class Value(Objective):
+    """The least of one row of the design."""
+
+    is_smooth = True
+
+    @property
+    def sides(self) -> tuple[tuple[str, float], ...]:
+        """The row itself."""
+        return ((self.row, 1.0),)
+
+    def least_within(self, lower: Mapping[str, float]) -> float:
+        """Return the variable's lower bound, SI, where the row is a variable."""
+        return lower.get(self.row, -math.inf)
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return the limit of the row at `most`, SI."""
+        return [DesignLimit(name, 1, self.row, most, self.scale)]
+
+
+@dataclass(frozen=True)
+class Worst(Objective):
+    """The least of the worst of several rows of the design; others: the rows beside the first."""
+
+    others: tuple[str, ...]
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """All its rows."""
+        return (self.row, *self.others)
+
+    @property
+    def sides(self) -> tuple[tuple[str, float], ...]:
+        """The rows themselves."""
+        return tuple((row, 1.0) for row in self.rows)
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return the limit of each row at `most`, SI."""
+        return [DesignLimit(name, 1, row, most, self.scale) for row in self.rows]
+
+
+class Magnitude(Objective):
+    """The least magnitude of one row of the design."""
+
+    is_magnitude, least = True, 0.0
+
+    @property
+    def sides(self) -> tuple[tuple[str, float], ...]:
+        """The row and its opposite."""
+        return (self.row, 1.0), (self.row, -1.0)
+
+    @property
+    def sought(self) -> Sought:
+        """Its least magnitude."""
+        return "least magnitude"
+
+    def worth(self, rows: Rows) -> Number:
+        """Return |row|, SI."""
+        return abs(rows.single(self.row))
+
+    def worsening(self, now: float, then: float, most: bool) -> float:
+        """Return by how much the magnitude grows from now to then, SI."""
+        return abs(then) - abs(now)
+
+    def least_within(self, lower: Mapping[str, float]) -> float:
+        """Return 0."""
+        return 0.0
+
+    def pieces(self, sampler: Sampler) -> list[Piece]:
+        """Return the row with its own sign; with both where it vanishes."""
+        value = sampler.single(self.row)
+        signs = (1.0, -1.0) if abs(value) <= FEASIBLE * self.scale else (float(np.sign(value)),)
+        return [Piece(self.row, abs(value), sign) for sign in signs]
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return the limits of the row at `most` and at its opposite, SI."""
+        return [DesignLimit(name, sign, self.row, sign * most, self.scale) for sign in (1, -1)]
+
+
+class Peak(Objective):
+    """The least peak of |quantity| over the cycle (of a signed quantity, of the quantity)."""
+
+    least = 0.0
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantity."""
+        return (self.row,)
+
+    def figure_of(self, sampler: Sampler) -> float:
+        """Return the figure of a design, SI: of the peak itself."""
+        return float(self.merit(sampler) ** (1 / self.power))
+
+    def watched(self, sampler: Sampler, pieces: Pieces, u: Floats) -> Floats:
+        """Return the quantity at nodes (pieces, u), SI."""
+        return sampler.at(self.row, pieces, u)
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return the limit of the quantity at `most`, SI."""
+        return [CycleLimit(name, 1, self.row, most, self.scale)]
