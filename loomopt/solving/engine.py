@@ -11,13 +11,13 @@ from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes.scene import Scene
 from loomopt.solving import options
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Solution
+from loomopt.solving.answer.solution import Clash, Solution
 from loomopt.solving.answer.words import Words
 from loomopt.solving.clock import Clock
 from loomopt.solving.nlp.ipopt import IterationCallback
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.options import GlobalProof
-from loomopt.solving.search import elastic, multistart
+from loomopt.solving.search import multistart
 from loomopt.solving.search.search import Search
 
 
@@ -75,8 +75,12 @@ def solve(
         # Figures are read as finely for every answer: they are no part of what accuracy costs.
         evaluations = own.positions - begun
 
-        with clock.charged("solve"):
-            clash = elastic.clash(search, Words(scene))
+        clash = Clash()
+        if search.best is None:
+            from loomopt.solving.search import elastic
+
+            with clock.charged("solve"):
+                clash = elastic.clash(search, Words(scene))
         with clock.charged("report"):
             answer = report.answer(scene, target, search, clash)
         for name, sizes in sold.items() if answer.status == "optimal" else ():

@@ -17,7 +17,7 @@ BOWL = {"f": lambda v: (v["x"] - 1) ** 2 + v["y"] ** 2}
 def test_where_no_start_assembles_nothing_was_iterated(monkeypatch):
     monkeypatch.setattr(exchange, "starts", lambda *_: [])
     monkeypatch.setattr(exchange, "started", lambda *_: None)
-    monkeypatch.setattr("loomopt.solving.search.multistart.least", lambda *_: None)
+    monkeypatch.setattr("loomopt.solving.search.elastic.least", lambda *_: None)
     monkeypatch.setattr("loomopt.solving.search.elastic.clash", lambda *_: Clash())
     answer = toy.solve(toy.program("xy", BOWL))
     assert answer.status == "failed"

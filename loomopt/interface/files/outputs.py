@@ -14,6 +14,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
 from loomopt.interface import tables
 from loomopt.jobs import registry
+from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
@@ -174,6 +175,7 @@ def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Fi
     return drawn
 
 
+@working()
 def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: Subject | None = None) -> "Figure":
     """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
@@ -209,12 +211,14 @@ def what(found: Evaluation, target: str | None = None, status: str | None = None
     return Subject(TODAY if own.items() <= now.items() else GIVEN, broken)
 
 
+@working()
 def drawing(scene: Scene, design: Design, said: Subject | None = None) -> "Drawing":
     """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
     found = registry.of(scene).views.linkage(scene, flat(design))
     return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
 
 
+@working()
 def linkage(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
     """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`)."""
     DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)

@@ -18,7 +18,6 @@ from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives import Derivatives
 from loomopt.solving.certificate.derivatives_jets import Forward
-from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import Multipliers, System, priced
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
@@ -66,7 +65,11 @@ def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: in
     falls here to higher order, from the certificate of a program with those levels that holds nothing more than this.
     """
     quick = certified(Forward, program, x, accuracy, shown)
-    return quick if quick.clear else certified(Exact, program, x, accuracy, shown)
+    if quick.clear:
+        return quick
+    from loomopt.solving.certificate.derivatives_mp import Exact
+
+    return certified(Exact, program, x, accuracy, shown)
 
 
 def certified(
@@ -84,7 +87,7 @@ def certified(
         return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         reason = f"a value or a slope is no number here ({type(error).__name__})"
-        by, clear = derivatives.by, issubclass(derivatives, Exact)
+        by, clear = derivatives.by, derivatives.last
         return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
 
 
@@ -182,7 +185,7 @@ def _certificate(
         curvatures[-1].unique if curvatures else True,
         tuple(_binding(local, levels)),
         by=local.derivatives.by,
-        clear=isinstance(local.derivatives, Exact) or not _doubtful(local, levels),
+        clear=local.derivatives.last or not _doubtful(local, levels),
         whole_cycle="bounded" if cycle.bound == "proven" else "refined",
         correction=moved,
         step=float(np.abs(step).max(initial=0.0)),

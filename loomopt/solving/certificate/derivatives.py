@@ -19,6 +19,8 @@ class Derivatives(abc.ABC):
     by: ClassVar[str]
     error: ClassVar[float]
     """Of slopes and curvatures, relative to the largest derivative of a row where that exceeds 1."""
+    last: ClassVar[bool] = False
+    """Whether no other way judges where these leave a verdict in doubt."""
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
         self.program, self.sampler, self.rows = program, sampler, tuple(rows)

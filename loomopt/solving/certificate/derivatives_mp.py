@@ -29,7 +29,7 @@ Vector = Sequence[Number] | Floats
 class Exact(Derivatives):
     """Derivatives by differences at 40 digits."""
 
-    by, error = "40 digits", ROUNDED
+    by, error, last = "40 digits", ROUNDED, True
 
     def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
         super().__init__(program, x, sampler, rows)

@@ -13,7 +13,6 @@ from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
 from loomopt.solving.search.batch import SCREENED_STARTS
-from loomopt.solving.search.elastic import least
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 if TYPE_CHECKING:
@@ -209,6 +208,8 @@ def _completed(search: Search, starts: Sequence[Mapping[str, float]]) -> list[di
 
 def relaxed(search: Search, starts: Sequence[Mapping[str, float]]) -> Search:
     """Return the search with where its limits' excesses are least; solved from there where there are none."""
+    from loomopt.solving.search.elastic import least
+
     began = time.perf_counter()
     search = at(search, "looking for the least relaxation")
     places = [*starts, *([search.today] if search.today else [])]
