@@ -31,7 +31,7 @@ HARMLESS = re.compile(r"input|literal|pi_\d+|\(.*\)|[-+]\{0\}|\{0\} [-+*] \{1\}"
 class Operation(NamedTuple):
     """What is done: Python with its operands as {0}, {1} ..., the places of these, and the value of a literal."""
 
-    form: str
+    template: str
     of: tuple[int, ...] = ()
     value: Number = None
 
@@ -118,7 +118,7 @@ class Tape:
 
     def known(self, number: Recorded) -> Recorded:
         """Return an input that stands for a number known when the function is bound; an input stands for itself."""
-        return number if self.operations[number.place].form == INPUT else self.input()
+        return number if self.operations[number.place].template == INPUT else self.input()
 
     def call(self, system: int, function: str, *operands: Number) -> Recorded:
         """Return what a function of a number system gives; system: its place among those of `Program`."""
@@ -135,9 +135,9 @@ class Tape:
         listed = "".join(f"{{{k}}}, " for k in range(len(operands)))
         return self.record(f"({listed})", *operands)
 
-    def record(self, form: str, *operands: Number) -> Recorded:
+    def record(self, template: str, *operands: Number) -> Recorded:
         """Return the result of an operation on recorded numbers and literals."""
-        operation = Operation(form, tuple(map(self.place, operands)))
+        operation = Operation(template, tuple(map(self.place, operands)))
         return self._at(operation, operation)
 
     def place(self, number: Number) -> int:
@@ -159,7 +159,7 @@ class Tape:
     def needed(self, outputs: Iterable[Number], since: int = 0) -> set[int]:
         """Return the places that outputs need, and what may fail from the place `since` on."""
         found = {self.place(output) for output in outputs}
-        found |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].form)}
+        found |= {k for k in range(since, len(self.operations)) if not HARMLESS.fullmatch(self.operations[k].template)}
         for place in range(len(self.operations) - 1, -1, -1):
             if place in found:
                 found.update(self.operations[place].of)
@@ -217,8 +217,8 @@ class _Written:
         """Return what has a name: read several times, never or later than it is known, or else nested too deeply."""
         found, depth = set(), dict.fromkeys(self.needed, 0)
         for place in self.needed:
-            form, operands, _ = self.operations[place]
-            if form in (INPUT, LITERAL):
+            template, operands, _ = self.operations[place]
+            if template in (INPUT, LITERAL):
                 continue
             depth[place] = 1 + max((depth[operand] for operand in operands if operand not in found), default=0)
             readers = self.readers[place]
@@ -241,20 +241,20 @@ class _Written:
         lines: tuple[list[str], ...] = ([], [], [])
         free, freed = list[str](), dict[int, list[str]]()
         for place in self.needed:
-            form, operands, value = self.operations[place]
+            template, operands, value = self.operations[place]
             level = self.level[place]
-            if form == INPUT:
+            if template == INPUT:
                 continue
-            if form == LITERAL:
+            if template == LITERAL:
                 names[place] = self._literal(place, value)
                 continue
-            if level == CALLED and form in ARITHMETIC:
+            if level == CALLED and template in ARITHMETIC:
                 for operand in (each for each in operands if self.level[each] < CALLED and each not in wide):
                     wide[operand] = f"w{operand}"
                     lines[self.level[operand]].append(f"w{operand} = constant({names[operand]})")
-                written = form.format(*(wide.get(operand, names[operand]) for operand in operands))
+                written = template.format(*(wide.get(operand, names[operand]) for operand in operands))
             else:
-                written = form.format(*(names[operand] for operand in operands))
+                written = template.format(*(names[operand] for operand in operands))
             if place not in self.named:
                 names[place] = f"({written})"
                 continue
@@ -268,8 +268,8 @@ class _Written:
 
     def _nested(self, lines: Sequence[Sequence[str]], inputs: Mapping[int, str], result: str) -> str:
         """Return the source of `program` from the lines of each level."""
-        forms = {self.operations[place].form for place in self.needed}
-        used = sorted({found[0] for form in forms if (found := re.match(r"[a-z0-9]+_\d+", form))})
+        templates = {self.operations[place].template for place in self.needed}
+        used = sorted({found[0] for template in templates if (found := re.match(r"[a-z0-9]+_\d+", template))})
         taken = [f"{name} = systems[{name.split('_')[1]}].{name.split('_')[0]}" for name in used]
         known, called = (
             [name for place, name in inputs.items() if self.level[place] == level] for level in (KNOWN, CALLED)

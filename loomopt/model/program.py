@@ -14,7 +14,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.limits import BoundLimit, CycleLimit, Limit, SingleLimit
 from loomopt.model.model import JobModel
 from loomopt.model.moves import Move
-from loomopt.model.objectives import Objective, Peak
+from loomopt.model.objectives import Objective
 from loomopt.physics.tolerances import FEASIBLE
 
 
@@ -149,11 +149,6 @@ class Program:
     def row_limits(self) -> tuple[Limit, ...]:
         """The limits that are more than bounds of variables, in order."""
         return tuple(limit for k, limit in enumerate(self.limits) if k not in self.bound_limits)
-
-    @lazy
-    def peaks(self) -> tuple[Peak, ...]:
-        """The objectives that are peaks over the cycle, in order."""
-        return tuple(objective for objective in self.objectives if isinstance(objective, Peak))
 
     @lazy
     def told(self) -> frozenset[str]:
