@@ -65,7 +65,9 @@ def sketches() -> dict[str, str]:
     found = {}
     for name in registry.own_names():
         scene = registry.load(name)
-        found[f"sketch-{name}.svg"] = svg.render(outputs.drawing(scene, glossary.sketched(scene), "sketch"))
+        found[f"sketch-{name}.svg"] = svg.render(
+            outputs.drawing(scene, glossary.sketched(scene), outputs.Subject("sketch"))
+        )
     return found
 
 
