@@ -66,7 +66,7 @@ def sketches() -> dict[str, str]:
     for name in registry.own_names():
         scene = registry.load(name)
         found[f"sketch-{name}.svg"] = svg.render(
-            outputs.drawing(scene, glossary.sketched(scene), outputs.Subject("sketch"))
+            outputs.drawing(scene, glossary.sketched(scene), outputs.DrawnSubject("sketch"))
         )
     return found
 

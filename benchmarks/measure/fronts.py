@@ -18,7 +18,7 @@ from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import POINTS, read_front
 from loomopt.studies.run import run
 from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
 LARGEST_AREA, CORNER = 34.892414, (7.0, 97.0)
@@ -140,7 +140,7 @@ def asked_at(trade: trade.Trade, found: Findings, value: float) -> Row:
     """Return the row with the second axis at a value, solved from its nearest neighbour on the front."""
     near = min((row for row in found.rows if row.certified), key=lambda row: abs(trade_value(trade, row) - value))
     ask = {"also": [], "held": near.warm["held"], "wide": False}
-    return trade.solved(Task(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
+    return trade.solved(StudyTask(len(found.rows), near.point, {trade.axes[1]: value}, ask), near)
 
 
 def trade_value(trade: trade.Trade, row: Row) -> float:

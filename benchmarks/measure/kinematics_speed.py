@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks import harness
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose
+from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose, Lengths
 from reference import balance as plain
 
 LENGTHS = (0.031, 0.065, 0.155, 0.167)
@@ -28,14 +28,14 @@ def exact(phi):
     """Return ψ, ψ', ψ'' by mpmath, a position at a time."""
     m = systems.mpmath(DIGITS)
     lengths = Lengths(*map(m.number, LENGTHS))
-    poses = [Pose(m, lengths, m.number(float(angle))) for angle in phi]
+    poses = [CrankRockerPose(m, lengths, m.number(float(angle))) for angle in phi]
     return np.array([[float(x) for x in (pose.psi, pose.psi_1, pose.psi_2)] for pose in poses]).T
 
 
 def symbolic():
     """Return the same formula as a CasADi function of φ."""
     phi = ca.SX.sym("phi")
-    pose = Pose(systems.casadi(), Lengths(*LENGTHS), phi)
+    pose = CrankRockerPose(systems.casadi(), Lengths(*LENGTHS), phi)
     return ca.Function("curves", [phi], [ca.vertcat(pose.psi, pose.psi_1, pose.psi_2)])
 
 

@@ -24,7 +24,7 @@ from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import executors, run
 from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 
 LONGER = 10.0
 """Times the front's own that the peer gets."""
@@ -128,7 +128,7 @@ def _trade(payload: bytes) -> trade.Trade:
     return found
 
 
-def half(payload: bytes, work: Sequence[tuple[Task, Row | None]]) -> None:
+def half(payload: bytes, work: Sequence[tuple[StudyTask, Row | None]]) -> None:
     """Solve tasks of a front one after the other, each parent's row at hand: no rounds, nothing handed over."""
     for task, parent in work:
         _trade(payload).solved(task, parent)

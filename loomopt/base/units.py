@@ -79,7 +79,7 @@ DISPLAY_UNIT = SI_UNIT | {"length": "mm", "angle": "deg", "angular speed": "rpm"
 """Kind of quantity → the unit it is shown in where a scene writes none."""
 
 
-class Shown(Protocol):
+class ShowValue(Protocol):
     """shown(value, kind, digits): an SI value as text in the unit in which a person sees its kind of quantity."""
 
     def __call__(self, value: float, kind: str, digits: int = 6, /) -> str:

@@ -35,7 +35,7 @@ class Column(NamedTuple):
         return [None if value is None else value / self.size for value in self.values]
 
 
-class Units:
+class ColumnUnits:
     """The units of a study's columns, those of its scene or SI."""
 
     def __init__(self, study: SceneStudy, si: bool) -> None:
@@ -63,7 +63,7 @@ def columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> dict[st
         "design": [row.design for row in rows],
         "figures": [row.figures for row in rows],
     }
-    units, found = Units(study, si), dict[str, list[Column]]()
+    units, found = ColumnUnits(study, si), dict[str, list[Column]]()
     for part, numbers in numbers_of.items():
         taken = {column.name for columns in found.values() for column in columns}
         taken |= {"change"} if part == "figures" else set()

@@ -27,7 +27,7 @@ from loomopt.scenes.schema import SceneSchema
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
-    from loomopt.model.axes import Asked, Traded
+    from loomopt.model.axes import Requested, Traded
     from loomopt.model.separation import Parted
     from loomopt.scenes.scene import Scene
 
@@ -40,7 +40,7 @@ class Crossing(NamedTuple):
     level: str
 
 
-class Family(NamedTuple):
+class LawFamily(NamedTuple):
     """Ever finer sets of designs that a target chooses from, such as laws of more and more intervals.
 
     method: what its ladder is called; target, key: whose scene key says how fine; limit(scene, x): the figure that
@@ -65,7 +65,7 @@ class Studied(NamedTuple):
     static: tuple[str, ...] = ()
     motion: str = "q_2"
     crossing: Crossing | None = None
-    family: Family | None = None
+    family: LawFamily | None = None
 
 
 Figures = Mapping[str, float | None]
@@ -188,7 +188,7 @@ class Job(abc.ABC):
         found: dict[str, float | None] = {name: sampled.figures.get(name) for name in scene.schema.figures}
         return found | {name: sampled.peak(quantity) for name, quantity in self.peaks(sampled.model).items()}
 
-    def traded(self, scene: Scene, target: str | None, asked: "Asked") -> "tuple[Program, tuple[Traded, ...]]":
+    def traded(self, scene: Scene, target: str | None, asked: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
         """Return the task whose levels are axes, after what a target holds (None: nothing), and the axes.
 
         Raises BadInput.
@@ -196,7 +196,7 @@ class Job(abc.ABC):
         from loomopt.model import axes
 
         bounded = [name for name, bound in scene.bounds.items() if bound.free and bound.min < bound.max]
-        known = axes.asked_of(scene.schema.axes, bounded, asked, scene.origin)
+        known = axes.requested_of(scene.schema.axes, bounded, asked, scene.origin)
         if target:
             self.demand(scene, target)
         task = self.task(scene, target or "", tuple(asked))

@@ -10,7 +10,7 @@ from loomopt.base.records import Frozen, lazy
 from loomopt.model import drive, numbers
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.moves import LEAST_CHANGE, AxisMove, Move, ScaleMove, Wish
+from loomopt.model.moves import LEAST_CHANGE, AxisMove, Move, Preference, ScaleMove
 from loomopt.model.objectives import Objective, Value
 from loomopt.model.program import Goal, Numbers, Program, Variable, goals, nothing_follows
 from loomopt.model.sampling import Sampler, sampled
@@ -260,7 +260,7 @@ class Task(abc.ABC):
             if name in self.limited and self.limited[name][0] < self.limited[name][1]
         ]
 
-    def move(self, name: str, along: str, wishes: Sequence[Wish] = (Wish("today", LEAST_CHANGE),)) -> Move:
+    def move(self, name: str, along: str, wishes: Sequence[Preference] = (Preference("today", LEAST_CHANGE),)) -> Move:
         """Return the move along one number; it would stay nearest to today's where no other wish is told."""
         return AxisMove(name, (along,), tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
 
@@ -268,7 +268,7 @@ class Task(abc.ABC):
         """Return the move that scales lengths in common, and would stay nearest to today's."""
         today = {n: self.known[n] for n in along if n in self.known}
         bounds = {n: self.limited[n] for n in along if n in self.limited}
-        return ScaleMove(name, along, (Wish("today", LEAST_CHANGE),), today, bounds)
+        return ScaleMove(name, along, (Preference("today", LEAST_CHANGE),), today, bounds)
 
     def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
         """Return what gives the variables that follow from the others."""

@@ -14,7 +14,7 @@ from loomopt.maths.intervals import Enclosure, Floats, Interval, interval
 Number = intervals.Number
 
 
-class Terms(NamedTuple):
+class SeriesTerms(NamedTuple):
     """The coefficients of 1, t and t²."""
 
     value: Number
@@ -30,20 +30,20 @@ class Series(Enclosure):
 
     __slots__ = ("terms",)
 
-    def __init__(self, terms: Terms) -> None:
+    def __init__(self, terms: SeriesTerms) -> None:
         self.terms = terms
 
     def __add__(self, other: Number) -> "Series":
         """Return the sum."""
         if isinstance(other, Series):
-            return Series(Terms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
+            return Series(SeriesTerms(*(a + b for a, b in zip(self.terms, other.terms, strict=True))))
         return Series(self.terms._replace(value=self.terms.value + other))
 
     __radd__ = __add__
 
     def __neg__(self) -> "Series":
         """Return the opposite."""
-        return Series(Terms(*(-a for a in self.terms)))
+        return Series(SeriesTerms(*(-a for a in self.terms)))
 
     def __pos__(self) -> "Series":
         """Return the number itself."""
@@ -52,7 +52,7 @@ class Series(Enclosure):
     def __sub__(self, other: Number) -> "Series":
         """Return the difference."""
         if isinstance(other, Series):
-            return Series(Terms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
+            return Series(SeriesTerms(*(a - b for a, b in zip(self.terms, other.terms, strict=True))))
         return Series(self.terms._replace(value=self.terms.value - other))
 
     def __rsub__(self, other: Number) -> "Series":
@@ -62,25 +62,25 @@ class Series(Enclosure):
     def __mul__(self, other: Number) -> "Series":
         """Return the product."""
         if not isinstance(other, Series):
-            return Series(Terms(*(a * other for a in self.terms)))
+            return Series(SeriesTerms(*(a * other for a in self.terms)))
         a, b = self.terms, other.terms
         slope = a.value * b.slope + a.slope * b.value
-        return Series(Terms(a.value * b.value, slope, a.value * b.bend + a.slope * b.slope + a.bend * b.value))
+        return Series(SeriesTerms(a.value * b.value, slope, a.value * b.bend + a.slope * b.slope + a.bend * b.value))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Number) -> "Series":
         """Return the quotient."""
         if not isinstance(other, Series):
-            return Series(Terms(*(a / other for a in self.terms)))
+            return Series(SeriesTerms(*(a / other for a in self.terms)))
         a, b = self.terms, other.terms
         value = a.value / b.value
         slope = (a.slope - value * b.slope) / b.value
-        return Series(Terms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
+        return Series(SeriesTerms(value, slope, (a.bend - value * b.bend - slope * b.slope) / b.value))
 
     def __rtruediv__(self, other: Number) -> "Series":
         """Return the quotient, the other number on top."""
-        return Series(Terms(other, interval(0.0), interval(0.0))) / self
+        return Series(SeriesTerms(other, interval(0.0), interval(0.0))) / self
 
     def __pow__(self, power: int) -> "Series":
         """Return a power of a whole number above 0."""
@@ -90,8 +90,8 @@ class Series(Enclosure):
         return found
 
 
-def _whole(x: Number) -> Terms:
-    return x.terms if isinstance(x, Series) else Terms(x, interval(0.0), interval(0.0))
+def _whole(x: Number) -> SeriesTerms:
+    return x.terms if isinstance(x, Series) else SeriesTerms(x, interval(0.0), interval(0.0))
 
 
 def _waves(x: Series) -> tuple[Series, Series]:
@@ -99,8 +99,8 @@ def _waves(x: Series) -> tuple[Series, Series]:
     angle, slope, bend = x.terms
     sine, cosine, half = intervals.sin(angle), intervals.cos(angle), slope * slope / 2
     return (
-        Series(Terms(sine, cosine * slope, cosine * bend - sine * half)),
-        Series(Terms(cosine, -sine * slope, -sine * bend - cosine * half)),
+        Series(SeriesTerms(sine, cosine * slope, cosine * bend - sine * half)),
+        Series(SeriesTerms(cosine, -sine * slope, -sine * bend - cosine * half)),
     )
 
 
@@ -120,7 +120,7 @@ def sqrt(x: Number) -> Number:
         return intervals.sqrt(x)
     root = intervals.sqrt(x.terms.value)
     slope = x.terms.slope / (root * 2)
-    return Series(Terms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
+    return Series(SeriesTerms(root, slope, (x.terms.bend - slope * slope) / (root * 2)))
 
 
 def atan2(y: Number, x: Number) -> Number:
@@ -132,16 +132,16 @@ def atan2(y: Number, x: Number) -> Number:
     slope = (right.value * up.slope - up.value * right.slope) / square
     swell = right.value * right.slope + up.value * up.slope
     bend = (right.value * up.bend - up.value * right.bend - slope * swell) / square
-    return Series(Terms(intervals.atan2(up.value, right.value), slope, bend))
+    return Series(SeriesTerms(intervals.atan2(up.value, right.value), slope, bend))
 
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Return the value at a place that is data: one for all, or one for each node and box."""
     if not any(isinstance(value, Series) for value in values):
         return intervals.chosen(place, values)
-    return Series(Terms(*(intervals.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
+    return Series(SeriesTerms(*(intervals.chosen(place, part) for part in zip(*map(_whole, values), strict=True))))
 
 
 def along(low: Floats, high: Floats) -> Series:
     """Return u itself between two ends, (nodes, 1)."""
-    return Series(Terms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))
+    return Series(SeriesTerms(Interval(low, high), interval(np.ones_like(low)), interval(0.0)))

@@ -28,7 +28,7 @@ HARMLESS = re.compile(r"input|literal|pi_\d+|\(.*\)|[-+]\{0\}|\{0\} [-+*] \{1\}"
 """What raises in no number system. All else is done even where nothing needs its result, for it might fail there."""
 
 
-class Operation(NamedTuple):
+class RecordedOperation(NamedTuple):
     """What is done: Python with its operands as {0}, {1} ..., the places of these, and the value of a literal."""
 
     template: str
@@ -109,12 +109,12 @@ class Tape:
     """Operations in the order in which they were recorded, equal ones once."""
 
     def __init__(self) -> None:
-        self.operations: list[Operation] = []
+        self.operations: list[RecordedOperation] = []
         self._places: dict[object, int] = {}
 
     def input(self) -> Recorded:
         """Return a number that is given when the function is bound, or called."""
-        return self._at(len(self.operations), Operation(INPUT))
+        return self._at(len(self.operations), RecordedOperation(INPUT))
 
     def known(self, number: Recorded) -> Recorded:
         """Return an input that stands for a number known when the function is bound; an input stands for itself."""
@@ -137,7 +137,7 @@ class Tape:
 
     def record(self, template: str, *operands: Number) -> Recorded:
         """Return the result of an operation on recorded numbers and literals."""
-        operation = Operation(template, tuple(map(self.place, operands)))
+        operation = RecordedOperation(template, tuple(map(self.place, operands)))
         return self._at(operation, operation)
 
     def place(self, number: Number) -> int:
@@ -148,9 +148,9 @@ class Tape:
             return number.place
         # 1, 1.0 and True are equal but not the same, and so are 0.0 and -0.0.
         text = repr(number) if isinstance(number, int | float) else id(number)
-        return self._at((type(number), text), Operation(LITERAL, (), number)).place
+        return self._at((type(number), text), RecordedOperation(LITERAL, (), number)).place
 
-    def _at(self, key: object, operation: Operation) -> Recorded:
+    def _at(self, key: object, operation: RecordedOperation) -> Recorded:
         place = self._places.setdefault(key, len(self.operations))
         if place == len(self.operations):
             self.operations.append(operation)
@@ -196,7 +196,11 @@ class _Written:
     """
 
     def __init__(
-        self, operations: Sequence[Operation], needed: Sequence[int], outputs: Sequence[int], inputs: Mapping[int, int]
+        self,
+        operations: Sequence[RecordedOperation],
+        needed: Sequence[int],
+        outputs: Sequence[int],
+        inputs: Mapping[int, int],
     ) -> None:
         self.operations, self.needed, self.outputs = operations, needed, outputs
         self.literals: dict[str, Number] = {}

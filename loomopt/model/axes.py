@@ -8,12 +8,12 @@ from loomopt.base.errors import BadInput
 from loomopt.base.refusals import unknown
 from loomopt.maths.systems import Number
 from loomopt.model.limits import Limit
-from loomopt.model.model import Formula, Instant, JobModel, Row
+from loomopt.model.model import DesignRow, Formula, Instant, JobModel
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst
 from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
-Asked = Mapping[str, Sense]
+Requested = Mapping[str, Sense]
 """Axis → which end of it is sought."""
 FORMS: Mapping[str, type[Objective]] = {"value": Value, "magnitude": Magnitude, "peak": Peak}
 """How an axis says that it is read → the kind of objective that it is."""
@@ -56,7 +56,7 @@ class Traded:
         return self.objective.limits(name, value)
 
 
-def asked_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Asked, origin: str) -> dict[str, Axis]:
+def requested_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Requested, origin: str) -> dict[str, Axis]:
     """Return the axes of the names that are asked for; numbers: those of the scene that are bounded, axes too.
 
     Raises BadInput for a name that is no axis, and for an end that is not offered.
@@ -74,7 +74,11 @@ def asked_of(axes: Mapping[str, Axis], numbers: Iterable[str], asked: Asked, ori
 
 
 def with_axes(
-    program: Program, axes: Mapping[str, Axis], asked: Asked, full: Callable[[str], str], size: Callable[[str], float]
+    program: Program,
+    axes: Mapping[str, Axis],
+    asked: Requested,
+    full: Callable[[str], str],
+    size: Callable[[str], float],
 ) -> tuple[Program, tuple[Traded, ...]]:
     """Return a program whose last levels are the axes in the order asked for, and what they are.
 
@@ -122,8 +126,8 @@ def opposing(model: JobModel, rows: tuple[str, ...]) -> JobModel:
     return replace(model, own_rows={**model.own_rows, **{opposite(row): _opposed(model, row) for row in rows}})
 
 
-def _opposed(model: JobModel, name: str) -> Row:
-    own = model.own_rows.get(name) or Row(functools.partial(_read, name), () if model.has_row(name) else (name,))
+def _opposed(model: JobModel, name: str) -> DesignRow:
+    own = model.own_rows.get(name) or DesignRow(functools.partial(_read, name), () if model.has_row(name) else (name,))
     return own._replace(formula=functools.partial(_negative, own.formula))
 
 

@@ -11,7 +11,7 @@ from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Group, Kinematics
-from loomopt.model.model import Instant, Row
+from loomopt.model.model import DesignRow, Instant
 from loomopt.model.sampling import KEPT, Sampler
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
@@ -55,7 +55,7 @@ def _turned(steady: Sampler, motor: Speed) -> Sampler:
         return np.asarray(motor.motor(system, omega, known, own) - taken)
 
     turning = solved(steady.cycle.starts, float(given.values["speed"]), surplus)
-    rows = {name: Row(functools.partial(_row, motor, name)) for name in motor.rows}
+    rows = {name: DesignRow(functools.partial(_row, motor, name)) for name in motor.rows}
     moved = replace(
         model,
         kinematics=TurnedCrank(model.kinematics, steady.cycle, turning),

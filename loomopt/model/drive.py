@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable
 
 from loomopt.maths.systems import Number
-from loomopt.model.model import Instant, Quantity
+from loomopt.model.model import CycleQuantity, Instant
 from loomopt.physics.effects.kinds import Effect, Load, Speed, State
 from loomopt.physics.schema import Figure
 
@@ -24,22 +24,22 @@ KINDS = {SPEED: "angular speed", MOTOR: "torque"}
 """What is told over the cycle of a crank whose speed changes: its speed, and the motor's own torque."""
 
 
-def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, Quantity]:
+def quantities(effects: Iterable[Effect], known: Collection[str]) -> dict[str, CycleQuantity]:
     """Return torque, N·m, and power, W, of the crank as effects load it; none without a load, no power without speed.
 
     known: names of scene numbers that are given.
     """
     if not any(isinstance(effect, Load | State) for effect in effects):
         return {}
-    found = {TORQUE: Quantity(lambda at: at.crank_torque)}
-    return found | ({POWER: Quantity(lambda at: motor_power(at, at.crank_torque))} if "speed" in known else {})
+    found = {TORQUE: CycleQuantity(lambda at: at.crank_torque)}
+    return found | ({POWER: CycleQuantity(lambda at: motor_power(at, at.crank_torque))} if "speed" in known else {})
 
 
-def motion() -> dict[str, Quantity]:
+def motion() -> dict[str, CycleQuantity]:
     """Return the speed of a crank, rad/s, and the motor's torque, N·m, which differ from its mean and the crank's."""
     return {
-        SPEED: Quantity(lambda at: at.pose.omega, figure=False),
-        MOTOR: Quantity(lambda at: motor_torque(at, at.crank_torque), figure=False),
+        SPEED: CycleQuantity(lambda at: at.pose.omega, figure=False),
+        MOTOR: CycleQuantity(lambda at: motor_torque(at, at.crank_torque), figure=False),
     }
 
 

@@ -90,7 +90,7 @@ class Instant:
 Formula = Callable[[Instant], Number]
 
 
-class Quantity(NamedTuple):
+class CycleQuantity(NamedTuple):
     """A whole-cycle quantity; figure: whether its largest |value| is one.
 
     signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
@@ -105,7 +105,7 @@ class Quantity(NamedTuple):
     loaded: bool = False
 
 
-class Row(NamedTuple):
+class DesignRow(NamedTuple):
     """A value of the design alone, or of the position at an event; needs: scene numbers without which there is none."""
 
     formula: Formula
@@ -216,10 +216,10 @@ def state_value(state: State, formula: Callable[[Moved], Number], sign: int, at:
     return formula(read_at(state, at)) if sign > 0 else -formula(read_at(state, at))
 
 
-def state_quantities(states: Sequence[State]) -> dict[str, Quantity]:
+def state_quantities(states: Sequence[State]) -> dict[str, CycleQuantity]:
     """Return what states tell over the cycle; of a least value its opposite, which is no figure."""
     return {
-        name: Quantity(
+        name: CycleQuantity(
             functools.partial(state_value, state, peak.read, -1 if peak.least else 1), not peak.least, signed=peak.least
         )
         for state in states
@@ -241,7 +241,7 @@ def uncovered(effects: Sequence[Effect], own: Mapping[str, Values]) -> tuple[str
     return tuple(each.rests(own[each.name]) for each in effects if isinstance(each, State | Event))
 
 
-__all__ = ["Formula", "Instant", "Integral", "JobModel", "Quantity", "Row", "Stills"]
+__all__ = ["CycleQuantity", "DesignRow", "Formula", "Instant", "Integral", "JobModel", "Stills"]
 
 Stills = Mapping[str, Values]
 """Event → the switches just before it, by name."""
@@ -260,8 +260,8 @@ class JobModel:
     kinematics: Kinematics
     effects: tuple[Effect, ...] = ()
     words: tuple[tuple[str, str, str], ...] = ()
-    own_quantities: Mapping[str, Quantity] = field(default_factory=dict)
-    own_rows: Mapping[str, Row] = field(default_factory=dict)
+    own_quantities: Mapping[str, CycleQuantity] = field(default_factory=dict)
+    own_rows: Mapping[str, DesignRow] = field(default_factory=dict)
     arcs: tuple[Arcs, ...] = ()
     integrals: tuple[Integral, ...] = ()
     assembled: Mapping[str, tuple[str, float]] = field(default_factory=dict)
@@ -322,30 +322,32 @@ class JobModel:
     # Quantities and rows.
 
     @lazy
-    def _quantities(self) -> dict[str, Quantity]:
+    def _quantities(self) -> dict[str, CycleQuantity]:
         found = dict(self.own_quantities)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.quantities.items():
-                found[prefix + name] = Quantity(functools.partial(group_value, formula), figure=False)
+                found[prefix + name] = CycleQuantity(functools.partial(group_value, formula), figure=False)
         for check in self.checks:
             for name in check.quantities:
-                found[name] = Quantity(functools.partial(check_value, check, name))
+                found[name] = CycleQuantity(functools.partial(check_value, check, name))
         if not self.states:
             return found
 
         return found | state_quantities(self.states)
 
     @lazy
-    def _rows(self) -> dict[str, Row]:
+    def _rows(self) -> dict[str, DesignRow]:
         found = dict(self.own_rows)
         for prefix, group in self.kinematics.groups.items():
             for name, formula in group.rows.items():
-                found[name if name in group.margins else prefix + name] = Row(functools.partial(design_value, formula))
+                found[name if name in group.margins else prefix + name] = DesignRow(
+                    functools.partial(design_value, formula)
+                )
         for check in self.checks:
-            found |= {name: Row(functools.partial(check_row, check, name)) for name in check.rows}
+            found |= {name: DesignRow(functools.partial(check_row, check, name)) for name in check.rows}
         return {name: row for name, row in found.items() if self._sufficed(row)}
 
-    def _sufficed(self, row: Row) -> bool:
+    def _sufficed(self, row: DesignRow) -> bool:
         known = not self.known or self.known.issuperset(row.needs)
         return known and (not row.event or any(load.acts == "output" for load in self.loads))
 

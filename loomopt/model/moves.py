@@ -10,7 +10,7 @@ Numbers = Mapping[str, float]
 LEAST_CHANGE = "least change from today"
 
 
-class Wish(NamedTuple):
+class Preference(NamedTuple):
     """Where along a move the silent levels would go, and why: to today's values, to the least or to the most.
 
     when, above: it holds where that variable exceeds that value, SI; "" for always.
@@ -36,19 +36,19 @@ class Move(abc.ABC):
 
     name: str
     along: tuple[str, ...]
-    wishes: tuple[Wish, ...]
+    wishes: tuple[Preference, ...]
     today: Numbers
     bounds: Mapping[str, tuple[float, float]]
 
     is_apart: ClassVar[bool]
     """Whether each variable changes by itself."""
 
-    def wished(self, values: Numbers) -> Wish | None:
+    def wished(self, values: Numbers) -> Preference | None:
         """Return the first wish that holds at these values (SI)."""
         return next((wish for wish in self.wishes if not wish.when or values[wish.when] > wish.above), None)
 
     @abc.abstractmethod
-    def goal(self, wish: Wish, x: Numbers) -> dict[str, float]:
+    def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
         """Return where a wish would go from x (SI), within the bounds; nothing where there is no room."""
 
     @abc.abstractmethod
@@ -70,7 +70,7 @@ class AxisMove(Move):
 
     is_apart = True
 
-    def goal(self, wish: Wish, x: Numbers) -> dict[str, float]:
+    def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
         """Return where a wish would go from x (SI), within the bounds; nothing where there is no room."""
         goal = {}
         for name in self.along:
@@ -94,7 +94,7 @@ class ScaleMove(Move):
 
     is_apart = False
 
-    def goal(self, wish: Wish, x: Numbers) -> dict[str, float]:
+    def goal(self, wish: Preference, x: Numbers) -> dict[str, float]:
         """Return x scaled in common: nearest to today's, in bound widths, or as small or as large as bounds allow."""
         widths = {name: self.bounds[name][1] - self.bounds[name][0] for name in self.along}
         if min(widths.values()) <= 0.0 or not any(x[name] for name in self.along):

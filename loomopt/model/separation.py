@@ -63,7 +63,7 @@ Forms = dict[str, tuple[Linear, ...]]
 """Name of a load of the output → its linear form in each zone of the output's position."""
 
 
-class Sizes(NamedTuple):
+class ProbeSizes(NamedTuple):
     """Of the output held on its mechanism: stroke, m, largest speed, m/s, and acceleration, m/s²."""
 
     stroke: float
@@ -71,12 +71,12 @@ class Sizes(NamedTuple):
     acceleration: float
 
 
-def sizes(sampler: Sampler) -> Sizes:
+def sizes(sampler: Sampler) -> ProbeSizes:
     """Return the sizes of the output's motion."""
     pieces, u = sampler.grid(SAMPLES)
     pose = sampler.model.instant(systems.numpy(), sampler.given, sampler.node(pieces, u)).pose
     rates = (float(np.abs(values).max()) for values in (pose.velocity, pose.acceleration))
-    return Sizes(*(size or 1.0 for size in (float(np.ptp(pose.q)), *rates)))
+    return ProbeSizes(*(size or 1.0 for size in (float(np.ptp(pose.q)), *rates)))
 
 
 def forms(sampler: Sampler, event: Event) -> Forms:

@@ -11,7 +11,7 @@ from loomopt.model.drive import motor
 from loomopt.model.model import JobModel
 from loomopt.physics import balance
 from loomopt.physics.balance import Acting, Given
-from loomopt.physics.effects.kinds import Check, Event, Load, Motion, State, Terms
+from loomopt.physics.effects.kinds import Check, Event, EventTerms, Load, Motion, State
 from loomopt.physics.schema import Values
 from loomopt.picture.equations import (
     Case,
@@ -177,7 +177,7 @@ def event_equations(model: JobModel, poses: tuple[Motion, Motion], known: Given,
     total = sum(symbol(f"{letter}_{load.name}") for load in output)
     mass = sum(form.coeff(poses[0].q2) for form in forward) / omega**2
     friction = sum((one - other) / 2 for one, other in zip(forward, back, strict=True))
-    terms = Terms(symbol, total, sp.simplify(friction), sp.simplify(mass))
+    terms = EventTerms(symbol, total, sp.simplify(friction), sp.simplify(mass))
     rules = [rule for event in model.effects if isinstance(event, Event) for rule in event.rules(terms)]
     return [relation(each.name, sp.sympify(each.left), each.sign, sp.sympify(each.right), each.where) for each in rules]
 

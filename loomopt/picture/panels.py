@@ -15,7 +15,7 @@ from loomopt.model.model import read_at
 from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Check, Load, Speed, State
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.tables import Limit
+from loomopt.scenes.tables import LimitRange
 
 EXTREMES = ("peak", "most", "least")
 """What of a curve may be marked: its largest magnitude, its largest and its least value."""
@@ -138,7 +138,7 @@ def _timed(known: Collection[str], speed: float) -> dict[str, tuple[str, float]]
     return {name: instead.get(name, (name, 1.0)) for name in known if name not in shown}
 
 
-def _levels(curve: Curve, limits: Mapping[str, Limit], scale: float) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _levels(curve: Curve, limits: Mapping[str, LimitRange], scale: float) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Yield the limits on a curve's figures as levels; scale: of the curve to its figures."""
     for figure in (curve.peak, curve.most, curve.least, *curve.at.values()):
         limit = limits.get(figure)

@@ -39,7 +39,7 @@ class Box(NamedTuple):
         return min(max(x, self.left), self.right), min(max(y, self.bottom), self.top)
 
 
-class Wish(NamedTuple):
+class LabelWish(NamedTuple):
     """A box wanted beside a point, the first of `near` best, on the side an angle points to, rad."""
 
     near: Sequence[tuple[float, float]]
@@ -48,7 +48,7 @@ class Wish(NamedTuple):
     height: float
 
 
-class Spot(NamedTuple):
+class LabelSpot(NamedTuple):
     """A box found beside a point (x, y)."""
 
     box: Box
@@ -56,13 +56,13 @@ class Spot(NamedTuple):
     y: float
 
 
-def place(wishes: Iterable[Wish], strokes: Floats, unit: float, leader: float = math.inf) -> list[Spot]:
+def place(wishes: Iterable[LabelWish], strokes: Floats, unit: float, leader: float = math.inf) -> list[LabelSpot]:
     """Return a spot for each wish, in order; strokes: (n, 2) points of what is drawn; unit: a text height.
 
     No box meets a stroke or an earlier box. leader: distance of a box from its point, in text heights, from which on
     a straight line will join the two: that meets no box either.
     """
-    taken: list[Spot] = []
+    taken: list[LabelSpot] = []
     for wish in wishes:
         found = _found(wish, strokes, taken, unit, leader)
         taken.append(found)
@@ -71,7 +71,7 @@ def place(wishes: Iterable[Wish], strokes: Floats, unit: float, leader: float = 
     return taken
 
 
-def _found(wish: Wish, strokes: Floats, taken: Sequence[Spot], unit: float, leader: float) -> Spot:
+def _found(wish: LabelWish, strokes: Floats, taken: Sequence[LabelSpot], unit: float, leader: float) -> LabelSpot:
     """Return the free spot of a wish that costs least, in text heights: of distance, turn and what lies between."""
     best, least = None, math.inf
     for ring in itertools.chain(RINGS, (RINGS[-1] * FARTHER**k for k in itertools.count(1))):
@@ -90,16 +90,16 @@ def _found(wish: Wish, strokes: Floats, taken: Sequence[Spot], unit: float, lead
     raise AssertionError("rings go on without end")
 
 
-def _beside(wish: Wish, near: tuple[float, float], gap: float, side: float) -> Spot:
+def _beside(wish: LabelWish, near: tuple[float, float], gap: float, side: float) -> LabelSpot:
     """Return the wish's box at a gap from a point in the direction of an angle, rad."""
     across, up = math.cos(side), math.sin(side)
     half_width, half_height = wish.width / 2, wish.height / 2
     reach = gap + min(half_width / max(abs(across), 1e-9), half_height / max(abs(up), 1e-9))
     x, y = near[0] + reach * across, near[1] + reach * up
-    return Spot(Box(x - half_width, y - half_height, x + half_width, y + half_height), *near)
+    return LabelSpot(Box(x - half_width, y - half_height, x + half_width, y + half_height), *near)
 
 
-def _free(boxes: Floats, strokes: Floats, taken: Sequence[Spot], room: float) -> NDArray[np.bool_]:
+def _free(boxes: Floats, strokes: Floats, taken: Sequence[LabelSpot], room: float) -> NDArray[np.bool_]:
     """Say of each box, (n, 4), whether no stroke and no box that is taken comes nearer to it than `room`."""
     left, bottom, right, top = (boxes + np.array([-room, -room, room, room])).T[:, :, None]
     x, y = strokes[_within(strokes, left.min(), bottom.min(), right.max(), top.max())].T
@@ -116,18 +116,18 @@ def _within(points: Floats, left: float, bottom: float, right: float, top: float
     return np.asarray((x > left) & (x < right) & (y > bottom) & (y < top))
 
 
-def _gap(spot: Spot) -> float:
+def _gap(spot: LabelSpot) -> float:
     """Return how far a spot's box is from its point."""
     return math.dist(spot.box.nearest(spot.x, spot.y), (spot.x, spot.y))
 
 
-def _between(spot: Spot, unit: float) -> Floats:
+def _between(spot: LabelSpot, unit: float) -> Floats:
     """Return points from a spot's point to its box, (n, 2)."""
     end = spot.box.nearest(spot.x, spot.y)
     return np.linspace((spot.x, spot.y), end, 2 + int(_gap(spot) / (STEP * unit)))
 
 
-def _meets(way: Floats, taken: Sequence[Spot], unit: float) -> bool:
+def _meets(way: Floats, taken: Sequence[LabelSpot], unit: float) -> bool:
     """Say whether a way comes too near to a box that is taken."""
     r = CLEAR * unit
     boxes = (spot.box for spot in taken)

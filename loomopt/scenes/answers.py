@@ -14,7 +14,7 @@ MOST_TOLD, LONGEST_TOLD = 8, 200
 """Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""
 
 
-class Handed(NamedTuple):
+class DesignGiven(NamedTuple):
     """What a design file brings: a design, unchecked; the scene it holds in; an answer's target and status."""
 
     design: object
@@ -23,17 +23,17 @@ class Handed(NamedTuple):
     status: str | None = None
 
 
-def read(path: Path, scene: Scene) -> Handed:
+def read(path: Path, scene: Scene) -> DesignGiven:
     """Return what a design file brings; a design alone holds in `scene`, a whole answer in its own. Raises BadInput."""
     data = designs.loaded(path)
     if not isinstance(data, dict) or "design" not in data:
-        return Handed(data, scene)
+        return DesignGiven(data, scene)
     target, own = data.get("target"), data.get("scene")
     if target is not None and not isinstance(target, str):
         raise refusal("the target is no name", str(path), "target", target, remedy="Correct it or take it out")
     status = data.get("status")
     whole = scene if own is None else _resumed(own, scene, str(path))
-    return Handed(data["design"], whole, target, status if isinstance(status, str) else None)
+    return DesignGiven(data["design"], whole, target, status if isinstance(status, str) else None)
 
 
 def _resumed(own: object, scene: Scene, origin: str) -> Scene:

@@ -11,7 +11,7 @@ from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table
 from loomopt.scenes.document import looked_up
 from loomopt.scenes.schema import SceneSchema
-from loomopt.scenes.tables import Bound, Limit, table
+from loomopt.scenes.tables import Bound, LimitRange, table
 
 KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
 """Key of [display] → kind of quantity."""
@@ -49,7 +49,7 @@ def units(
     document: Mapping[str, Any],
     schema: SceneSchema,
     active: Iterable[Effect],
-    ranges: tuple[Mapping[str, Bound], Mapping[str, Limit]],
+    ranges: tuple[Mapping[str, Bound], Mapping[str, LimitRange]],
 ) -> dict[str, str]:
     """Return the unit of every kind of quantity; ranges: [bounds] and [limits], which come after the scene's numbers.
 
@@ -85,7 +85,7 @@ def _written(
     document: Mapping[str, Any],
     schema: SceneSchema,
     active: Iterable[Effect],
-    ranges: tuple[Mapping[str, Bound], Mapping[str, Limit]],
+    ranges: tuple[Mapping[str, Bound], Mapping[str, LimitRange]],
 ) -> Iterator[tuple[str, str]]:
     """Yield each quantity's kind with the unit it is written in, in the order in which the first one counts."""
     tables: list[tuple[tuple[str, ...], type[Table]]] = [

@@ -14,7 +14,7 @@ from loomopt.scenes import display
 from loomopt.scenes import tables as read
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
 from loomopt.scenes.schema import SceneSchema
-from loomopt.scenes.tables import Bound, JobNames, Limit
+from loomopt.scenes.tables import Bound, JobNames, LimitRange
 
 _Own = TypeVar("_Own", bound=Table)
 
@@ -55,7 +55,7 @@ class Scene(Shown):
     effects: Mapping[str, Table]
     active: tuple[Effect, ...]
     bounds: Mapping[str, Bound]
-    limits: Mapping[str, Limit]
+    limits: Mapping[str, LimitRange]
     targets: Mapping[str, Table]
     paths: Paths = field(compare=False)
 

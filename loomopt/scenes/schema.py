@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from loomopt.base.records import lazy
-from loomopt.base.units import Shown
+from loomopt.base.units import ShowValue
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
 
@@ -36,7 +36,7 @@ class SceneSchema:
     own_figures: Mapping[str, Figure]
     targets: Mapping[str, Target]
     default_target: str
-    fault: Callable[[Mapping[str, float], Shown], str]
+    fault: Callable[[Mapping[str, float], ShowValue], str]
     needs: tuple[str, ...] = ()
     own_margins: Mapping[str, str] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

@@ -47,7 +47,7 @@ class Bound(NamedTuple):
     unit: str
 
 
-class Limit(NamedTuple):
+class LimitRange(NamedTuple):
     """Range in which a figure is kept, SI; None: that side is open; unit: as written."""
 
     min: float | None
@@ -241,7 +241,7 @@ def _bound(raw: object, quantity: Quantity, origin: str, key: str) -> Bound:
     return Bound(low, high, free, _unit(raw["min"]))
 
 
-def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, Limit]:
+def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, LimitRange]:
     """Return [limits]: figures of the job, and of the effects that are on."""
     inner = flat(raw, schema.figures, origin, "limits")
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
@@ -257,7 +257,7 @@ def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: s
     return {name: _limit(inner[name], schema.figures[name], name, origin) for name in inner}
 
 
-def _limit(raw: object, figure: Figure, name: str, origin: str) -> Limit:
+def _limit(raw: object, figure: Figure, name: str, origin: str) -> LimitRange:
     key = f"limits.{name}"
     sides = " and ".join(figure.sides)
     if not isinstance(raw, Mapping):
@@ -274,7 +274,7 @@ def _limit(raw: object, figure: Figure, name: str, origin: str) -> Limit:
     found = {side: _value(quantity, value, origin, f"{key}.{side}") for side, value in raw.items()}
     if len(found) == 2:
         _ordered(raw, found["min"], found["max"], origin, key)
-    return Limit(found.get("min"), found.get("max"), _unit(next(iter(raw.values()))))
+    return LimitRange(found.get("min"), found.get("max"), _unit(next(iter(raw.values()))))
 
 
 def _known_keys(raw: Mapping[str, Any], known: tuple[str, ...], origin: str, key: str) -> None:

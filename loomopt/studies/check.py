@@ -17,7 +17,7 @@ from loomopt.solving.answer.solution import Solution
 from loomopt.solving.answer.words import Words, grouped
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.run import run
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,12 +124,12 @@ def checked_front(study: trade.Trade, then: "pd.DataFrame") -> Iterator[tuple[st
     for place in dict.fromkeys((*ends, *_front_between(values))):
         near = _front_start(study, {str(name): str(cell) for name, cell in then.iloc[place].items()})
         if place in ends:
-            task = Task(ends.index(place), None, {}, {"end": ends.index(place), "also": near})
+            task = StudyTask(ends.index(place), None, {}, {"end": ends.index(place), "also": near})
             parent = None
         else:
             parent = rows[min(ends, key=lambda end: abs(values[end] - values[place]))]
             ask = {"also": near, "held": rows[ends[0]].warm.get("held", []), "wide": False}
-            task = Task(place, parent.point, {second: float(then[asked].iloc[place])}, ask)
+            task = StudyTask(place, parent.point, {second: float(then[asked].iloc[place])}, ask)
         rows[place] = row = study.solved(task, parent if parent and parent.certified else None)
         spot = f"{second} {words.shown(second, values[place])}"
         if not row.certified:

@@ -25,7 +25,7 @@ from loomopt.solving.nlp.point import Point
 from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.run import warm
 from loomopt.studies.run.findings import Change, Findings
-from loomopt.studies.run.rows import Multiplier, Row, Side, Task
+from loomopt.studies.run.rows import Multiplier, Row, Side, StudyTask
 
 COARSE = 8
 """Steps of each axis between two points that are searched from scratch; a power of two."""
@@ -84,7 +84,7 @@ Over = Mapping[str, str | Sequence[str | float]]
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweptNumber:
     """A number to be swept: its key, its values as a scene gives them, and in SI; kind: of quantity."""
 
     key: str
@@ -109,7 +109,7 @@ class Sweep:
 
     scene: Scene
     target: str
-    axes: tuple[Axis, ...]
+    axes: tuple[SweptNumber, ...]
     accuracy: float
     seed: int
     cold: bool
@@ -173,7 +173,7 @@ class Sweep:
         """Its points."""
         return Lattice(tuple(axis.ranks for axis in self.axes))
 
-    def batch(self, rows: Sequence[Row]) -> list[Task]:
+    def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
         """Return the tasks of the next round, from all rows of earlier ones."""
         rounds = [list(range(self.size))] if self.cold else self.lattice.rounds
         done = list(itertools.accumulate(map(len, rounds), initial=0)).index(len(rows))
@@ -181,18 +181,18 @@ class Sweep:
         usable = sorted(known)
         return [self._task(point, usable, known) for point in (rounds[done] if done < len(rounds) else ())]
 
-    def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> Task:
+    def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> StudyTask:
         places = zip(self.axes, self.lattice.places(point), strict=True)
         parent, *beyond = self.lattice.neighbours(point, usable) if usable else [None]
         ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
-        return Task(point, parent, {axis.key: axis.values[k] for axis, k in places}, ask)
+        return StudyTask(point, parent, {axis.key: axis.values[k] for axis, k in places}, ask)
 
     def scene_at(self, point: int) -> Scene:
         """Return the scene of a point. Raises BadInput for a combination that is none."""
         places = zip(self.axes, self.lattice.places(point), strict=True)
         return self.scene.update({axis.key: axis.texts[k] for axis, k in places})
 
-    def solve(self, task: Task, parent: Row | None) -> Solution:
+    def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Return the answer of a task. Raises BadInput for a combination that is no scene."""
         scene = self.scene_at(task.point)
         program = registry.of(scene).program(scene, self.target)
@@ -200,7 +200,7 @@ class Sweep:
         near: list[Point] = [point for data in starts if (point := warm.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
-    def _warm(self, task: Task, answer: Solution) -> dict[str, object]:
+    def _warm(self, task: StudyTask, answer: Solution) -> dict[str, object]:
         """Return what a neighbour can start from."""
         scene = self.scene_at(task.point)
         return warm.written(answer.point, registry.of(scene).program(scene, self.target))
@@ -222,7 +222,7 @@ class Sweep:
         line = sorted(rows, key=lambda row: (*row.place.values(), row.point)) if len(self.axes) == 1 else []
         return Findings(tuple(rows), "", tuple(_changes(line)), tuple(_gaps(line)))
 
-    def solved(self, task: Task, parent: Row | None) -> Row:
+    def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task. Raises BadInput for a combination that is no scene."""
         answer = self.solve(task, parent)
         passed = answer.certificate is not None and answer.certificate.passed
@@ -312,7 +312,9 @@ def _values(given: str | Sequence[str | float], key: str) -> Sequence[str | floa
     return arguments.listed(given, key, f"{numbers.FORM}, or a list of values", remedy)
 
 
-def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]) -> Axis:
+def _axis(
+    base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Mapping[str, str | float]]
+) -> SweptNumber:
     """Return an axis, each of whose values makes a scene with the first or the last values of the others.
 
     Raises BadInput.
@@ -330,4 +332,4 @@ def _axis(base: Scene, key: str, texts: Sequence[str | float], ends: Sequence[Ma
             if len(ends[0]) == 1:
                 raise
             base.update({**ends[-1], key: text})
-    return Axis(key, tuple(texts), tuple(values), kind.kind)
+    return SweptNumber(key, tuple(texts), tuple(values), kind.kind)

@@ -17,9 +17,9 @@ EFFECT = '''"""Clock spring on the rocking shaft: output term T."""
 
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Load
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Maths; from loomopt.maths.systems import Number
 from loomopt.base.quantities import Torque
-from loomopt.physics.schema import Table, Values
+from loomopt.physics.schema import Table; from loomopt.physics.schema import Values
 
 
 class Own(Table):
@@ -127,7 +127,7 @@ def test_a_new_job_is_its_folders_its_scene_and_its_reference_rows(copy):
 
 COMMAND = '''"""The command that counts the effects of a scene."""
 
-from loomopt.interface.cli.commands import Problem, Set
+from loomopt.interface.cli.commands import Problem; from loomopt.interface.cli.commands import Set
 from loomopt.interface.cli.shell import read_scene
 
 
@@ -167,7 +167,10 @@ def test_a_new_command_is_its_file_and_a_row_of_the_commands(copy):
     text = (copy.folder / name).read_text(encoding="utf-8")
     copy.write(
         name,
-        text.replace("from loomopt.interface.cli import commands", "from loomopt.interface.cli import commands, count"),
+        text.replace(
+            "from loomopt.interface.cli import commands",
+            "from loomopt.interface.cli import commands; from loomopt.interface.cli import count",
+        ),
     )
     assert copy.loomopt("count", "beatup") == "2\n"
     assert "count" in copy.loomopt("--help")

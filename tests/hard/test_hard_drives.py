@@ -14,7 +14,7 @@ from hard_digits import MP, TIME_STEP, angle, centres, exact, worst_ulps
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 from reference import crank_rocker_synthesis, sley_synthesis
 
 # Synthesis: θ → 0, K → 1 -----------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ def drive_rates(*data):
 def spans():
     """Return crank angles and the distance from C to B2 there, of today's drive."""
     phi = np.linspace(0, 2 * math.pi, 200_001)
-    base = Pose(systems.numpy(), TODAY, Sley(systems.FLOAT, TODAY).stand, phi).base
+    base = RapierPose(systems.numpy(), TODAY, Sley(systems.FLOAT, TODAY).stand, phi).base
     return phi, np.hypot(base.x, base.y)
 
 
@@ -101,7 +101,7 @@ def nearly_singular(side, gap):
 def test_a_five_bar_near_its_singular_position_to_two_ulps_times_condition(side, gap):
     d, place = nearly_singular(side, gap)
     for off in (0, 1e-8, -1e-5, 1e-3):
-        pose = Pose(systems.FLOAT, d, Sley(systems.FLOAT, d).stand, place + off)
+        pose = RapierPose(systems.FLOAT, d, Sley(systems.FLOAT, d).stand, place + off)
         data = [*(getattr(d, key) for key in KEYS), place + off]
         assert worst_ulps((pose.phi63_1, pose.phi63_2), drive_rates, data) <= 2
 

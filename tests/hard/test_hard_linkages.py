@@ -14,7 +14,7 @@ import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.effects.beatup import inertia
 from loomopt.physics.mechanisms import crank_rocker, dyad
-from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose, Lengths, dead_centres
 
 DRAWS = 25
 
@@ -99,7 +99,7 @@ def sides_of(lengths):
 @pytest.mark.parametrize("name", CASES)
 def test_positions_and_rates_to_a_few_ulps_times_condition(name):
     for lengths, phi in draws(name):
-        pose = Pose(systems.FLOAT, lengths, phi)
+        pose = CrankRockerPose(systems.FLOAT, lengths, phi)
         found = pose.psi, pose.psi_1, pose.psi_2
         assert worst_ulps(found, motion(lengths.side), [*sides_of(lengths), phi]) <= CASES[name][2]
 
@@ -124,7 +124,11 @@ def test_a_rod_of_1e6_cranks_and_a_short_rocker_to_1e_9_rad(name):
     For that front and rear move apart; in ulps times condition it is up to 400.
     """
     for lengths, phi in draws(name, SHORT_ROCKERS):
-        data, pose, stands = sides_of(lengths), Pose(systems.FLOAT, lengths, phi), dead_centres(systems.FLOAT, lengths)
+        data, pose, stands = (
+            sides_of(lengths),
+            CrankRockerPose(systems.FLOAT, lengths, phi),
+            dead_centres(systems.FLOAT, lengths),
+        )
         found = [pose.psi, pose.psi_1, pose.psi_2, *(getattr(stands, of) for of in CENTRES)]
         true = [*motion(lengths.side)(*exact(*data, phi)), *centres(lengths.side)(*exact(*data))]
         most = max(float(abs(MP.mpf(one) - other)) for one, other in zip(found, true, strict=True))
@@ -135,7 +139,7 @@ def test_a_rod_of_1e6_cranks_and_a_short_rocker_to_1e_9_rad(name):
 def test_the_branch_never_flips(name):
     """Even where the condition allows no digit: C stays on its side, ψ within 1e-6 rad of the true branch."""
     for lengths, phi in draws(name):
-        pose = Pose(systems.FLOAT, lengths, phi)
+        pose = CrankRockerPose(systems.FLOAT, lengths, phi)
         true = motion(lengths.side)(*exact(*sides_of(lengths), phi))[0]
         assert abs(MP.sin((MP.mpf(pose.psi) - true) / 2)) < 1e-6
         assert math.copysign(1, pose.dyad.area4) == lengths.side

@@ -25,7 +25,7 @@ ANGLES = (0.0, 0.4, 1.15, 2.5, 3.3, 4.7, 6.2)
 
 
 def position_figures(m, lengths, phi):
-    pose = crank_rocker.Pose(m, lengths, phi)
+    pose = crank_rocker.CrankRockerPose(m, lengths, phi)
     names = ("psi", "psi_1", "psi_2", "rod_1", "rod_2", "cos_crank_rod", "sin_crank_rod")
     return {name: getattr(pose, name) for name in names}
 

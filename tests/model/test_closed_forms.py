@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_up import CLOTH, INERTIA, NUMBERS, SPRING, Yoke
 
-from loomopt.model.model import Integral, JobModel, Quantity
+from loomopt.model.model import CycleQuantity, Integral, JobModel
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN
 
@@ -16,10 +16,10 @@ MODEL = JobModel(
     Yoke(),
     (INERTIA, SPRING),
     own_quantities={
-        "force": Quantity(lambda at: at.force),
-        "torque": Quantity(lambda at: at.crank_torque),
-        "pushed": Quantity(lambda at: at.force, signed=True),
-        "square": Quantity(lambda at: at.force**2),
+        "force": CycleQuantity(lambda at: at.force),
+        "torque": CycleQuantity(lambda at: at.crank_torque),
+        "pushed": CycleQuantity(lambda at: at.force, signed=True),
+        "square": CycleQuantity(lambda at: at.force**2),
     },
     integrals=(Integral("mean", "", "force"), Integral("mean_square", "rms", "square")),
 )

@@ -15,7 +15,7 @@ from made_up import CLOTH, FRONT, INERTIA, NUMBERS, SPRING, Yoke
 
 from loomopt.maths import systems
 from loomopt.model.limits import DesignLimit
-from loomopt.model.model import JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, JobModel
 from loomopt.model.objectives import Peak
 from loomopt.model.program import Program, Variable
 from loomopt.model.reading import Reading
@@ -68,8 +68,8 @@ DRAG = Load(name="drag", summary="", own=Table, acts="drive", force=drag)
 STIFF = JobModel(
     Yoke(),
     (INERTIA, SPRING, CLOTH, DRAG),
-    own_quantities={"torque": Quantity(lambda at: at.crank_torque), "force": Quantity(lambda at: at.force)},
-    own_rows={"front_force": Row(lambda at: at.force, event=FRONT)},
+    own_quantities={"torque": CycleQuantity(lambda at: at.crank_torque), "force": CycleQuantity(lambda at: at.force)},
+    own_rows={"front_force": DesignRow(lambda at: at.force, event=FRONT)},
 )
 ELASTIC = replace(STIFF, effects=(*STIFF.effects, ARM))
 WITH_ARM = {**NUMBERS, "arm.ratio": 0.5}

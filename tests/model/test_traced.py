@@ -17,7 +17,7 @@ from loomopt.jobs import registry
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.model import reading
-from loomopt.model.model import JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, JobModel
 from loomopt.model.reading import DATUM, Quantities
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import Session, current, working
@@ -184,8 +184,8 @@ def test_a_formula_that_raises_raises_the_same():
 
 def yoke(**quantities):
     """Return a machine of a model of its own, so that nothing was asked of it before."""
-    own = {"torque": Quantity(lambda at: at.crank_torque), **quantities}
-    rows = {"front_force": Row(lambda at: at.force, event=FRONT)}
+    own = {"torque": CycleQuantity(lambda at: at.crank_torque), **quantities}
+    rows = {"front_force": DesignRow(lambda at: at.force, event=FRONT)}
     return JobModel(Yoke(), (INERTIA, SPRING, CLOTH), own_quantities=own, own_rows=rows)
 
 
@@ -229,7 +229,7 @@ def read_as_float(at):
 
 @pytest.mark.parametrize("formula", [decided, read_as_float])
 def test_a_formula_that_cannot_be_recorded_is_run_as_it_is(formula, made, monkeypatch):
-    model = yoke(odd=Quantity(formula))
+    model = yoke(odd=CycleQuantity(formula))
     sampler = Sampler(model, NUMBERS)
     pieces, u = sampler.grid()
     before = sampler.at("odd", pieces, u)

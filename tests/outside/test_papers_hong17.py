@@ -163,7 +163,7 @@ def test_the_packaged_scene_is_what_is_printed_on_the_layout_in_closed_form():
 def test_the_second_crank_stands_on_the_main_shafts_vertical_below_it():
     """The layout as drawn: A0 = (0.461034, 0.620465) m, C0 = (0.461034, 0.234217) m."""
     at_front = dataclasses.replace(PRINTED, **built())
-    pose = rapier_drive.Pose(systems.FLOAT, at_front, Sley(systems.FLOAT, at_front).stand, 0.0)
+    pose = rapier_drive.RapierPose(systems.FLOAT, at_front, Sley(systems.FLOAT, at_front).stand, 0.0)
     A0, C0 = pose.joints["A0"], pose.joints["C0"]
     assert (A0.x, A0.y) == (pytest.approx(0.461034, abs=6e-7), pytest.approx(0.620465, abs=6e-7))
     assert (C0.x, C0.y) == (pytest.approx(0.461034, abs=6e-7), pytest.approx(0.234217, abs=6e-7))

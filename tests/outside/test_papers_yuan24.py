@@ -80,7 +80,7 @@ def torque_745():
 def bends(lengths, size):
     """Return max ψ'' − min ψ'' ("peak to peak") or max ψ'' ("peak") over the cycle."""
     phi = np.linspace(0, 2 * math.pi, 20_000)
-    psi_2 = crank_rocker.Pose(systems.numpy(), crank_rocker.Lengths(*lengths), phi).psi_2
+    psi_2 = crank_rocker.CrankRockerPose(systems.numpy(), crank_rocker.Lengths(*lengths), phi).psi_2
     return np.max(psi_2) - (np.min(psi_2) if size == "peak to peak" else 0.0)
 
 

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loomopt.jobs.beatup import model as beatup
-from loomopt.jobs.beatup.model import ReedPose
+from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths import systems
 from loomopt.physics import balance
@@ -79,7 +79,7 @@ def torques(names, numbers, phi, rod="exact", omega_dot=None, system=systems.FLO
     switches = {name: load.switch(phi, corners[name]) for name, load in cornered.items()}
     angle = system.number(phi)
     lengths = beatup.linked(given_).lengths
-    pose = ReedPose(angle, given_.values["speed"], crank_rocker.Pose(system, lengths, angle), omega_dot)
+    pose = ReedMotion(angle, given_.values["speed"], crank_rocker.CrankRockerPose(system, lengths, angle), omega_dot)
     arguments = (system, found.loads, pose, given_, switches)
     return balance.output_force(*arguments), balance.crank_torque(*arguments)
 
@@ -197,7 +197,7 @@ def test_friction_turns_the_work_of_a_cycle_into_heat():
     numbers, points = sized(LINKAGES[0]), 4096
     lengths = crank_rocker.Lengths(*LINKAGES[0])
     phi = np.arange(points) * TURN / points
-    psi_1 = crank_rocker.Pose(systems.numpy(), lengths, phi).psi_1
+    psi_1 = crank_rocker.CrankRockerPose(systems.numpy(), lengths, phi).psi_1
     swing = crank_rocker.dead_centres(systems.FLOAT, lengths).swing
     work = np.mean(cycle_of(("bearing_friction",), LINKAGES[0], "exact", points)) * TURN
     heat = 2 * 5.0 * swing + 0.7 * numbers["speed"] * np.mean(psi_1**2) * TURN

@@ -59,7 +59,7 @@ def drawings(job):
     random, scene, found = np.random.default_rng(7), lo.load(job), 0
     while found < MACHINES:
         try:
-            yield outputs.drawing(scene, RANDOM[job](random), outputs.Subject("a machine of random numbers"))
+            yield outputs.drawing(scene, RANDOM[job](random), outputs.DrawnSubject("a machine of random numbers"))
             found += 1
         except (BadInput, ValueError):
             continue
@@ -69,7 +69,7 @@ def drawings(job):
 def test_drawings_of_packaged_scenes_are_clear_today_and_solved(name):
     scene = lo.load(name)
     answer = lo.solve(scene, starts=1)
-    for design, said in (({}, outputs.Subject("today's machine")), (answer.design, outputs.what(answer))):
+    for design, said in (({}, outputs.DrawnSubject("today's machine")), (answer.design, outputs.what(answer))):
         assert clear.faults_of(outputs.drawing(scene, design, said)) == []
 
 

@@ -15,7 +15,7 @@ from loomopt.physics.mechanisms import cam_follower, crank_rocker, rapier_drive
 from loomopt.physics.mechanisms.cam_follower import Follower
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.crank_rocker import Lengths
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 
 TURN = 2 * math.pi
 NEAREST = 1e-9
@@ -72,7 +72,7 @@ def drives(draw):
     moved = {name: getattr(TODAY, name) * (1 + widths[name] * draw(st.floats(-1, 1))) for name in NAMES}
     d = Dimensions(**moved)
     assume(rapier_drive.fault(d) == "")
-    base = Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.linspace(0, TURN, 181)).base
+    base = RapierPose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.linspace(0, TURN, 181)).base
     span = np.hypot(base.x, base.y)
     assume(span.max() * ROOM < d.l5 + d.l6 and span.min() > abs(d.l5 - d.l6) * ROOM)
     return d

@@ -27,10 +27,10 @@ from machines import (
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import cam_spline, crank_rocker
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
-from loomopt.physics.mechanisms.cam_laws import LAWS, Derivatives
-from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from loomopt.physics.mechanisms.cam_laws import LAWS, LawDerivatives
+from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose, Lengths, dead_centres
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
-from loomopt.physics.mechanisms.rapier_drive import Pose as Drive
+from loomopt.physics.mechanisms.rapier_drive import RapierPose as Drive
 from reference import crank_rocker_synthesis, sley_synthesis
 
 MOST = 50
@@ -59,7 +59,7 @@ def test_crank_rocker_angles_and_their_derivatives(lengths, phi):
         l1, l2, l3, l4, angle = numbers
         sized = Lengths(l1, l2, l3, l4, lengths.side)
         spans = {of.__name__: of(system, sized, angle) for of in (crank_rocker.span_far, crank_rocker.span_near)}
-        return named(Pose(system, sized, angle), OF_POSE) | spans
+        return named(CrankRockerPose(system, sized, angle), OF_POSE) | spans
 
     assert_right(formulas, sides_of(lengths), MOST, phi)
 
@@ -68,7 +68,7 @@ def test_crank_rocker_angles_and_their_derivatives(lengths, phi):
 def test_crank_rocker_angles_where_the_linkage_is_nearly_flat(lengths, flat, off, way):
     def formulas(system, *numbers):
         l1, l2, l3, l4, angle = numbers
-        return named(Pose(system, Lengths(l1, l2, l3, l4, lengths.side), angle), OF_POSE)
+        return named(CrankRockerPose(system, Lengths(l1, l2, l3, l4, lengths.side), angle), OF_POSE)
 
     assert_right(formulas, sides_of(lengths), MOST, flat + way * off)
 
@@ -106,7 +106,7 @@ def test_a_kite_that_nearly_folds_on_itself_keeps_its_digits(name):
 @pytest.mark.parametrize(("l4", "phi"), [(0.118, 0.0), (0.101, 0.0), (0.1 + 1e-6, 1e-7)])
 def test_the_third_derivative_of_a_kite_keeps_its_digits(l4, phi):
     def formulas(system, *numbers):
-        return named(Pose(system, Lengths(*numbers[:4]), numbers[4]), ("psi_3",))
+        return named(CrankRockerPose(system, Lengths(*numbers[:4]), numbers[4]), ("psi_3",))
 
     assert_right(formulas, (0.1, 1.0, 1.0, l4), MOST, phi)
 
@@ -236,7 +236,7 @@ def clamped(u, s, share, piece):
     h, chord, begin, end = steps[piece], chords[piece], slopes[piece], slopes[piece + 1]
     bend, jerk, t = (3 * chord - 2 * begin - end) / h, (begin + end - 2 * chord) / h**2, share - u[piece]
     at = s[piece] + t * (begin + t * (bend + t * jerk))
-    return Derivatives(at, begin + t * (2 * bend + 3 * t * jerk), 2 * bend + 6 * t * jerk, 6 * jerk)
+    return LawDerivatives(at, begin + t * (2 * bend + 3 * t * jerk), 2 * bend + 6 * t * jerk, 6 * jerk)
 
 
 @settings(max_examples=25)

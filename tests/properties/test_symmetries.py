@@ -15,9 +15,9 @@ import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import dyad
 from loomopt.physics.mechanisms.cam_follower import Contact
-from loomopt.physics.mechanisms.crank_rocker import Pose, dead_centres
+from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose, dead_centres
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.mechanisms.rapier_drive import Pose as Drive
+from loomopt.physics.mechanisms.rapier_drive import RapierPose as Drive
 from loomopt.physics.mechanisms.rapier_drive import Sley
 
 sizes = powers(-9, 9)
@@ -46,7 +46,7 @@ def assert_alike(found, expected, rel=1e-10):
 @given(crank_rockers(nearest=1e-2), angles, sizes)
 def test_a_crank_rocker_of_another_size_has_the_same_angles(lengths, phi, factor):
     larger = resized(lengths, ("l1", "l2", "l3", "l4"), factor)
-    here, there = (Pose(systems.FLOAT, links, phi) for links in (lengths, larger))
+    here, there = (CrankRockerPose(systems.FLOAT, links, phi) for links in (lengths, larger))
     assert_alike(read(there, CURVES), read(here, CURVES))
     stands, others = (dead_centres(systems.FLOAT, links) for links in (lengths, larger))
     assert_alike(read(others, STANDS), read(stands, STANDS))
@@ -55,8 +55,8 @@ def test_a_crank_rocker_of_another_size_has_the_same_angles(lengths, phi, factor
 @given(crank_rockers(), angles)
 def test_a_crank_rocker_in_a_mirror_that_turns_backward_has_the_same_angles_to_the_last_digit(lengths, phi):
     """y → −y: ψ(−φ) of the other side is −ψ(φ); odd derivatives stay, even ones change their sign."""
-    here = read(Pose(systems.FLOAT, lengths, phi), CURVES)
-    there = Pose(systems.FLOAT, lengths._replace(side=-lengths.side), -phi)
+    here = read(CrankRockerPose(systems.FLOAT, lengths, phi), CURVES)
+    there = CrankRockerPose(systems.FLOAT, lengths._replace(side=-lengths.side), -phi)
     signs = {"psi": -1, "psi_2": -1, "rod_2": -1, "sin_crank_rod": -1}
     assert read(there, CURVES) == [signs.get(name, 1) * value for name, value in zip(CURVES, here, strict=True)]
 

@@ -20,7 +20,7 @@ from loomopt.jobs.beatup.scene import RetrofitTarget, TorqueTarget
 from loomopt.jobs.registry import load, scene
 from loomopt.scenes import packaged
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.tables import Bound, Limit
+from loomopt.scenes.tables import Bound, LimitRange
 from loomopt.studies.check import served
 
 BEATUP = load("beatup")
@@ -61,7 +61,7 @@ def test_the_packaged_scene_reads_in_SI():
     ]
     assert BEATUP.bounds["l1"] == Bound(0.03, 0.035, True, "mm")
     least = BEATUP.limits["mu_min"]
-    assert least == Limit(least.min, None, "deg")
+    assert least == LimitRange(least.min, None, "deg")
     assert least.min == pytest.approx(math.radians(56.5), rel=1e-15)
 
 

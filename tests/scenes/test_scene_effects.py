@@ -14,10 +14,10 @@ from loomopt.jobs.beatup.scene import SCHEMA, Mechanism, Operation, RetrofitTarg
 from loomopt.jobs.registry import load
 from loomopt.model import numbers
 from loomopt.physics.effects.beatup import inertia, rocker_inertia
-from loomopt.physics.effects.kinds import Clash, Load, label, owned, ranked
+from loomopt.physics.effects.kinds import EffectClash, Load, label, owned, ranked
 from loomopt.physics.schema import Figure, Table
 from loomopt.scenes import scene
-from loomopt.scenes.tables import Bound, Limit
+from loomopt.scenes.tables import Bound, LimitRange
 
 BEATUP = load("beatup")
 
@@ -103,7 +103,7 @@ def test_labels_with_dots_may_be_bounded_freed_and_limited():
     assert {"rod.m", "rod.at", "A.x", "l1"} <= set(found.bounds)
     assert found.bounds["rod.m"] == Bound(1.0, 2.0, False, "kg")
     assert found.bounds["A.x"].max == 0.002
-    assert found.limits["rod.tension"] == Limit(None, 5000.0, "kN")
+    assert found.limits["rod.tension"] == LimitRange(None, 5000.0, "kN")
     freed = found.free("rod.m")
     assert freed.bounds["rod.m"].free
     assert freed.set("bounds.rod.m.max", "2500 g").bounds["rod.m"].max == 2.5
@@ -161,7 +161,7 @@ def test_an_effect_that_another_needs_is_asked_for():
 
 
 def test_effects_that_clash_are_refused_naming_both():
-    lone = apart("lone", clashes=(Clash("resistance", "both push the reed"),))
+    lone = apart("lone", clashes=(EffectClash("resistance", "both push the reed"),))
     with pytest.raises(BadInput, match="lone and resistance cannot be on together: both push the reed") as error:
         built({"effects": {"lone": {}}}, lone)
     assert error.value.key == "effects.lone"
@@ -170,7 +170,7 @@ def test_effects_that_clash_are_refused_naming_both():
 
 @pytest.mark.parametrize(("shape", "stands"), [("round", True), ("square", False)])
 def test_effects_may_clash_only_by_a_word_of_the_other(shape, stands):
-    lone = apart("lone", clashes=(Clash("shaped", "it has corners", "shape", ("square", "flat")),))
+    lone = apart("lone", clashes=(EffectClash("shaped", "it has corners", "shape", ("square", "flat")),))
     other = Load(name="shaped", summary="", own=Shaped, acts="drive", force=lambda *_: 0)
     tables = {"effects": {"lone": {}, "shaped": {"shape": shape}}}
     if stands:

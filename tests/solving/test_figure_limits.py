@@ -8,7 +8,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.studies.front import front, plan
-from loomopt.studies.run.rows import Task
+from loomopt.studies.run.rows import StudyTask
 
 DEGREE, RPM = math.pi / 180, math.pi / 30
 PEAKS = {25: 0.672656909, 30: 0.694984754, 35: 0.714035795, 45: 0.751506644}
@@ -70,7 +70,7 @@ def test_the_worth_of_both_dwells_is_the_slope_of_their_front(rapier):
     answer = lo.solve(rapier.set("limits.dwell.min", "35 deg"), starts=1)
     trade = front.trade(rapier, ("peak_acceleration", "dwell"), "stroke-dwell", maximise=("dwell",))
     ask = {"also": [], "held": [], "wide": False}
-    row = trade.solved(Task(0, None, {"dwell": 35 * DEGREE}, ask), None)
+    row = trade.solved(StudyTask(0, None, {"dwell": 35 * DEGREE}, ask), None)
     assert answer.figures["peak_acceleration"] == pytest.approx(row.figures["peak_acceleration"], rel=1e-9)
     slope = row.multipliers[plan.sloped(("peak_acceleration", "dwell"))]
     assert price(answer, "dwell") == pytest.approx(slope, rel=1e-6)

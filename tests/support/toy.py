@@ -16,7 +16,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.model.curves import Columns
 from loomopt.model.kinematics import Arcs, Group
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit
-from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.model.moves import Move
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program, Variable
@@ -85,9 +85,9 @@ def model(
     signed, bounded: of every wave.
     """
     rows, waves, formulas = rows or {}, waves or {}, formulas or {}
-    quantities = {n: Quantity(functools.partial(_wave, wave), True, signed, bounded) for n, wave in waves.items()}
-    of_values = {name: Row(functools.partial(_row, row)) for name, row in rows.items()}
-    of_maths = {name: Row(functools.partial(_formula, formula)) for name, formula in formulas.items()}
+    quantities = {n: CycleQuantity(functools.partial(_wave, wave), True, signed, bounded) for n, wave in waves.items()}
+    of_values = {name: DesignRow(functools.partial(_row, row)) for name, row in rows.items()}
+    of_maths = {name: DesignRow(functools.partial(_formula, formula)) for name, formula in formulas.items()}
     structure = (tuple(rows.items()), tuple(waves.items()), tuple(formulas.items()))
     return JobModel(Still(structure), (), (), quantities, of_values | of_maths, arcs, integrals)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from loomopt.base.errors import BadInput
-from loomopt.interface.cli.shell import DIFFERS, Progress, read_asked, read_number, read_scene, remark
+from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_request, read_scene, remark
 
 if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
@@ -139,7 +139,7 @@ def evaluate(
     """Show the figures of a design (today's without one)."""
     from loomopt.interface import api
 
-    scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_request(problem, design, target, sets, on, off)
     found = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
@@ -165,7 +165,7 @@ def prove(
     from loomopt.interface.files import outputs
     from loomopt.interface.text import answers, layout
 
-    scene, given, name, _ = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_request(problem, design, target, sets, on, off)
     with Progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
@@ -197,7 +197,7 @@ def simulate(
     from loomopt.interface.text import layout, scenes
     from loomopt.solving.options import check_numbers
 
-    scene, given, name, status = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, status = read_request(problem, design, target, sets, on, off)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
@@ -225,7 +225,7 @@ def export(
     from loomopt.interface import api
     from loomopt.interface.files import outputs
 
-    scene, given, name, status = read_asked(problem, design, target, sets, on, off)
+    scene, given, name, status = read_request(problem, design, target, sets, on, off)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
     for path in out:
         outputs.linkage(path, scene, given, said)

@@ -94,7 +94,7 @@ def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: l
     return scene.change(values, on or (), off or ())
 
 
-class Asked(NamedTuple):
+class DesignRequest(NamedTuple):
     """What a command line asks of a design: the scene it holds in, the design (SI; none for today's), the target.
 
     status: of an answer in its own scene and for its own target, as its file says.
@@ -106,14 +106,14 @@ class Asked(NamedTuple):
     status: str | None = None
 
 
-def read_asked(
+def read_request(
     problem: str,
     design: Path | None,
     target: str | None,
     sets: list[str] | None,
     on: list[str] | None,
     off: list[str] | None,
-) -> Asked:
+) -> DesignRequest:
     """Return the scene of the file, as an answer given as the design has it, with what the command line changes.
 
     A remark names what is otherwise than in the file, where an answer brings any of it.
@@ -137,7 +137,7 @@ def read_asked(
             here = [*(sets or ()), *(f"{each} on" for each in on or ()), *(f"{each} off" for each in off or ())]
             then = f"; then, of this call: {', '.join(clean(each, 80) for each in here)}" if here else ""
             remark(f"Remark: the scene is that of {clean(str(design))}: {', '.join(own)}{then}.")
-    return Asked(scene, given, target_name(scene, name) if name else None, status)
+    return DesignRequest(scene, given, target_name(scene, name) if name else None, status)
 
 
 def only(option: str, given: list[Path] | None) -> Path | None:

@@ -13,8 +13,8 @@ from loomopt.interface.figures.heads import Entry, head
 from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes import provenance
-from loomopt.studies.accuracy.accuracy import Study, in_time
-from loomopt.studies.accuracy.ladders import Row, grouped, told
+from loomopt.studies.accuracy.accuracy import AccuracyStudy, in_time
+from loomopt.studies.accuracy.ladders import LadderRow, grouped, told
 from loomopt.studies.accuracy.readings import NUMBERS
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
@@ -24,7 +24,7 @@ COLUMNS = 2
 MARKS = "os^Dv"
 
 
-def parts(study: Study) -> list[str | Grid]:
+def parts(study: AccuracyStudy) -> list[str | Grid]:
     """Return the parts of a study in a terminal: a table of rows, the measured orders, the advice."""
     lines = []
     for rows in grouped(study.rows).values():
@@ -45,16 +45,16 @@ def parts(study: Study) -> list[str | Grid]:
     ]
 
 
-def _words(row: Row) -> str:
+def _words(row: LadderRow) -> str:
     """Return a row's status; what everything is, is not said."""
     return "" if row.status in ("done", "optimal") else row.status.removeprefix("Solve_Succeeded, ")
 
 
-def _order(study: Study, name: str) -> str:
+def _order(study: AccuracyStudy, name: str) -> str:
     return f"{study.orders[name]:.2f}" if name in study.orders else ""
 
 
-def _knee(study: Study, name: str) -> str:
+def _knee(study: AccuracyStudy, name: str) -> str:
     return told(study.knees[name]) if name in study.knees else ""
 
 
@@ -64,7 +64,7 @@ def check(path: Path) -> None:
     check_file(path)
 
 
-def write(study: Study, path: Path) -> None:
+def write(study: AccuracyStudy, path: Path) -> None:
     """Write a study's table as CSV, or its figure, by the file's ending."""
     if suffix(path, FORMATS) == ".csv":
         outputs.text(path, provenance.csv(study.table()))
@@ -72,12 +72,12 @@ def write(study: Study, path: Path) -> None:
         atomically(path, functools.partial(draw, study))
 
 
-def draw(study: Study, path: Path) -> None:
+def draw(study: AccuracyStudy, path: Path) -> None:
     """Write the figure as PNG, PDF or SVG."""
     save(drawn(study), path)
 
 
-def drawn(study: Study) -> Any:
+def drawn(study: AccuracyStudy) -> Any:
     """Return the figure: a panel per quantity, error over time, or over the method's own setting."""
     panels = _panels(study)
     with own_style(study.problem, *panels):
@@ -96,9 +96,9 @@ def drawn(study: Study) -> Any:
     return page
 
 
-def _panels(study: Study) -> dict[str, list[list[Row]]]:
+def _panels(study: AccuracyStudy) -> dict[str, list[list[LadderRow]]]:
     """Return quantity → its ladders' rows that have an error; only quantities that some method tells at sizes."""
-    found: dict[str, list[list[Row]]] = {}
+    found: dict[str, list[list[LadderRow]]] = {}
     for rows in grouped(study.rows).values():
         known = [row for row in rows if row.error is not None and row.seconds]
         if known:
@@ -106,11 +106,11 @@ def _panels(study: Study) -> dict[str, list[list[Row]]]:
     return {name: ladders for name, ladders in found.items() if any(_sized(rows) for rows in ladders)}
 
 
-def _sized(rows: Sequence[Row]) -> bool:
+def _sized(rows: Sequence[LadderRow]) -> bool:
     return len(rows) > 1 and not isinstance(rows[0].setting, str)
 
 
-def _panel(axes: Any, study: Study, quantity: str, ladders: Sequence[Sequence[Row]]) -> list[Entry]:
+def _panel(axes: Any, study: AccuracyStudy, quantity: str, ladders: Sequence[Sequence[LadderRow]]) -> list[Entry]:
     """Draw one quantity's methods, over the setting where all of one cost alike; return what its legend says."""
     from matplotlib.ticker import NullFormatter
 

@@ -100,7 +100,7 @@ HIGH, HIGH_WIDE, WIDTHS = 1.15, 1.9, (7.0, 11.0)
 """Of axes, inches; widths of a figure with one column of panels and with two."""
 
 
-class Turn(NamedTuple):
+class DrawnTurn(NamedTuple):
     """One machine's curves over a closed turn: crank angles, deg, columns, SI, and marks.
 
     unit: in which a person sees crank angles.
@@ -164,11 +164,11 @@ def curves(
     return page
 
 
-def _turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> Turn:
+def _turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
     """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
-    return Turn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
+    return DrawnTurn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
 
 
 def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
@@ -213,7 +213,7 @@ def _unit(panel: Panel) -> str:
     return panel.unit or ("deg" if panel.si == "rad" else panel.si)
 
 
-def _panel(axes: Any, panel: Panel, design: Turn, before: Turn | None) -> list[Entry]:
+def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None) -> list[Entry]:
     """Draw a panel's columns with what is marked and limited; return what its legend says."""
     size = factor(_unit(panel))
     drawn = [design.of(column) / size for column in panel.columns]
@@ -237,7 +237,7 @@ def _panel(axes: Any, panel: Panel, design: Turn, before: Turn | None) -> list[E
     return entries + _levels(axes, panel, size)
 
 
-def _frame(axes: Any, values: Floats, turn: Turn) -> None:
+def _frame(axes: Any, values: Floats, turn: DrawnTurn) -> None:
     """Give axes their ticks, their grid and a zero where curves pass it."""
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
@@ -270,7 +270,7 @@ def _in_g(axes: Any, size: float) -> None:
     scale.spines["right"].set_visible(False)
 
 
-def _points(axes: Any, panel: Panel, turn: Turn, colour: str, said: str) -> list[Entry]:
+def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) -> list[Entry]:
     """Mark what of a panel's first column is marked; return what is to say of it."""
     values, unit = turn.of(panel.columns[0]), _unit(panel)
     entries = []
@@ -285,7 +285,7 @@ def _points(axes: Any, panel: Panel, turn: Turn, colour: str, said: str) -> list
     return entries
 
 
-def _row(values: Floats, turn: Turn, how: str) -> int | None:
+def _row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
     """Return the row of what is marked, the first of those alike; None where nothing is known."""
     if how not in WORDS:
         mark = turn.marks.get(how, math.nan)
@@ -318,7 +318,7 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
     return entries
 
 
-def _mark(axes: Any, of: Turn) -> list[tuple[float, str]]:
+def _mark(axes: Any, of: DrawnTurn) -> list[tuple[float, str]]:
     """Shade stretches and mark angles wherever they fall on the axis; return the names with their places."""
     (low, high), whole = axes.get_xlim(), of.whole
     names: list[tuple[float, str]] = []

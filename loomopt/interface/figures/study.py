@@ -127,7 +127,7 @@ def lettered(figure: Any, axes: Any, points: Sequence[tuple[str, float, float]])
     ways += [_corners(each.get_window_extent()) for each in (axes, *axes.texts)]
     strokes = np.concatenate([_followed(way, step) for way in ways])
     at = axes.transData.transform([(x, y) for _, x, y in points])
-    wishes = [placing.Wish([(float(x), float(y))], np.pi / 4, 0.9 * unit, unit) for x, y in at]
+    wishes = [placing.LabelWish([(float(x), float(y))], np.pi / 4, 0.9 * unit, unit) for x, y in at]
     for (letter, x, y), spot in zip(points, placing.place(wishes, strokes, unit), strict=True):
         axes.plot(x, y, "o", color="#111827", markersize=5, fillstyle="none")
         middle = ((spot.box.left + spot.box.right) / 2, (spot.box.bottom + spot.box.top) / 2)

@@ -41,7 +41,7 @@ FOUND = {
 """What an answer's design is, by its status and target."""
 
 
-class Subject(NamedTuple):
+class DrawnSubject(NamedTuple):
     """What a drawn design is, in a few words, and the limits that it does not hold."""
 
     name: str
@@ -143,7 +143,7 @@ def curves(
     design: Design,
     accuracy: float | None = None,
     target: str | None = None,
-    said: Subject | None = None,
+    said: DrawnSubject | None = None,
 ) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
@@ -176,7 +176,9 @@ def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Fi
 
 
 @working()
-def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: Subject | None = None) -> "Figure":
+def plotted(
+    frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], said: DrawnSubject | None = None
+) -> "Figure":
     """Return curves, SI, as a figure in the scene's own units, with what the job marks, beside today's machine.
 
     design: SI; today's without one. said: what it is, as `what` says it.
@@ -189,66 +191,66 @@ def plotted(frame: "pd.DataFrame", scene: Scene, design: Mapping[str, float], sa
     own = {**now, **design}
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
-    subject = said or Subject(GIVEN if design else TODAY)
+    subject = said or DrawnSubject(GIVEN if design else TODAY)
     title = f"{scene.name}: {subject.name}{', limits not held' if subject.broken else ''}, curves over the cycle"
     unit = scene.shown_in("angle")
     drawn: Figure = curves.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
 
 
-def what(found: Evaluation, target: str | None = None, status: str | None = None) -> Subject:
+def what(found: Evaluation, target: str | None = None, status: str | None = None) -> DrawnSubject:
     """Say what the design of an evaluation or of an answer is.
 
     target, status: of the answer whose design was evaluated, where it was one's.
     """
     broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     if isinstance(found, Solution):
-        return Subject(FOUND[found.status].format(found.sought), broken)
+        return DrawnSubject(FOUND[found.status].format(found.sought), broken)
     if target and status in FOUND and not (broken and status == "optimal"):
-        return Subject(FOUND[status].format(target), broken)
+        return DrawnSubject(FOUND[status].format(target), broken)
     own, scene = flat(found.design), found.scene
     now = registry.of(scene).today(scene) if scene else {}
-    return Subject(TODAY if own.items() <= now.items() else GIVEN, broken)
+    return DrawnSubject(TODAY if own.items() <= now.items() else GIVEN, broken)
 
 
 @working()
-def drawing(scene: Scene, design: Design, said: Subject | None = None) -> "Drawing":
+def drawing(scene: Scene, design: Design, said: DrawnSubject | None = None) -> "Drawing":
     """Return a design's mechanism in the positions that matter; said: what the design is, for the title."""
     found = registry.of(scene).views.linkage(scene, flat(design))
     return replace(found, title=f"{scene.name}: {said.text if said else GIVEN if design else TODAY}")
 
 
 @working()
-def linkage(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
+def linkage(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None) -> None:
     """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`)."""
     DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
 
 
-def _joints(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+def _joints(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
     """Write a linkage's joints as CSV."""
     text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
 
 
-def _svg(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+def _svg(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
     """Write a linkage as SVG at true scale."""
     from loomopt.interface.files import svg
 
     text(path, svg.render(drawing(scene, design, said)))
 
 
-def _dxf(path: Path, scene: Scene, design: Design, said: Subject | None) -> None:
+def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
     """Write a linkage as DXF at true scale."""
     from loomopt.interface.files import dxf
 
     atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
 
 
-Writer = Callable[[Path, Scene, Design, Subject | None], None]
+Writer = Callable[[Path, Scene, Design, DrawnSubject | None], None]
 DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints}
 """Ending of a file → what writes a linkage to it."""
 
 
-def picture(path: Path, scene: Scene, design: Design, said: Subject | None = None) -> None:
+def picture(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None) -> None:
     """Draw a design's linkage in the positions that matter as a picture."""
     from loomopt.interface.figures import figure
 

@@ -40,7 +40,7 @@ class Sketch:
         return f"<Sketch {self.drawing.title}>"
 
 
-def sketch(scene: Scene, design: Design, said: outputs.Subject | None = None) -> Sketch:
+def sketch(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> Sketch:
     """Return a design's mechanism in the positions that matter; said: what the design is, for the title.
 
     Raises BadInput where the scene cannot be drawn.
@@ -65,7 +65,7 @@ def html(thing: object) -> str:
     raise TypeError(f"a {type(thing).__name__} is not shown")
 
 
-def _drawn(scene: Scene, design: Design, said: outputs.Subject | None = None) -> str:
+def _drawn(scene: Scene, design: Design, said: outputs.DrawnSubject | None = None) -> str:
     """Return the mechanism as SVG where the scene gives what a drawing needs, else ""."""
     return "" if registry.of(scene).views.missing(scene) else sketch(scene, design, said)._repr_svg_()
 

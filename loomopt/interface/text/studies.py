@@ -90,7 +90,7 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
 def change_said(study: SceneStudy, change: Change, si: bool) -> str:
     """Return a change as a sentence."""
     key = next(iter(study.kinds))
-    unit = study_table.Units(study, si).of(key)
+    unit = study_table.ColumnUnits(study, si).of(key)
     limits = [joined(side.text) for side in change.limits]
     low, high = (joined(show(value, unit)) for value in change.between)
     if change.at is None:

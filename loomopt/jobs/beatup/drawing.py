@@ -19,7 +19,7 @@ MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
 
 
 @dataclass(frozen=True)
-class Linkage:
+class LinkageDrawing:
     """The crank-rocker in both dead centres: lengths in m, angles in rad.
 
     masses: by joint; offset: of the reed's centre of mass from the rocker's line, rad.
@@ -63,7 +63,7 @@ class Linkage:
         return 0.02 * float(self.lengths.l4 + self.lengths.l1)
 
 
-def of(design: Mapping[str, float]) -> Linkage:
+def of(design: Mapping[str, float]) -> LinkageDrawing:
     """Return the crank-rocker l1, l2, l3, l4 (m) with its masses where it has any (kg, m; offset in rad).
 
     Raises BadInput when it is none.
@@ -75,7 +75,7 @@ def of(design: Mapping[str, float]) -> Linkage:
     lengths = crank_rocker.Lengths(*metres)
     masses = {at: Mass(*(design.get(name, 0.0) for name in names)) for at, names in MASSES.items()}
     there = {at: own for at, own in masses.items() if own.mass and own.radius}
-    return Linkage(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
+    return LinkageDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
 
 
 def linkage(design: Mapping[str, float], title: str, units: Units = METRIC) -> Drawing:
@@ -91,7 +91,7 @@ def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
     return of(design).skeleton.csv(units)
 
 
-def _angles(found: Linkage) -> list[Primitive]:
+def _angles(found: LinkageDrawing) -> list[Primitive]:
     """Draw β at A, the swing at D, and the arrow toward the fell."""
     skeleton, centres, h, (beta, swing) = found.skeleton, found.centres, found.height, found.radii
     return [
@@ -101,7 +101,7 @@ def _angles(found: Linkage) -> list[Primitive]:
     ]
 
 
-def _labels(found: Linkage, units: Units) -> list[Label]:
+def _labels(found: LinkageDrawing, units: Units) -> list[Label]:
     """Name joints, links with lengths, angles in degrees, masses; joints first: they must stand closest."""
     sides, centres, (beta, swing) = found.lengths, found.centres, found.radii
     at, line, quarter, fell = found.skeleton.at(FRONT), centres.beta, math.pi / 2, found.toward_fell
@@ -133,7 +133,7 @@ def _told(name: str, own: Mass, units: Units) -> str:
     return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"
 
 
-def _legend(found: Linkage, units: Units) -> tuple[tuple[str, str], ...]:
+def _legend(found: LinkageDrawing, units: Units) -> tuple[tuple[str, str], ...]:
     """Return the lines below a drawing, each with its layer."""
     centres = found.centres
     theta, rear = math.degrees(centres.theta), 180 + math.degrees(centres.beta_r)

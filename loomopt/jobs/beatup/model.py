@@ -13,7 +13,7 @@ from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Group, four_bar
-from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.physics import balance
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node, Where
@@ -26,12 +26,12 @@ LENGTHS = ("l1", "l2", "l3", "l4")
 
 
 @dataclass(frozen=True)
-class ReedPose(Motion):
+class ReedMotion(Motion):
     """The pose at crank angles φ, rad, any shape: q = −ψ; what no load reads is not computed."""
 
     phi: Number
     omega: Number
-    joints: crank_rocker.Pose
+    joints: crank_rocker.CrankRockerPose
     omega_dot: Number = None
 
     @property
@@ -86,7 +86,7 @@ class FrontPose(Motion):
         return -self.linkage.centres.psi_2_front
 
     @lazy
-    def joints(self) -> crank_rocker.Pose:
+    def joints(self) -> crank_rocker.CrankRockerPose:
         """The linkage with crank and rod stretched."""
         return crank_rocker.front_pose(self.maths, *self.linkage)
 
@@ -130,10 +130,10 @@ class CrankRocker:
         """Return nothing: every event has a formula."""
         return {}
 
-    def pose(self, maths: Maths, given: Given, node: Node) -> ReedPose:
+    def pose(self, maths: Maths, given: Given, node: Node) -> ReedMotion:
         """Return the pose at crank angles φ, rad."""
-        pose = crank_rocker.Pose(maths, linked(given).lengths, node.phi)
-        return ReedPose(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
+        pose = crank_rocker.CrankRockerPose(maths, linked(given).lengths, node.phi)
+        return ReedMotion(node.phi, given.values.get("speed"), pose, given.values.get("omega_dot"))
 
     def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrontPose:
         """Return the pose at front dead centre."""
@@ -172,14 +172,14 @@ def _front(at: Instant) -> Motion:
     return at.model.kinematics.still(at.maths, at.given, FRONT, {})
 
 
-ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: linked(at.given).centres.swing),
-    "theta": Row(lambda at: linked(at.given).centres.theta),
-    "beta": Row(lambda at: linked(at.given).centres.beta),
-    "M3_fdc": Row(lambda at: at.force, event=FRONT),
-    "alpha_fdc": Row(lambda at: linked(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
-    "r4": Row(eccentricity, ("m4", "r4", "m4e")),
-    "r4e_square": Row(lambda at: at.values["r4e"] ** 2),
+ROWS: dict[str, DesignRow] = {
+    "swing": DesignRow(lambda at: linked(at.given).centres.swing),
+    "theta": DesignRow(lambda at: linked(at.given).centres.theta),
+    "beta": DesignRow(lambda at: linked(at.given).centres.beta),
+    "M3_fdc": DesignRow(lambda at: at.force, event=FRONT),
+    "alpha_fdc": DesignRow(lambda at: linked(at.given).centres.psi_2_front * _front(at).omega ** 2, ("speed",)),
+    "r4": DesignRow(eccentricity, ("m4", "r4", "m4e")),
+    "r4e_square": DesignRow(lambda at: at.values["r4e"] ** 2),
 }
 """Figures and rows of front dead centre and of the linkage as a whole, SI."""
 
@@ -197,9 +197,9 @@ def model(
     pulse: the pieces of the cycle in which the cloth resists, which the figure pulse_rms is of.
     """
     reed = any("s" in effect.reads for effect in effects if effect.name in _moved(effects))
-    rows = ROWS | ({"J4": Row(inertia)} if reed else {})
-    rows |= {"change": Row(functools.partial(change, changing))} if changing else {}
-    square = {"M3_square": Quantity(lambda at: at.force**2, figure=False)}
+    rows = ROWS | ({"J4": DesignRow(inertia)} if reed else {})
+    rows |= {"change": DesignRow(functools.partial(change, changing))} if changing else {}
+    square = {"M3_square": CycleQuantity(lambda at: at.force**2, figure=False)}
     resisted = any(effect.name == pulse[0] for effect in effects)
     means = (Integral("pulse_mean_square", "pulse_rms", "M3_square", pulse),) if resisted else ()
     peaks = drive.quantities(effects, known)

@@ -13,7 +13,7 @@ from loomopt.jobs.task import Ends, Task, bound_limits, distinct, ends, size_rea
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
-from loomopt.model.moves import Move, Wish
+from loomopt.model.moves import Move, Preference
 from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
 from loomopt.model.program import Goal, Numbers, Variable, goals
@@ -214,10 +214,10 @@ class BeatupTask(Task):
         names = {variable.name for variable in self.variables}
         used, above = ("s", NO_MASS * self.most) if "s" in names else ("m4e", 0.0)
         wishes = {
-            "m4e": (Wish("least", "least added mass"),),
+            "m4e": (Preference("least", "least added mass"),),
             "r4e": (
-                Wish("most", "least added mass, so the largest radius", used, above),
-                Wish("today", "no mass, so the radius nearest today's"),
+                Preference("most", "least added mass, so the largest radius", used, above),
+                Preference("today", "no mass, so the radius nearest today's"),
             ),
         }
         room = [name for name in COUNTERWEIGHT if name in names and self.limited[name][0] < self.limited[name][1]]

@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, PureNumber, Speed, Torque
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.model import drive
 from loomopt.physics.effects import declared
@@ -96,7 +96,7 @@ TARGETS = {
 }
 
 
-def fault(design: Mapping[str, float], shown: Shown = usual) -> str:
+def fault(design: Mapping[str, float], shown: ShowValue = usual) -> str:
     """Say why a design's lengths, m, are no crank-rocker; "" when they are, or when it names none of them."""
     named = [name for name in ("l1", "l2", "l3", "l4") if name in design]
     return crank_rocker.fault(*(design[name] for name in named), shown=shown) if len(named) == 4 else ""

@@ -14,7 +14,7 @@ from loomopt.maths.systems import FLOAT
 from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, place, pointer
 from loomopt.picture.shapes import METRIC, Drawing, Line, Point, Primitive, Units
 
@@ -37,14 +37,14 @@ class Drive:
         """The sley four-bar."""
         return Sley(FLOAT, self.dimensions)
 
-    def turn(self, phi1: Floats) -> Pose:
+    def turn(self, phi1: Floats) -> RapierPose:
         """Return the drive at crank angles, rad."""
-        return Pose(systems.numpy(), self.dimensions, self.sley.stand, phi1)
+        return RapierPose(systems.numpy(), self.dimensions, self.sley.stand, phi1)
 
     @functools.cached_property
     def front(self) -> Vector:
         """The driving link as seen from the sley at front dead centre."""
-        return Pose(FLOAT, self.dimensions, self.sley.stand, 0.0).relative
+        return RapierPose(FLOAT, self.dimensions, self.sley.stand, 0.0).relative
 
     @functools.cached_property
     def phi1(self) -> dict[str, float]:
@@ -55,9 +55,9 @@ class Drive:
         return {FRONT: 0.0, REAR: float(rear), OVER: over % TURN}
 
     @functools.cached_property
-    def poses(self) -> dict[str, Pose]:
+    def poses(self) -> dict[str, RapierPose]:
         """The drive in each position."""
-        return {name: Pose(FLOAT, self.dimensions, self.sley.stand, at) for name, at in self.phi1.items()}
+        return {name: RapierPose(FLOAT, self.dimensions, self.sley.stand, at) for name, at in self.phi1.items()}
 
     @property
     def phi63(self) -> float:

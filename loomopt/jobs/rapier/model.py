@@ -18,7 +18,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.maths.turning_points import crossing
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Group, four_bar
-from loomopt.model.model import Instant, Integral, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node
@@ -47,7 +47,7 @@ JERK_NODES = 64
 class HeadPose(Motion):
     """The head at crank angles φ1, rad, any shape; what no load reads is not computed."""
 
-    joints: rapier_drive.Pose
+    joints: rapier_drive.RapierPose
     front: Vector
     omega: Number
     omega_dot: Number = None
@@ -98,17 +98,17 @@ def _five_bar() -> Group:
     return Group({"span_far": far, "span_near": near, "obliquity": obliquity}, closes)
 
 
-class Linkage(NamedTuple):
+class DriveLinkage(NamedTuple):
     """What poses read at once of the scene's numbers; centres: the sley's dead centres."""
 
     dimensions: rapier_drive.Dimensions
     centres: crank_rocker.DeadCentres
 
 
-def linked(given: Given) -> Linkage:
+def linked(given: Given) -> DriveLinkage:
     """Return what poses read at once."""
     found = given.linkage
-    assert isinstance(found, Linkage)
+    assert isinstance(found, DriveLinkage)
     return found
 
 
@@ -131,17 +131,17 @@ class RapierDrive:
         )
         return {"": _five_bar(), "sley_": sley}
 
-    def linkage(self, maths: Maths, values: Values) -> Linkage:
+    def linkage(self, maths: Maths, values: Values) -> DriveLinkage:
         """Return dimensions, and the sley's dead centres."""
         dimensions = rapier_drive.Dimensions(**{name: values[name] for name in DIMENSIONS})
-        return Linkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
+        return DriveLinkage(dimensions, rapier_drive.Sley(maths, dimensions).centres)
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
         """Return the sley's stand, the driving link's direction at front dead centre, and the turns if called in."""
         values, centres = given.values, linked(given).centres
         found = {"beta": centres.beta, "frame_angle": values["phi30"] - centres.psi_front}
         stand = rapier_drive.Stand(found["beta"], found["frame_angle"])
-        front = rapier_drive.Pose(maths, linked(given).dimensions, stand, 0).relative
+        front = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, 0).relative
         found |= {"front_x": front.x, "front_y": front.y}
         given = given._replace(values={**values, **found})
         if STROKE in called:
@@ -162,7 +162,7 @@ class RapierDrive:
         """Return the pose at crank angles φ1, rad."""
         values = given.values
         stand = rapier_drive.Stand(values["beta"], values["frame_angle"])
-        joints = rapier_drive.Pose(maths, linked(given).dimensions, stand, node.phi)
+        joints = rapier_drive.RapierPose(maths, linked(given).dimensions, stand, node.phi)
         return HeadPose(
             joints, Vector(values["front_x"], values["front_y"]), values.get("speed"), values.get("omega_dot")
         )
@@ -220,29 +220,29 @@ def _at_stroke(at: Instant) -> HeadPose:
     return at.model.kinematics.pose(at.maths, at.given, Node(at.values["phi_stroke"], {}))  # type: ignore[return-value]
 
 
-QUANTITIES: dict[str, Quantity] = {
-    "peak_acceleration": Quantity(lambda at: at.pose.q2),
-    "peak_jerk": Quantity(lambda at: at.pose.q3),
-    "S": Quantity(lambda at: at.pose.q, figure=False),
-    "S_1": Quantity(lambda at: at.pose.q1, figure=False),
-    "jerk_square": Quantity(lambda at: at.pose.q3**2, figure=False),
-    "miss_square": Quantity(lambda at: (at.pose.q - at.node.switch["datum"]) ** 2, figure=False),
-    "dwell_travel": Quantity(lambda at: at.pose.q / at.values["s_dwell"], figure=False),
+QUANTITIES: dict[str, CycleQuantity] = {
+    "peak_acceleration": CycleQuantity(lambda at: at.pose.q2),
+    "peak_jerk": CycleQuantity(lambda at: at.pose.q3),
+    "S": CycleQuantity(lambda at: at.pose.q, figure=False),
+    "S_1": CycleQuantity(lambda at: at.pose.q1, figure=False),
+    "jerk_square": CycleQuantity(lambda at: at.pose.q3**2, figure=False),
+    "miss_square": CycleQuantity(lambda at: (at.pose.q - at.node.switch["datum"]) ** 2, figure=False),
+    "dwell_travel": CycleQuantity(lambda at: at.pose.q / at.values["s_dwell"], figure=False),
 }
-TAPE_FORCE = {"tape_force": Quantity(lambda at: at.force)}
+TAPE_FORCE = {"tape_force": CycleQuantity(lambda at: at.force)}
 """Quantities of the motion, and the one of the tape that loads give, SI."""
 LOADED = (*TAPE_FORCE, drive.TORQUE, drive.POWER)
 """Figures that loads give."""
 
-ROWS: dict[str, Row] = {
-    "swing": Row(lambda at: linked(at.given).centres.swing),
-    "theta": Row(lambda at: linked(at.given).centres.theta),
-    "phi_stroke": Row(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
-    "rest": Row(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
-    "stroke_short": Row(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
-    "reach": Row(lambda at: _at_stroke(at).q, ("phi_stroke",)),
-    "dwell": Row(lambda at: at.values["dwell"], ("dwell",)),
-    "dwell_rest": Row(lambda at: at.maths.pi - at.values["dwell"], ("dwell",)),
+ROWS: dict[str, DesignRow] = {
+    "swing": DesignRow(lambda at: linked(at.given).centres.swing),
+    "theta": DesignRow(lambda at: linked(at.given).centres.theta),
+    "phi_stroke": DesignRow(lambda at: at.values["phi_stroke"], ("phi_stroke",)),
+    "rest": DesignRow(lambda at: _at_stroke(at).q1, ("phi_stroke",)),
+    "stroke_short": DesignRow(lambda at: _at_stroke(at).q - at.values["stroke"], ("phi_stroke", "stroke")),
+    "reach": DesignRow(lambda at: _at_stroke(at).q, ("phi_stroke",)),
+    "dwell": DesignRow(lambda at: at.values["dwell"], ("dwell",)),
+    "dwell_rest": DesignRow(lambda at: at.maths.pi - at.values["dwell"], ("dwell",)),
 }
 """Figures and rows of single positions and of the sley four-bar, SI."""
 
@@ -306,7 +306,7 @@ TOUCHES = 1e-9
 
 
 @dataclass(frozen=True)
-class Reading:
+class TravelReading:
     """stroke, m, reached at crank angle phi_stroke; dwells after and before front dead centre, rad."""
 
     stroke: float
@@ -315,7 +315,7 @@ class Reading:
     dwell_before: float
 
 
-def read(sampler: Sampler) -> Reading:
+def read(sampler: Sampler) -> TravelReading:
     """Return stroke and dwells of a sampled drive. Raises ValueError where it does not turn all round."""
     found = sampler.extremes("S")
     if not found or not all(math.isfinite(extreme.value) for extreme in found):
@@ -327,10 +327,10 @@ def read(sampler: Sampler) -> Reading:
         stroke = sampler.at_angle(("S",), phi)[0]
     room = sampler.given.values.get("s_dwell")
     if room is None:
-        return Reading(stroke, phi % TURN, math.nan, math.nan)
+        return TravelReading(stroke, phi % TURN, math.nan, math.nan)
     extremes = [sampler.angle(extreme) for extreme in found]
     after, before = (_dwell(sampler, extremes, float(room), side) for side in (1, -1))
-    return Reading(stroke, phi % TURN, after, before)
+    return TravelReading(stroke, phi % TURN, after, before)
 
 
 def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> float:

@@ -16,7 +16,7 @@ from loomopt.jobs.rapier.model import (
     LOADED,
     SLEY,
     SLEY_MARGINS,
-    Reading,
+    TravelReading,
     jerk_mean,
     match_mean,
     read,
@@ -137,7 +137,7 @@ class RapierTask(Task):
         return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.asked, 1.0), **self.known})
 
     @lazy
-    def reading(self) -> Reading:
+    def reading(self) -> TravelReading:
         """Today's stroke and dwells."""
         return read(self.sampler)
 

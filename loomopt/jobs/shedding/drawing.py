@@ -15,7 +15,7 @@ from loomopt.base.refusals import refusal
 from loomopt.base.units import factor, show
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
-from loomopt.jobs.shedding.scene import Frame
+from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.maths import systems
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats, Pieces
@@ -194,7 +194,7 @@ Figures = Mapping[str, float | None]
 
 
 @dataclass(frozen=True)
-class Cam:
+class CamDrawing:
     """The cam of one design, ready to be read anywhere on its turn; numbers SI."""
 
     sampler: Sampler
@@ -243,7 +243,7 @@ def missing(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in FOLLOWER if scene.mechanism.get(name) is None)
 
 
-def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
+def cam(scene: Scene, design: Mapping[str, float]) -> CamDrawing:
     """Return the cam of a design, SI (today's number for what it does not name). Raises BadInput where there is none.
 
     A cam that is undercut is one.
@@ -257,15 +257,15 @@ def cam(scene: Scene, design: Mapping[str, float]) -> Cam:
     fault = scene.schema.fault(job.numbers_of(scene, design), scene.show)
     if fault:
         raise refusal(f"the cam cannot be drawn: {fault}", scene.origin, "mechanism", remedy="Correct it")
-    return Cam(job.sampler(scene, design))
+    return CamDrawing(job.sampler(scene, design))
 
 
-def allowed(found: Cam) -> float:
+def allowed(found: CamDrawing) -> float:
     """Return how far a cam's curves may lie from the straight lines that are drawn for them, m."""
     return max(CURVE_CLOSE, CURVE_NARROW * float(found.follower.arm + found.follower.centre_distance))
 
 
-def traced(found: Cam) -> Stations:
+def traced(found: CamDrawing) -> Stations:
     """Return stations once round, the last before the first again, that straight lines join as closely as `allowed`.
 
     That holds for the profile and for the roller centre's curve. Corners of the law are stations.
@@ -277,7 +277,7 @@ def traced(found: Cam) -> Stations:
 class Picture:
     """The cam with its arm in both dwells and where the cam force is least; theta: cam angle of each, rad."""
 
-    cam: Cam
+    cam: CamDrawing
     theta: Mapping[str, float]
 
     @property
@@ -311,13 +311,13 @@ class Picture:
         )
 
 
-def picture(found: Cam, least: float) -> Picture:
+def picture(found: CamDrawing, least: float) -> Picture:
     """Return the arm in both dwells and at the cam angle of least cam force, rad."""
     begin, end = found.segments[FAR]
     return Picture(found, {NEAR: 0.0, FAR: (begin + end) / 2, LEAST: least})
 
 
-def linkage(scene: Scene, found: Cam, figures: Figures) -> Drawing:
+def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:
     """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
     drawn, units = picture(found, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
@@ -397,13 +397,13 @@ def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tup
     )
 
 
-def _law(scene: Scene, found: Cam) -> str:
+def _law(scene: Scene, found: CamDrawing) -> str:
     """Return the name of the law the cam really has."""
     law = frame(found.sampler.model).law
-    return f"spline of {law.intervals} intervals" if isinstance(law, Spline) else scene.table(Frame).law
+    return f"spline of {law.intervals} intervals" if isinstance(law, Spline) else scene.table(HealdFrame).law
 
 
-def joints_csv(scene: Scene, found: Cam) -> str:
+def joints_csv(scene: Scene, found: CamDrawing) -> str:
     """Return the profile as CSV: cam angle, X, both curves in the cam's frame, pressure angle, curvature.
 
     Digits round-trip. Rows stand every half degree and at every corner of the law, from 0 to 360 deg; where the
@@ -429,7 +429,7 @@ def joints_csv(scene: Scene, found: Cam) -> str:
     return provenance.csv(table)
 
 
-def _rows(found: Cam) -> tuple[Pieces, Floats]:
+def _rows(found: CamDrawing) -> tuple[Pieces, Floats]:
     """Return the table's nodes: every half degree and both sides of every corner, one where they are alike."""
     cycle = found.sampler.cycle
     there = np.flatnonzero(np.diff(cycle.starts) > 0.0)

@@ -17,7 +17,7 @@ from loomopt.jobs.shedding.model import (
     RISE,
     SEGMENT,
     CamFrame,
-    FramePose,
+    FrameMotion,
     frame,
 )
 from loomopt.maths import systems
@@ -28,7 +28,7 @@ from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Load, Motion
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
-from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
@@ -62,9 +62,9 @@ class Unwritten:
         """Return nothing."""
         return {}
 
-    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """Return symbols."""
-        return Derivatives(*(symbol(name) for name in (*PRIMES, "s'''")))
+        return LawDerivatives(*(symbol(name) for name in (*PRIMES, "s'''")))
 
 
 def law(found: CamLaw) -> list[Equation]:
@@ -108,7 +108,7 @@ def _knots(letter: str, count: int) -> tuple[Expression, ...]:
 def _spline(found: Spline) -> list[Equation]:
     """Write the spline on the interval between knots k and k + 1, t counted from knot k."""
     n = found.intervals
-    made = cam_spline.Spline(*(_knots(letter, n + 1) for letter in "sva"))
+    made = cam_spline.SplineData(*(_knots(letter, n + 1) for letter in "sva"))
     t, u = symbol("t"), symbol("u")
     at = made.at(systems.sympy(), t, 0)
     kind = f"cam law spline, k = 0 ... {n - 1}"
@@ -120,7 +120,7 @@ def _spline(found: Spline) -> list[Equation]:
     ]
 
 
-def _table(found: cam_spline.Table) -> list[Equation]:
+def _table(found: cam_spline.LawTable) -> list[Equation]:
     """Say what the law through a table is: a cubic between each point and the next."""
     points = len(found.u)
     said = f"the C2 cubic through the table's {points} points (u, s), s' = 0 at both ends"
@@ -241,7 +241,7 @@ def motion(cam: CamFrame, given: Given) -> list[Equation]:
     spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in cam.segments]
     poses = {SEGMENTS[k]: pose(cam, given, k) for k in cam.segments}
     named = (("argument of the law", "u"), ("travel", "X"), ("travel", "X'"), ("travel", "X''"))
-    read: tuple[Callable[[FramePose], Number], ...] = (
+    read: tuple[Callable[[FrameMotion], Number], ...] = (
         lambda at: at.u,
         lambda at: at.q,
         lambda at: at.q1,
@@ -256,7 +256,7 @@ def motion(cam: CamFrame, given: Given) -> list[Equation]:
     ]
 
 
-def pose(cam: CamFrame, given: Given, segment: int) -> FramePose:
+def pose(cam: CamFrame, given: Given, segment: int) -> FrameMotion:
     """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
     unwritten = dataclasses.replace(cam, law=Unwritten(cam.law))
     return unwritten.pose(systems.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))

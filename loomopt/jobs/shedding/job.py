@@ -13,7 +13,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.quantities import NARROWEST
 from loomopt.base.refusals import refusal
 from loomopt.jobs import base
-from loomopt.jobs.base import Family, Figures, Job, Studied
+from loomopt.jobs.base import Figures, Job, LawFamily, Studied
 from loomopt.jobs.shedding.model import (
     CYCLE,
     DWELLS,
@@ -21,18 +21,12 @@ from loomopt.jobs.shedding.model import (
     RETURN_SPRING,
     RISE,
     SEGMENT,
-    FramePose,
+    FrameMotion,
     contact,
     frame,
     moving,
 )
-from loomopt.jobs.shedding.program import (
-    CONTACT_SPEED,
-    SheddingTask,
-    contact_speed,
-    demand_moving,
-    model,
-)
+from loomopt.jobs.shedding.program import CONTACT_SPEED, SheddingTask, contact_speed, demand_moving, model
 from loomopt.jobs.shedding.scene import (
     SCHEMA,
     SEGMENTS,
@@ -51,7 +45,7 @@ from loomopt.model.program import Numbers, Program, Variable
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics import balance
 from loomopt.physics.mechanisms import cam_limit, cam_spline
-from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import Spline, knots, named_knots
 from loomopt.scenes.scene import Scene
 
@@ -202,7 +196,7 @@ class Shedding(Job):
         """Return what studies read: least springs, the cam force, and what a free law tends to."""
         # Points over the whole turn would read a force that is known in the dwells only.
         peaks = {} if self.model(scene).known_in else {"contact_max": ("cam_force", False)}
-        family = Family("spline intervals", "law", "targets.law.intervals", self.law_limit)
+        family = LawFamily("spline intervals", "law", "targets.law.intervals", self.law_limit)
         return Studied(("stiffness", "law"), peaks, motion="X_2", family=family)
 
     def law_limit(self, scene: Scene, x: Mapping[str, Number]) -> Number | None:
@@ -300,10 +294,10 @@ def _force(model: JobModel, numbers: Numbers) -> Force:
     values, zero = given.values, system.number(0.0)
 
     def force(segment: int, s: float, u: float, slope: float, bend: float) -> Number:
-        law = Derivatives(*map(system.number, (s, slope, bend, 0.0)))
+        law = LawDerivatives(*map(system.number, (s, slope, bend, 0.0)))
         rate = {RISE: 1 / values["rise"], RETURN: -1 / values["return"]}[segment]
         omega = values.get("speed", zero)
-        pose = FramePose(system, zero, values["travel"], segment, system.number(u), rate, law, -1, omega)
+        pose = FrameMotion(system, zero, values["travel"], segment, system.number(u), rate, law, -1, omega)
         past = {load.name: float(s > 0.5) for load in loads}
         return zero + balance.output_force(system, loads, pose, given, past)
 

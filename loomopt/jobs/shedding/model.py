@@ -15,13 +15,13 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.maths.turning_points import followed
 from loomopt.model import drive
 from loomopt.model.kinematics import Arcs, Chain, Group
-from loomopt.model.model import Instant, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
 from loomopt.physics.effects.kinds import Effect, Load, Motion
 from loomopt.physics.effects.shedding import FramePose as Frame
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
-from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, middle, mirrored, piece_at, segment_at
 from loomopt.physics.schema import Table, Values
 
@@ -58,7 +58,7 @@ RETURN_SPRING = Load(
 
 
 @dataclass(frozen=True)
-class FramePose(Motion):
+class FrameMotion(Motion):
     """The heald frame at cam angles θ, rad, any shape.
 
     segment: data of the node; u: the law's argument, 1 with the shed open
@@ -71,7 +71,7 @@ class FramePose(Motion):
     segment: Number
     u: Number
     rate: Number
-    law: Derivatives
+    law: LawDerivatives
     worst: Number
     omega: Number
     omega_dot: Number = None
@@ -204,7 +204,7 @@ class CamFrame:
             return {}
         return dict(zip((MIDDLE, MIDDLE_PIECE), middle(self.law, given.values), strict=True))
 
-    def pose(self, maths: Maths, given: Given, node: Node) -> FramePose:
+    def pose(self, maths: Maths, given: Given, node: Node) -> FrameMotion:
         """Return the pose at cam angles θ, rad; switches: segment, the law's piece, worst."""
         values, theta = given.values, node.phi
         segment, piece = node.switch[SEGMENT], node.switch[LAW]
@@ -213,9 +213,9 @@ class CamFrame:
         law = self.law.at(maths, values, u, piece)
         worst = node.switch.get("worst", LEAST)
         speeds = values.get("speed"), values.get("omega_dot")
-        return FramePose(maths, theta, values["travel"], segment, u, rate, law, worst, *speeds)
+        return FrameMotion(maths, theta, values["travel"], segment, u, rate, law, worst, *speeds)
 
-    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FramePose:
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrameMotion:
         """Return the pose at the beginning of the rise, from ahead of it."""
         return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0, LAW: 0.0}))
 
@@ -241,35 +241,35 @@ def moving(at: Instant, value: Number) -> Number:
     return at.maths.choose(at.pose.segment, (value, 0, value, 0))
 
 
-QUANTITIES: dict[str, Quantity] = {
-    "cam_force": Quantity(lambda at: at.switched(worst=MOST).force, signed=True, bounded=True, loaded=True),
-    "lift": Quantity(lambda at: -at.force, figure=False, signed=True, bounded=True, loaded=True),
-    "law_acceleration": Quantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
-    "law_fall": Quantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
+QUANTITIES: dict[str, CycleQuantity] = {
+    "cam_force": CycleQuantity(lambda at: at.switched(worst=MOST).force, signed=True, bounded=True, loaded=True),
+    "lift": CycleQuantity(lambda at: -at.force, figure=False, signed=True, bounded=True, loaded=True),
+    "law_acceleration": CycleQuantity(lambda at: moving(at, at.pose.law.s2), bounded=True),
+    "law_fall": CycleQuantity(lambda at: moving(at, -at.pose.law.s1), figure=False, signed=True),
 }
 LIFT, AT_REST, FASTEST = "lift", "contact at rest", "contact at contact_speed"
-RACED: dict[str, Quantity] = {
+RACED: dict[str, CycleQuantity] = {
     AT_REST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(0).force),
     FASTEST: QUANTITIES["lift"]._replace(formula=lambda at: -at.at_speed(at.values["contact_speed"]).force),
 }
 """What a limit on the speed up to which contact holds reads, SI."""
-FOLLOWED: dict[str, Quantity] = {
-    "pressure_angle": Quantity(lambda at: contact(at).pressure_angle),
-    "curvature": Quantity(lambda at: contact(at).curvature, signed=True),
-    "concavity": Quantity(lambda at: -contact(at).curvature, signed=True),
-    "arm_angle": Quantity(lambda at: contact(at).angle, figure=False),
+FOLLOWED: dict[str, CycleQuantity] = {
+    "pressure_angle": CycleQuantity(lambda at: contact(at).pressure_angle),
+    "curvature": CycleQuantity(lambda at: contact(at).curvature, signed=True),
+    "concavity": CycleQuantity(lambda at: -contact(at).curvature, signed=True),
+    "arm_angle": CycleQuantity(lambda at: contact(at).angle, figure=False),
 }
 """Quantities of the frame, and of the cam where the scene gives its dimensions, SI; forces count with their sign."""
 
-ROWS: dict[str, Row] = {
-    "K1": Row(lambda at: at.values["K1"]),
-    "X0": Row(lambda at: at.values["X0"]),
-    "travel": Row(lambda at: at.values["travel"]),
-    "spring_stretch": Row(lambda at: at.values["X0"] + at.values["travel"]),
-    "spring_force_max": Row(lambda at: at.values["K1"] * (at.values["X0"] + at.values["travel"])),
-    "near_dwell": Row(lambda at: at.values["near_dwell"]),
-    "speed": Row(lambda at: at.values["speed"], ("speed",)),
-    "cam_period": Row(lambda at: 1 / at.values["speed"], ("speed",)),
+ROWS: dict[str, DesignRow] = {
+    "K1": DesignRow(lambda at: at.values["K1"]),
+    "X0": DesignRow(lambda at: at.values["X0"]),
+    "travel": DesignRow(lambda at: at.values["travel"]),
+    "spring_stretch": DesignRow(lambda at: at.values["X0"] + at.values["travel"]),
+    "spring_force_max": DesignRow(lambda at: at.values["K1"] * (at.values["X0"] + at.values["travel"])),
+    "near_dwell": DesignRow(lambda at: at.values["near_dwell"]),
+    "speed": DesignRow(lambda at: at.values["speed"], ("speed",)),
+    "cam_period": DesignRow(lambda at: 1 / at.values["speed"], ("speed",)),
 }
 """Figures and rows of the design alone, SI."""
 CYCLE = {
@@ -284,14 +284,14 @@ CYCLE = {
 """Figures that are extremes over the cycle, with their quantities."""
 
 
-def law_rows(law: CamLaw) -> dict[str, Row]:
+def law_rows(law: CamLaw) -> dict[str, DesignRow]:
     """Return the rows a spline law must keep: its end, its slope there and at the inner knots, ±s'' at these."""
     if not isinstance(law, Spline):
         return {}
     n, found = law.intervals, {}
 
-    def reads(name: str, sign: int = 1) -> Row:
-        return Row(lambda at: at.values[name] if sign > 0 else -at.values[name])
+    def reads(name: str, sign: int = 1) -> DesignRow:
+        return DesignRow(lambda at: at.values[name] if sign > 0 else -at.values[name])
 
     found = {"law_end": reads(law.knot("s", n)), "law_end_slope": reads(law.knot("v", n))}
     found |= {f"law_slope_{k}": reads(law.knot("v", k)) for k in range(1, n)}

@@ -12,7 +12,7 @@ from loomopt.base.records import Frozen, lazy
 from loomopt.base.refusals import refusal
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
-from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, Frame, LawTarget, chosen, dwelt
+from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, HealdFrame, LawTarget, chosen, dwelt
 from loomopt.jobs.task import Asked, Ends, Task, bound_limits, ends, size_read
 from loomopt.maths import systems
 from loomopt.model import drive
@@ -49,7 +49,7 @@ MEGA = 1e6
 
 def scene_numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by name, SI, the knots of a spline law included."""
-    return numbers(scene) | named_knots(map(float, scene.table(Frame).law_coefficients or ()))
+    return numbers(scene) | named_knots(map(float, scene.table(HealdFrame).law_coefficients or ()))
 
 
 def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) -> JobModel:

@@ -20,7 +20,7 @@ from loomopt.base.quantities import (
     Stiffness,
 )
 from loomopt.base.refusals import refusal
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.jobs.shedding.model import FOLLOWER
 from loomopt.model import drive
 from loomopt.model.numbers import words
@@ -60,7 +60,7 @@ class Operation(Table):
     N_min: Force = Field(0.0, description="least cam force that counts as contact")
 
 
-class Frame(Table):
+class HealdFrame(Table):
     """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
     travel: Length = Field(description="travel of the heald frame")
@@ -81,7 +81,7 @@ class Frame(Table):
 
 # `return` is a word of the language: no field of a class can be written so.
 RETURNED = {"return": (SegmentAngle, Field(description="cam angle of the return"))}
-Mechanism: type[Table] = create_model("Mechanism", __base__=Frame, **RETURNED)  # type: ignore[call-overload]
+Mechanism: type[Table] = create_model("Mechanism", __base__=HealdFrame, **RETURNED)  # type: ignore[call-overload]
 
 
 class TargetTable(Table):
@@ -98,7 +98,7 @@ class LawTarget(TargetTable):
     acceleration: PositiveNumber = Field(CYCLOID, description="largest |s''|")
 
 
-SAID = {name: field.description or "" for own in (Operation, Frame) for name, field in own.model_fields.items()}
+SAID = {name: field.description or "" for own in (Operation, HealdFrame) for name, field in own.model_fields.items()}
 """What figures are that are numbers of the scene too."""
 
 VARIABLES = {"K1": "stiffness", "X0": "length"}
@@ -156,7 +156,7 @@ def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
 
 def chosen(scene: Scene) -> CamLaw:
     """Return the scene's own cam law. Raises BadInput."""
-    name = scene.table(Frame).law
+    name = scene.table(HealdFrame).law
     if name == "spline":
         return Spline(len(_coefficients(scene)) - 1)
     return Tabulated(_table(scene)) if name == "table" else Named(name)
@@ -179,9 +179,9 @@ def check_known(scene: Scene, there: Collection[Where], called: str) -> None:
 
 def check_law(scene: Scene) -> None:
     """Raise BadInput where the scene's cam law is none."""
-    name = scene.table(Frame).law
+    name = scene.table(HealdFrame).law
     for key, of in (("law_coefficients", "spline"), ("law_table", "table")):
-        if getattr(scene.table(Frame), key) is not None and name != of:
+        if getattr(scene.table(HealdFrame), key) is not None and name != of:
             remedy = f'Write law = "{of}", or take {key} out'
             raise refusal(f"{key} is not of law {name}", scene.origin, f"mechanism.{key}", remedy=remedy)
     if name == "spline":
@@ -193,17 +193,17 @@ def check_law(scene: Scene) -> None:
 
 
 def _coefficients(scene: Scene) -> tuple[float, ...]:
-    found = scene.table(Frame).law_coefficients
+    found = scene.table(HealdFrame).law_coefficients
     if found is None:
         remedy = "Give s'' at evenly spaced knots, as target law finds them"
         raise refusal("law spline needs its coefficients", scene.origin, "mechanism.law_coefficients", remedy=remedy)
     return tuple(found)
 
 
-def _table(scene: Scene) -> cam_spline.Table:
+def _table(scene: Scene) -> cam_spline.LawTable:
     """Return the law of `mechanism.law_table`: cam angles and displacements of the rise, from 0 on. Raises BadInput."""
     key = "mechanism.law_table"
-    given = scene.table(Frame).law_table
+    given = scene.table(HealdFrame).law_table
     columns = {"angle": "angle", "s": "length"}
     if given is None:
         remedy = 'Write law_table = "law.csv"; the file has the columns angle [deg], s [mm] of the rise'
@@ -217,14 +217,14 @@ def _table(scene: Scene) -> cam_spline.Table:
         raise refusal(f"the table is no cam law: {error}", origin, remedy="Correct the table") from None
 
 
-def unfollowed(numbers: Mapping[str, Any], shown: Shown) -> str:
+def unfollowed(numbers: Mapping[str, Any], shown: ShowValue) -> str:
     """Say why a scene's follower cannot work; "" when it can, or when the scene does not give one."""
     if any(numbers.get(name) is None for name in FOLLOWER):
         return ""
     return cam_follower.fault(cam_follower.Follower(**{name: numbers[name] for name in FOLLOWER}), shown)
 
 
-def fault(numbers: Mapping[str, Any], shown: Shown = usual) -> str:
+def fault(numbers: Mapping[str, Any], shown: ShowValue = usual) -> str:
     """Say why a design, SI, cannot work as this cam; "" when it can."""
     coefficients = tuple(map(float, knots(numbers)))
     reason = cam_spline.fault(coefficients) if coefficients else ""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
-from loomopt.base.units import Shown
+from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.schema import Figure, Table, Values
 
@@ -54,16 +54,16 @@ class Force(Protocol[Pose]):
         """Return the term, N or N·m."""
 
 
-class Response(Protocol[Pose]):
+class ResponseFormula(Protocol[Pose]):
     """response(maths, oscillator, pose, given, own, switch): the closed-form answer to a load with corners."""
 
     def __call__(
-        self, maths: Maths, oscillator: "Oscillator", pose: Pose, given: Values, own: Values, switch: Number, /
+        self, maths: Maths, oscillator: "SteadyOscillator", pose: Pose, given: Values, own: Values, switch: Number, /
     ) -> tuple[Number, Number]:
         """Return z, rad or m, and z˙ in the periodic steady state."""
 
 
-class Reading(Protocol[Pose]):
+class ReadingFormula(Protocol[Pose]):
     """reading(maths, pose, given, own): a value read from the solved motion at one instant."""
 
     def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, /) -> Number:
@@ -80,7 +80,7 @@ def nothing_unknown(words: Mapping[str, str]) -> tuple[Place, ...]:
     return ()
 
 
-class Clash(NamedTuple):
+class EffectClash(NamedTuple):
     """Another effect that one cannot stand beside, and why; key, words: only while that key of its table says so."""
 
     effect: str
@@ -118,7 +118,7 @@ class Effect:
     reads: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     beside: tuple[str, ...] = ()
-    clashes: tuple[Clash, ...] = ()
+    clashes: tuple[EffectClash, ...] = ()
     examples: tuple[Mapping[str, str], ...] = ({},)
     letters: Mapping[str, str] = field(default_factory=dict)
     figures: tuple[Figure, ...] = ()
@@ -154,12 +154,12 @@ class Load(Effect, Generic[Pose]):
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
     moved: Callable[[Values, Values], Number] | None = None
-    response: Response[Pose] | None = None
+    response: ResponseFormula[Pose] | None = None
     symbol: str = ""
     told: Mapping[float, str] = field(default_factory=dict)
 
 
-class Axis(NamedTuple):
+class FlatNumber(NamedTuple):
     """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
 
     name: str
@@ -171,7 +171,7 @@ def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
     return {}
 
 
-def nothing_remarked(given: Values, own: Values, shown: Shown) -> str:
+def nothing_remarked(given: Values, own: Values, shown: ShowValue) -> str:
     """Return nothing: the figures stand for themselves."""
     return ""
 
@@ -181,7 +181,7 @@ def nothing_explained(
     bounds: Mapping[str, tuple[float, float]],
     own: Any,
     clash: Collection[str],
-    shown: Shown,
+    shown: ShowValue,
 ) -> str:
     """Return nothing: physics has nothing general to say."""
     return ""
@@ -199,16 +199,16 @@ class Check(Effect, Generic[Pose]):
     explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
     """
 
-    quantities: Mapping[str, Reading[Pose]] = field(default_factory=dict)
+    quantities: Mapping[str, ReadingFormula[Pose]] = field(default_factory=dict)
     rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
     demands: tuple[Demand, ...] = ()
     least: str = ""
-    axes: tuple[Axis, ...] = ()
+    axes: tuple[FlatNumber, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
-    remark: Callable[[Values, Values, Shown], str] = nothing_remarked
-    explain: Callable[[Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], Shown], str] = (
-        nothing_explained
-    )
+    remark: Callable[[Values, Values, ShowValue], str] = nothing_remarked
+    explain: Callable[
+        [Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], ShowValue], str
+    ] = nothing_explained
 
     def __post_init__(self) -> None:
         """Raise ValueError for what no job could keep."""
@@ -228,14 +228,14 @@ class Check(Effect, Generic[Pose]):
             raise ValueError(f"effect {self.name}: {faults[0]}")
 
 
-class Peak(NamedTuple):
+class StatePeak(NamedTuple):
     """A figure of a state: the largest |value| over the cycle, or the least value, of what is read."""
 
     read: "Callable[[Moved], Number]"
     least: bool = False
 
 
-def no_oscillator(maths: Maths, given: Values, own: Values) -> "Oscillator":
+def no_oscillator(maths: Maths, given: Values, own: Values) -> "SteadyOscillator":
     """Raise LookupError: no load with corners is carried."""
     raise LookupError("the state answers no load with corners")
 
@@ -265,10 +265,10 @@ class State(Effect):
     term: "Callable[[Written, Values], Number]"
     between: tuple[str, str]
     rests: Callable[[Values], str]
-    oscillator: "Callable[[Maths, Values, Values], Oscillator]" = no_oscillator
+    oscillator: "Callable[[Maths, Values, Values], SteadyOscillator]" = no_oscillator
     fixed: "Callable[[Values, Values, Carried], Mapping[str, str]]" = lambda given, own, carried: {}
     samples: Callable[[Values, Values], float] = lambda given, own: 0.0
-    peaks: Mapping[str, Peak] = field(default_factory=dict)
+    peaks: Mapping[str, StatePeak] = field(default_factory=dict)
     columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
     acts: Literal["output"] = "output"
 
@@ -299,7 +299,7 @@ class Rule(NamedTuple):
     where: str = ""
 
 
-class Terms(NamedTuple):
+class EventTerms(NamedTuple):
     """Symbols of an event's equations: symbol(name); the output's terms in all, what of them is friction, the mass."""
 
     symbol: Callable[[str], Number]
@@ -326,7 +326,7 @@ class Event(Effect):
     places: Callable[[Values], Mapping[str, float]]
     follow: "Callable[[Body, Cam, Values], Course]"
     read: "Callable[[Course], Mapping[str, float | None]]"
-    rules: Callable[[Terms], Sequence[Rule]]
+    rules: Callable[[EventTerms], Sequence[Rule]]
 
     def rests(self, own: Values) -> str:
         """Return what of it no proof and no study of accuracy covers."""
@@ -348,7 +348,7 @@ def ranked(effects: Iterable[Effect]) -> dict[str, Effect]:
     return {effect.name: effect for effect in sorted(effects, key=lambda effect: (effect.rank, effect.name))}
 
 
-class Oscillator(Protocol):
+class SteadyOscillator(Protocol):
     """What a state is made of, as `motion/harmonic.py` has it: what a load with corners makes of it is read here."""
 
     @property

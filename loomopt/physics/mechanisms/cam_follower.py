@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from loomopt.base.records import lazy
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.physics.mechanisms.dyad import Vector
 
@@ -154,7 +154,7 @@ def _points(points: Vector) -> "Floats":
     return np.column_stack((points.x, points.y))
 
 
-def fault(follower: Follower, shown: Shown = usual) -> str:
+def fault(follower: Follower, shown: ShowValue = usual) -> str:
     """Say why a follower of floats (m, rad) cannot work; "" when it can.
 
     shown(value, kind): a value as text in the reader's unit.

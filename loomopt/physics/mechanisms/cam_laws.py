@@ -16,7 +16,7 @@ from typing import NamedTuple
 from loomopt.maths.systems import Maths, Number
 
 
-class Derivatives(NamedTuple):
+class LawDerivatives(NamedTuple):
     """The law s(u) and its first three derivatives with respect to u: velocity, acceleration, jerk."""
 
     s: Number
@@ -38,7 +38,7 @@ class Law:
     name: str
     breaks: tuple[Fraction, ...]
     smooth: int
-    formula: Callable[[Maths, Number, Number], Derivatives]
+    formula: Callable[[Maths, Number, Number], LawDerivatives]
     symmetric: bool
 
 
@@ -47,24 +47,24 @@ def _halves(maths: Maths, u: Number) -> tuple[Number, Number]:
     return maths.sin(maths.pi * u / 2), maths.sin(maths.pi * (1 - u) / 2)
 
 
-def _harmonic(maths: Maths, u: Number, _piece: Number) -> Derivatives:
+def _harmonic(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
     """Half a cosine wave of displacement: the acceleration jumps at the dwells."""
     pi = maths.pi
     rise, rest = _halves(maths, u)
     sine, cosine = 2 * rise * rest, (rest - rise) * (rest + rise)
-    return Derivatives(rise**2, pi * sine / 2, pi**2 * cosine / 2, -(pi**3) * sine / 2)
+    return LawDerivatives(rise**2, pi * sine / 2, pi**2 * cosine / 2, -(pi**3) * sine / 2)
 
 
-def _harmonics(first: int, third: int) -> Callable[[Maths, Number, Number], Derivatives]:
+def _harmonics(first: int, third: int) -> Callable[[Maths, Number, Number], LawDerivatives]:
     """Return the law s' = 1 − (first·cos x + third·cos 3x)/(first + third), x = 2πu, in powers of sin x and sin x/2."""
     total = first + third
 
-    def formula(maths: Maths, u: Number, _piece: Number) -> Derivatives:
+    def formula(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
         pi = maths.pi
         rise, rest = _halves(maths, u)
         half = 2 * rise * rest
         sine, cosine = 2 * half * (rest - rise) * (rest + rise), 1 - 2 * half**2
-        return Derivatives(
+        return LawDerivatives(
             u - sine * (3 * total - 4 * third * sine**2) / (6 * total * pi),
             2 * half**2 * (first + third * (3 - 4 * half**2) ** 2) / total,
             2 * pi * sine * (first + 9 * third - 12 * third * sine**2) / total,
@@ -74,13 +74,13 @@ def _harmonics(first: int, third: int) -> Callable[[Maths, Number, Number], Deri
     return formula
 
 
-def _modified_sine(maths: Maths, u: Number, piece: Number) -> Derivatives:
+def _modified_sine(maths: Maths, u: Number, piece: Number) -> LawDerivatives:
     """Acceleration of a quarter sine, half a sine three times as long, a quarter sine; each about its own zero at t."""
     pi, scale = maths.pi, 4 + maths.pi
     zero, wave, long = (maths.choose(piece, values) for values in ((0, 1, 2), (-1, 1, -1), (1, 3, 1)))
     t = (2 * u - zero) / 2
     sine, cosine = maths.sin(4 * pi * t / long), maths.cos(4 * pi * t / long)
-    return Derivatives(
+    return LawDerivatives(
         (zero + (4 * pi * t + wave * long**2 * sine) / (2 * scale)) / 2,
         pi * (1 + wave * long * cosine) / scale,
         -4 * pi**2 * wave * sine / scale,
@@ -88,7 +88,7 @@ def _modified_sine(maths: Maths, u: Number, piece: Number) -> Derivatives:
     )
 
 
-def _modified_trapezoid(maths: Maths, u: Number, piece: Number) -> Derivatives:
+def _modified_trapezoid(maths: Maths, u: Number, piece: Number) -> LawDerivatives:
     """Acceleration of a trapezoid whose flanks are quarter sines; t is counted from u = 0, 1/2 or 1.
 
     wave: sign of the sine; level: sign of the constant acceleration; middle: 1 in the middle piece.
@@ -100,7 +100,7 @@ def _modified_trapezoid(maths: Maths, u: Number, piece: Number) -> Derivatives:
     sine, cosine = maths.sin(4 * pi * t), maths.cos(4 * pi * t)
     ramp = 8 * t - level
     parabola = level * ramp**2 / 16 + 2 * middle * t
-    return Derivatives(
+    return LawDerivatives(
         (zero + (4 * t - (wave * sine + level) / pi + 2 * pi * parabola) / scale) / 2,
         (2 - 2 * wave * cosine + pi * (level * ramp + 2 * middle)) / scale,
         8 * pi * (wave * sine + level) / scale,
@@ -108,25 +108,25 @@ def _modified_trapezoid(maths: Maths, u: Number, piece: Number) -> Derivatives:
     )
 
 
-def _polynomial_345(maths: Maths, u: Number, _piece: Number) -> Derivatives:
+def _polynomial_345(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
     """10u³ − 15u⁴ + 6u⁵ in Bernstein's form: no term cancels another."""
     rest, both, slope = 1 - u, u * (1 - u), 1 - 2 * u
     s = u**3 * (rest * (10 * rest + 5 * u) + u**2)
-    return Derivatives(s, 30 * both**2, 60 * both * slope, 60 * (1 - 6 * both))
+    return LawDerivatives(s, 30 * both**2, 60 * both * slope, 60 * (1 - 6 * both))
 
 
-def _polynomial_4567(maths: Maths, u: Number, _piece: Number) -> Derivatives:
+def _polynomial_4567(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
     """35u⁴ − 84u⁵ + 70u⁶ − 20u⁷ in Bernstein's form."""
     rest, both, slope = 1 - u, u * (1 - u), 1 - 2 * u
     s = u**4 * (rest * (rest * (35 * rest + 21 * u) + 7 * u**2) + u**3)
-    return Derivatives(s, 140 * both**3, 420 * both**2 * slope, 840 * both * (1 - 5 * both))
+    return LawDerivatives(s, 140 * both**3, 420 * both**2 * slope, 840 * both * (1 - 5 * both))
 
 
-def _polynomial_56789(maths: Maths, u: Number, _piece: Number) -> Derivatives:
+def _polynomial_56789(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
     """126u⁵ − 420u⁶ + 540u⁷ − 315u⁸ + 70u⁹ in Bernstein's form."""
     rest, both, slope = 1 - u, u * (1 - u), 1 - 2 * u
     s = u**5 * (rest * (rest * (rest * (126 * rest + 84 * u) + 36 * u**2) + 9 * u**3) + u**4)
-    return Derivatives(s, 630 * both**4, 2520 * both**3 * slope, 2520 * both**2 * (3 - 14 * both))
+    return LawDerivatives(s, 630 * both**4, 2520 * both**3 * slope, 2520 * both**2 * (3 - 14 * both))
 
 
 def _eighths(*counts: int) -> tuple[Fraction, ...]:

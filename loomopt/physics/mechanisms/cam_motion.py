@@ -11,7 +11,7 @@ from typing import Protocol
 from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.maths.turning_points import crossing
 from loomopt.physics.mechanisms import cam_spline
-from loomopt.physics.mechanisms.cam_laws import LAWS, Derivatives
+from loomopt.physics.mechanisms.cam_laws import LAWS, LawDerivatives
 from loomopt.physics.schema import Values
 
 PREFIX = "law_"
@@ -36,7 +36,7 @@ class CamLaw(Hashable, Protocol):
     def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
         """Return what every position shares."""
 
-    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """Return s and its derivatives at u."""
 
 
@@ -65,7 +65,7 @@ class Named:
         """Return nothing."""
         return {}
 
-    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """Return s and its derivatives at u."""
         return LAWS[self.name].formula(maths, u, piece)
 
@@ -135,9 +135,9 @@ class Spline:
         """Return the name of s, v or a (= s, s', s'') at a knot."""
         return f"{PREFIX}{of}_{k}"
 
-    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """Return s and its derivatives at u."""
-        columns = (Column(values, names) for names in self._ends)
+        columns = (LawColumn(values, names) for names in self._ends)
         return cam_spline.cubic(
             self.intervals * u - piece, self.intervals, *(maths.choose(piece, column) for column in columns)
         )
@@ -149,7 +149,7 @@ class Spline:
         return s[:-1], v[:-1], a[:-1], a[1:]
 
 
-class Column(Sequence[Number]):
+class LawColumn(Sequence[Number]):
     """Values by names in order, each read when it is asked for: a choice among them reads one."""
 
     def __init__(self, values: Values, names: tuple[str, ...]) -> None:
@@ -172,7 +172,7 @@ class Column(Sequence[Number]):
 class Tabulated:
     """A law through the points of a table."""
 
-    table: cam_spline.Table
+    table: cam_spline.LawTable
 
     @property
     def key(self) -> Hashable:
@@ -193,7 +193,7 @@ class Tabulated:
         """Return nothing."""
         return {}
 
-    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
         """Return s and its derivatives at u."""
         return self.table.at(maths, u, piece)
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.mechanisms.cam_laws import Derivatives
+from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +31,7 @@ DIP = 5e-3
 
 
 @dataclass(frozen=True)
-class Spline:
+class SplineData:
     """A cubic spline on n equal intervals; s'' is piecewise linear.
 
     s, v, a: displacement and its first two derivatives at the n + 1 knots k/n, numbers of one system.
@@ -56,18 +56,18 @@ class Spline:
         """s(1) and s'(1): 1 and 0 for a law that ends in a dwell."""
         return self.s[-1], self.v[-1]
 
-    def at(self, maths: Maths, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, u: Number, piece: Number) -> LawDerivatives:
         """Return s(u) and its derivatives on interval `piece`."""
         columns = self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:]
         return cubic(self.intervals * u - piece, self.intervals, *(maths.choose(piece, values) for values in columns))
 
 
-def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number) -> Derivatives:
+def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number) -> LawDerivatives:
     """Return s and its derivatives at a share of one of n equal intervals, from s, s', s'' at its beginning and s''
     at its end.
     """
     t, rise = share / n, after - a
-    return Derivatives(
+    return LawDerivatives(
         s + t * (v + t * (a / 2 + rise * share / 6)),
         v + t * (a + rise * share / 2),
         a + rise * share,
@@ -75,7 +75,7 @@ def cubic(share: Number, n: int, s: Number, v: Number, a: Number, after: Number)
     )
 
 
-def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
+def spline(maths: Maths, accelerations: Sequence[Number]) -> SplineData:
     """Return the spline that starts at rest with second derivatives a_0 … a_n at its evenly spaced knots.
 
     s and v are running sums, linear in the accelerations: with symbols for these, s(1) = 1 and s'(1) = 0 are linear.
@@ -86,7 +86,7 @@ def spline(maths: Maths, accelerations: Sequence[Number]) -> Spline:
         height, slope = after(len(a) - 1, s[k], v[k], a[k], a[k + 1])
         s.append(height)
         v.append(slope)
-    return Spline(tuple(s), tuple(v), a)
+    return SplineData(tuple(s), tuple(v), a)
 
 
 def after(n: int, s: Number, v: Number, before: Number, end: Number) -> tuple[Number, Number]:
@@ -115,7 +115,7 @@ def cycloid_like(n: int) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
-class Table:
+class LawTable:
     """The C² cubic through the points of a table, at rest at both ends; s'' need not be 0 there.
 
     u, s: the points; v, a: the slope and second derivative at each.
@@ -131,17 +131,17 @@ class Table:
         """The inner points, where the formula changes."""
         return tuple(Fraction(u) for u in self.u[1:-1])
 
-    def at(self, maths: Maths, u: Number, piece: Number) -> Derivatives:
+    def at(self, maths: Maths, u: Number, piece: Number) -> LawDerivatives:
         """Return s(u) and its derivatives on interval `piece`."""
         begin, end, s, v, a, after = (
             maths.choose(piece, [maths.number(value) for value in values])
             for values in (self.u[:-1], self.u[1:], self.s[:-1], self.v[:-1], self.a[:-1], self.a[1:])
         )
         t, jerk = u - begin, (after - a) / (end - begin)
-        return Derivatives(s + t * (v + t * (a / 2 + t * jerk / 6)), v + t * (a + t * jerk / 2), a + t * jerk, jerk)
+        return LawDerivatives(s + t * (v + t * (a / 2 + t * jerk / 6)), v + t * (a + t * jerk / 2), a + t * jerk, jerk)
 
 
-def tabulated(u: Sequence[float], s: Sequence[float]) -> Table:
+def tabulated(u: Sequence[float], s: Sequence[float]) -> LawTable:
     """Return the C² cubic through the points (u, s) with zero slope at both ends.
 
     Raises ValueError unless at least 4 points rise from (0, 0) to (1, 1) with u increasing and the curve between them
@@ -157,7 +157,7 @@ def tabulated(u: Sequence[float], s: Sequence[float]) -> Table:
     bends = _second_derivatives(steps, slopes)
     rates = np.concatenate([[0.0], slopes[1:] - steps[1:] * (2 * bends[1:-1] + bends[2:]) / 6, [0.0]])
     _refuse_a_fall(places, rates, bends)
-    return Table(*(tuple(values.tolist()) for values in (places, heights, rates, bends)))
+    return LawTable(*(tuple(values.tolist()) for values in (places, heights, rates, bends)))
 
 
 def _table_fault(u: "Floats", s: "Floats") -> str:
@@ -234,7 +234,7 @@ def fault(accelerations: tuple[float, ...]) -> str:
     return ""
 
 
-def _least_slope(made: Spline, k: int) -> float:
+def _least_slope(made: SplineData, k: int) -> float:
     """Return the least s' on an interval, where s'' is linear."""
     before, after = made.a[k : k + 2]
     turn = before / (before - after) if before < 0 < after else 1.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.records import lazy
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.maths.systems import Maths, Number, numpy
 from loomopt.physics.mechanisms import dyad
 from loomopt.physics.mechanisms.dyad import Vector
@@ -32,7 +32,7 @@ class Lengths(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Pose:
+class CrankRockerPose:
     """The linkage at crank angles φ, any shape; each figure is computed when it is first read."""
 
     maths: Maths
@@ -130,7 +130,7 @@ def curves(lengths: Lengths, phi: "Floats", chunk: int = 8192) -> tuple["Floats"
     flat, found = phi.ravel(), np.empty((3, phi.size))
     for begin in range(0, phi.size, chunk):
         part = slice(begin, begin + chunk)
-        pose = Pose(numpy(), lengths, flat[part])
+        pose = CrankRockerPose(numpy(), lengths, flat[part])
         found[0, part], found[1, part], found[2, part] = pose.psi, pose.psi_1, pose.psi_2
     psi, psi_1, psi_2 = found.reshape(3, *phi.shape)
     return psi, psi_1, psi_2
@@ -217,7 +217,7 @@ class DeadCentres:
 
 
 @dataclass(frozen=True)
-class Still(Pose):
+class Still(CrankRockerPose):
     """The linkage with crank and rod in line, exact: ψ' = 0, the rod turns against the crank, ψ'' in closed form."""
 
     centres: "DeadCentres"
@@ -282,7 +282,7 @@ TELLING = 1e-15
 """Share of the links' sum below which a margin cannot be told from rounding: the linkage is at its change point."""
 
 
-def fault(l1: float, l2: float, l3: float, l4: float, *, shown: Shown = usual) -> str:
+def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usual) -> str:
     """Say why four lengths (m) are no crank-rocker: the inequality and where the crank stops; "" when they are one.
 
     shown(value, kind): a value as text in the reader's unit.
@@ -303,7 +303,7 @@ def fault(l1: float, l2: float, l3: float, l4: float, *, shown: Shown = usual) -
     return f"{reason}; {_where_it_stops(l1, l2, l3, l4, shown)}"
 
 
-def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: Shown) -> str:
+def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: ShowValue) -> str:
     """Say over which crank angles the dyad does not close, for lengths in m."""
     reach, fold = l2 + l3, abs(l2 - l3)
     if l1 + l4 < fold or abs(l4 - l1) > reach:

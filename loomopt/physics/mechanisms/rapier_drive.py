@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base.records import lazy
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.mechanisms import crank_rocker, dyad
@@ -108,7 +108,7 @@ def sley_lengths(dimensions: Dimensions, mirror: int = 1) -> Lengths:
 
 
 @dataclass(frozen=True)
-class Pose:
+class RapierPose:
     """The drive at crank angles φ1, any shape; derivatives with respect to φ1; each figure computed when first read.
 
     D lies to the right of C→B2, as the paper assembles it (to the left in a mirrored drive).
@@ -120,11 +120,11 @@ class Pose:
     phi1: Number
 
     @lazy
-    def four_bar(self) -> crank_rocker.Pose:
+    def four_bar(self) -> crank_rocker.CrankRockerPose:
         """The sley four-bar, its derivatives with respect to its own crank angle."""
         stand = self.stand
         lengths = sley_lengths(self.dimensions, stand.mirror)
-        return crank_rocker.Pose(self.maths, lengths, stand.sense * self.phi1 + stand.beta)
+        return crank_rocker.CrankRockerPose(self.maths, lengths, stand.sense * self.phi1 + stand.beta)
 
     @lazy
     def phi3(self) -> Number:
@@ -260,7 +260,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Layout:
+class DriveLayout:
     """What the paper's construction returns: pivot C0, m, l4 + l5, m, and φ40, rad."""
 
     C0x: Number
@@ -269,7 +269,7 @@ class Layout:
     phi40: Number
 
 
-def construct(maths: Maths, dimensions: Dimensions, phi3M: Number, phi63: Number) -> Layout:
+def construct(maths: Maths, dimensions: Dimensions, phi3M: Number, phi63: Number) -> DriveLayout:
     """Return the paper's own layout in closed form [Hong17]: C0 on A0's vertical, crank and link stretched twice.
 
     C0 is equally far from D at front dead centre (driving link in line with φ30) and at the hand-over, where the sley
@@ -286,14 +286,14 @@ def construct(maths: Maths, dimensions: Dimensions, phi3M: Number, phi63: Number
     squares = dot(front, front) - dot(over, over)
     C0y = (squares / 2 - A0x * (front.x - over.x)) / (front.y - over.y)
     reach = Vector(front.x - A0x, front.y - C0y)
-    return Layout(A0x, C0y, maths.sqrt(dot(reach, reach)), maths.atan2(reach.y, reach.x))
+    return DriveLayout(A0x, C0y, maths.sqrt(dot(reach, reach)), maths.atan2(reach.y, reach.x))
 
 
 FAULT_SAMPLES = 3600
 Floats = NDArray[np.float64]
 
 
-def fault(dimensions: Dimensions, shown: Shown = usual) -> str:
+def fault(dimensions: Dimensions, shown: ShowValue = usual) -> str:
     """Say why a drive (m, rad) does not turn all round, and at which crank angles from FDC; "" when it does.
 
     shown(value, kind): a value as text in the reader's unit.
@@ -320,7 +320,7 @@ def fault(dimensions: Dimensions, shown: Shown = usual) -> str:
 
 def _span(d: Dimensions, phi1: NDArray[np.floating[Any]]) -> Floats:
     """Return the distance of C and B2, m, at crank angles φ1, rad."""
-    base = Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, phi1).base
+    base = RapierPose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, phi1).base
     return np.asarray(np.sqrt(dot(base, base)), dtype=np.float64)
 
 
@@ -340,7 +340,7 @@ def _angles(d: Dimensions) -> Floats:
     return np.unique(np.concatenate([even, np.mod(found, 2 * math.pi)]))
 
 
-def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: Shown) -> str:
+def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: ShowValue) -> str:
     """Return the stretches of crank angle, rad, where something holds, as words; one across FDC ends past a turn."""
     inside = [int(k) for k in np.flatnonzero(open_at)]
     runs: list[list[int]] = []
@@ -355,7 +355,7 @@ def _stretches(angles: Floats, open_at: NDArray[np.bool_], shown: Shown) -> str:
     return " and ".join(f"from {shown(begin, 'angle', 4)} to {shown(end, 'angle', 4)}" for begin, end in spans)
 
 
-def fault_of(design: Mapping[str, float], shown: Shown = usual) -> str:
+def fault_of(design: Mapping[str, float], shown: ShowValue = usual) -> str:
     """Return `fault` of numbers by name, SI; "" where some of them are not named."""
     names = Dimensions.__dataclass_fields__
     if not all(name in design for name in names):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from loomopt.maths.turning_points import crossing
-from loomopt.physics.motion.free import Body, Moving, Piece, bound, safe, unhindered
+from loomopt.physics.motion.free import Body, FreePiece, Moving, bound, safe, unhindered
 
 TURN = 2 * math.pi
 CHATTER = 1e-6
@@ -43,7 +43,7 @@ class Cam:
     pulls: tuple[tuple[float, float], ...]
 
 
-class State(NamedTuple):
+class FlightState(NamedTuple):
     """Of a body in flight: position, m, and speed, m/s."""
 
     x: float
@@ -55,7 +55,7 @@ class Stretch(NamedTuple):
 
     begin: float
     end: float
-    piece: Piece | None
+    piece: FreePiece | None
 
 
 class Landing(NamedTuple):
@@ -73,7 +73,7 @@ class Turn:
     stretches: tuple[Stretch, ...]
     lifts: tuple[float, ...]
     landings: tuple[Landing, ...]
-    end: State | None
+    end: FlightState | None
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
 
     Raises ArithmeticError where a turn does not end in a reasonable number of pieces.
     """
-    states: list[State | None] = [None]
+    states: list[FlightState | None] = [None]
     found: list[Turn] = []
     rule = _Rule(body, cam, restitution)
     while len(found) < turns:
@@ -157,7 +157,7 @@ def follow(body: Body, cam: Cam, restitution: float, turns: int) -> Course:
     return Course(body, cam, tuple(found), None)
 
 
-def _same(one: State | None, other: State | None, cam: Cam) -> bool:
+def _same(one: FlightState | None, other: FlightState | None, cam: Cam) -> bool:
     """Say whether two states are one."""
     if one is None or other is None:
         return one is other
@@ -173,7 +173,7 @@ class _Rule:
     cam: Cam
     restitution: float
 
-    def turn(self, state: State | None) -> Turn:
+    def turn(self, state: FlightState | None) -> Turn:
         """Return the turn from a state, None for contact."""
         angle, stretches, lifts, landings = 0.0, list[Stretch](), list[float](), list[Landing]()
         blind = 0.0
@@ -187,23 +187,23 @@ class _Rule:
                 angle = max(begin, angle)
                 lifts.append(angle)
                 there = self.cam.motion(angle)
-                state, blind = State(there.x, there.v), self._blind(angle, end)
+                state, blind = FlightState(there.x, there.v), self._blind(angle, end)
             piece = self._piece(angle, state)
             time, how = self._ends(piece, blind)
             end_angle, at = min(angle + self.cam.omega * time, TURN), piece.at(time)
             end_angle = TURN if how == "turn" else end_angle
             stretches.append(Stretch(angle, end_angle, piece))
             blind = max(0.0, blind - time)
-            angle, state = end_angle, State(at.x, at.v)
+            angle, state = end_angle, FlightState(at.x, at.v)
             if how == "turn":
                 return Turn(tuple(stretches), tuple(lifts), tuple(landings), state)
             if how == "landing":
                 state, blind, landing = self._landed(angle, state)
                 landings.append(landing)
             elif how == "rest":
-                state = State(at.x, 0.0)
+                state = FlightState(at.x, 0.0)
             else:
-                state = State(self.body.corners[int(how)], at.v)
+                state = FlightState(self.body.corners[int(how)], at.v)
         raise ArithmeticError(f"more than {MOST_PIECES} pieces of flight in one turn")
 
     def _pull(self, angle: float) -> tuple[float, float]:
@@ -218,19 +218,19 @@ class _Rule:
         """
         return min((end - angle) / self.cam.omega, self.body.quarter)
 
-    def _landed(self, angle: float, state: State) -> tuple[State | None, float, Landing]:
+    def _landed(self, angle: float, state: FlightState) -> tuple[FlightState | None, float, Landing]:
         """Return the state after a landing, how long no landing can follow, and the landing."""
         cam = self.cam.motion(angle)
         speed = min(state.v - cam.v, 0.0)
         rebound = -self.restitution * speed
         if rebound > CHATTER * self.cam.fastest:
-            return State(cam.x, cam.v + rebound), 0.0, Landing(angle, speed, True)
+            return FlightState(cam.x, cam.v + rebound), 0.0, Landing(angle, speed, True)
         begin, end = self._pull(angle)
         if begin <= angle:
-            return State(cam.x, cam.v), self._blind(angle, end), Landing(angle, speed, True)
+            return FlightState(cam.x, cam.v), self._blind(angle, end), Landing(angle, speed, True)
         return None, 0.0, Landing(angle, speed, False)
 
-    def _piece(self, angle: float, state: State) -> Piece:
+    def _piece(self, angle: float, state: FlightState) -> FreePiece:
         """Return the free motion from a state."""
         body = self.body
         zone = sum(state.x > corner or (state.x == corner and state.v > 0.0) for corner in body.corners)
@@ -239,9 +239,9 @@ class _Rule:
         sign = int(math.copysign(1.0, state.v or -back)) if body.friction > 0.0 else 0
         push = -(back + sign * body.friction) / body.mass
         sigma, kappa = body.damping / (2 * body.mass), body.zones[zone].stiffness / body.mass
-        return Piece(angle, state.x, state.v, zone, sign, sigma, kappa, push, stuck)
+        return FreePiece(angle, state.x, state.v, zone, sign, sigma, kappa, push, stuck)
 
-    def _ends(self, piece: Piece, blind: float) -> tuple[float, str]:
+    def _ends(self, piece: FreePiece, blind: float) -> tuple[float, str]:
         """Return how long, s, a piece lasts and what ends it: "landing", "rest", a corner's number, or the "turn"."""
         omega = self.cam.omega
         last, time = (TURN - piece.begin) / omega, 0.0

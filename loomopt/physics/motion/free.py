@@ -91,7 +91,7 @@ def _series(sigma: float, kappa: float, time: float) -> Response:
 
 
 @dataclass(frozen=True)
-class Piece:
+class FreePiece:
     """Free motion under one formula from a turn's angle `begin`, rad, on: linear, or at rest where it sticks.
 
     sign: which way friction takes it to move; push: acceleration at the beginning but for damping, m/s².
@@ -122,7 +122,7 @@ class Piece:
         return -2 * self.sigma * at.a - self.kappa * at.v
 
 
-def unhindered(piece: Piece, at: Moving, body: Body, left: float) -> Iterator[tuple[float, str]]:
+def unhindered(piece: FreePiece, at: Moving, body: Body, left: float) -> Iterator[tuple[float, str]]:
     """Yield for how long, s, the formula surely holds: until the motion turns under friction, and at each corner."""
     if piece.stuck:
         return
@@ -139,7 +139,7 @@ def unhindered(piece: Piece, at: Moving, body: Body, left: float) -> Iterator[tu
                 yield safe(away, rate, bend), str(place)
 
 
-def bound(piece: Piece, at: Moving, left: float) -> float:
+def bound(piece: FreePiece, at: Moving, left: float) -> float:
     """Return what |ẍ| cannot exceed during the time left, s: ẍ² + x⃛²/kappa never grows, nor does x⃛² + kappa ẍ²."""
     if piece.stuck:
         return 0.0

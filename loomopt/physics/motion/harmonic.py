@@ -122,7 +122,7 @@ def constants(
     return begun._replace(cosine=cosine, sine=sine)
 
 
-class Series(NamedTuple):
+class FourierSeries(NamedTuple):
     """Harmonics of a periodic number: Σ cosines[n] cos nφ + sines[n] sin nφ, n from 0 on; sines[0] = 0."""
 
     cosines: Sequence[Number]
@@ -142,12 +142,12 @@ class Series(NamedTuple):
         return max(sizes[-LAST:]) / (max(sizes) or 1.0)
 
 
-def harmonics(maths: Maths, count: int, weigh: Weigh) -> Series:
+def harmonics(maths: Maths, count: int, weigh: Weigh) -> FourierSeries:
     """Return the first `count` harmonics of a smooth force, by the trapezoidal rule on twice as many angles."""
     # What is recorded on a tape must not outlive it.
     angles, weights = _made(maths, count) if maths.name == "recorded" else _kept(maths, count)
     sums = weigh(angles, weights)
-    return Series(sums[:count], [0 * sums[0], *sums[count:]])
+    return FourierSeries(sums[:count], [0 * sums[0], *sums[count:]])
 
 
 def _made(maths: Maths, count: int) -> tuple[Sequence[Number], Sequence[Sequence[Number]]]:
@@ -179,7 +179,7 @@ def enough(weigh: Weigh, maths: Maths, begun: int = FEWEST) -> int:
     return count
 
 
-def answered(oscillator: Oscillator, force: Series) -> tuple[Series, Series]:
+def answered(oscillator: Oscillator, force: FourierSeries) -> tuple[FourierSeries, FourierSeries]:
     """Return the harmonics of z and of k z + c z˙ in answer to those of a force."""
     of = oscillator.of
     positions: list[Pair] = []
@@ -190,11 +190,11 @@ def answered(oscillator: Oscillator, force: Series) -> tuple[Series, Series]:
         drag = n * of.omega * of.damping
         positions.append(z)
         torques.append((of.stiffness * z[0] + drag * z[1], of.stiffness * z[1] - drag * z[0]))
-    z_series, torque_series = (Series(*zip(*pairs, strict=True)) for pairs in (positions, torques))
+    z_series, torque_series = (FourierSeries(*zip(*pairs, strict=True)) for pairs in (positions, torques))
     return z_series, torque_series
 
 
-def named(prefix: str, values: Constants | Series) -> dict[str, Number]:
+def named(prefix: str, values: Constants | FourierSeries) -> dict[str, Number]:
     """Return numbers by name, as `read_constants` and `read_series` find them again."""
     if isinstance(values, Constants):
         return {f"{prefix}.{name}": value for name, value in values._asdict().items()}
@@ -207,7 +207,7 @@ def read_constants(prefix: str, values: Mapping[str, Number]) -> Constants:
     return Constants(*(values[f"{prefix}.{name}"] for name in Constants._fields))
 
 
-def read_series(prefix: str, values: Mapping[str, Number], count: int) -> Series:
+def read_series(prefix: str, values: Mapping[str, Number], count: int) -> FourierSeries:
     """Return the first `count` harmonics of a name."""
     sines = [0, *(values[f"{prefix}.sin {n}"] for n in range(1, count))]
-    return Series([values[f"{prefix}.cos {n}"] for n in range(count)], sines)
+    return FourierSeries([values[f"{prefix}.cos {n}"] for n in range(count)], sines)

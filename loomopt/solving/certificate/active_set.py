@@ -16,7 +16,7 @@ MOVED = 100 * SAME_NODE
 
 
 @dataclass(frozen=True)
-class Row:
+class ActiveRow:
     """One smooth function of the design, in its natural size.
 
     A limit's residual or an objective's piece, either of them maybe at an extreme of the cycle (`node`). reads: the
@@ -43,7 +43,7 @@ class ActiveSet:
     of an equality the magnitude.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[ActiveRow, ...]
     limits: int
     levels: tuple[tuple[int, ...], ...]
     zero: tuple[bool, ...]
@@ -63,32 +63,32 @@ def active_set(program: Program, sampler: Sampler) -> ActiveSet:
     return ActiveSet(tuple(rows), count, tuple(levels), tuple(zero), excess)
 
 
-def _limit_rows(sampler: Sampler, place: int, limit: Limit) -> list[Row]:
+def _limit_rows(sampler: Sampler, place: int, limit: Limit) -> list[ActiveRow]:
     """Return the rows of a limit that is touched; each touching extreme of a whole-cycle limit is one."""
     return [
-        Row(of.name, of.row, of.scale, node.sign if node else 1.0, place, excess, of, node)
+        ActiveRow(of.name, of.row, of.scale, node.sign if node else 1.0, place, excess, of, node)
         for of, excess, node in limit.touches(sampler)
     ]
 
 
-def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[Row]:
+def _pieces(sampler: Sampler, place: int, objective: Objective) -> list[ActiveRow]:
     """Return the smooth pieces the largest of which is what an objective is worth."""
     found = objective.pieces(sampler)
     top, scale = max(piece.value for piece in found), objective.scale
     return [
-        Row(objective.figure, name, scale, sign, place, (value - top) / scale, node=node)
+        ActiveRow(objective.figure, name, scale, sign, place, (value - top) / scale, node=node)
         for name, value, sign, node in found
         if len(found) == 1 or value >= top - ACTIVE * scale
     ]
 
 
-def moved(rows: Sequence[Row], sampler: Sampler) -> tuple[Row, ...] | None:
+def moved(rows: Sequence[ActiveRow], sampler: Sampler) -> tuple[ActiveRow, ...] | None:
     """Return rows with their extremes as they are at another design; None where one is gone."""
     found = [_moved(row, sampler) for row in rows]
     return None if None in found else tuple(row for row in found if row)
 
 
-def _moved(row: Row, sampler: Sampler) -> Row | None:
+def _moved(row: ActiveRow, sampler: Sampler) -> ActiveRow | None:
     if row.node is None:
         return row
     piece, u = row.node.piece, row.node.u

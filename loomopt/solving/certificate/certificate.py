@@ -18,7 +18,7 @@ from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives import Derivatives
 from loomopt.solving.certificate.derivatives_jets import Forward
-from loomopt.solving.certificate.kkt import Multipliers, System, priced
+from loomopt.solving.certificate.kkt import LevelMultipliers, System, priced
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
 from loomopt.solving.certificate.verdict import Binding, Certificate, Level
@@ -46,12 +46,12 @@ class JudgedLevel:
     """One level: its residuals, the multipliers they are of, and its curvature (None where there was none to judge)."""
 
     level: Level
-    multipliers: Multipliers
+    multipliers: LevelMultipliers
     curvature: Curvature | None = None
 
 
 @dataclass(frozen=True)
-class Cycle:
+class WholeCycle:
     """What holds over the whole cycle: by how much a refined value is exceeded, and what boxes say."""
 
     violation: float
@@ -83,7 +83,7 @@ def certified(
         found = derivatives(program, x, sampler, active.rows)
         local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
         rows = cycle_rows(program)
-        cycle = Cycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
+        cycle = WholeCycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
         return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         reason = f"a value or a slope is no number here ({type(error).__name__})"
@@ -96,7 +96,7 @@ def judged_levels(local: Local) -> list[JudgedLevel]:
     found: list[JudgedLevel] = []
     for place, objective in enumerate(local.program.objectives):
         if any(each.curvature and each.curvature.settled for each in found):
-            none = Multipliers(np.zeros(len(local.active.rows)), 0.0)
+            none = LevelMultipliers(np.zeros(len(local.active.rows)), 0.0)
             found.append(JudgedLevel(Level(objective.figure, 0.0, 0.0, 0.0), none))
         else:
             found.append(_judged_level(local, place, found))
@@ -122,7 +122,7 @@ def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> J
     return JudgedLevel(_residuals(local, place, system, multipliers, first.residual), multipliers, curvature)
 
 
-def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple[Multipliers, Curvature]:
+def _best(local: Local, place: int, system: System, first: LevelMultipliers) -> tuple[LevelMultipliers, Curvature]:
     """Return the multipliers under which the curvature is best, where several share the slopes."""
     curvature = second_order.judged(local, place, system, first)
     if curvature.minimum and curvature.unique:
@@ -143,7 +143,7 @@ def _best(local: Local, place: int, system: System, first: Multipliers) -> tuple
     return first, curvature
 
 
-def _residuals(local: Local, place: int, system: System, multipliers: Multipliers, residual: float) -> Level:
+def _residuals(local: Local, place: int, system: System, multipliers: LevelMultipliers, residual: float) -> Level:
     """Return one level's residuals, and the limit with the largest multiplier."""
     rows, of = local.active.rows, multipliers.of
     slack = max((abs(of[k] * rows[k].excess) for k in system.limits), default=0.0)
@@ -164,7 +164,7 @@ def _unserved(sampler: Sampler) -> str:
 
 
 def _certificate(
-    local: Local, cycle: Cycle, levels: Sequence[JudgedLevel], accuracy: float, model: str = ""
+    local: Local, cycle: WholeCycle, levels: Sequence[JudgedLevel], accuracy: float, model: str = ""
 ) -> Certificate:
     """Return what was verified, and every reason why it is not enough; model: why it is none for here, if so."""
     feasibility = float(max(0.0, *local.active.excess))
@@ -219,7 +219,7 @@ def _amiss(local: Local, feasibility: float) -> Iterator[str]:
         yield f"limit {local.program.limits[worst].name} is exceeded by {feasibility:.2g} of its size"
 
 
-def _open(cycle: Cycle, accuracy: float) -> Iterator[str]:
+def _open(cycle: WholeCycle, accuracy: float) -> Iterator[str]:
     """Yield why the whole cycle is not covered."""
     if not cycle.violation <= accuracy:
         yield f"a whole-cycle value is exceeded by {cycle.violation:.2g} between refined points"

@@ -7,7 +7,7 @@ from typing import ClassVar
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.solving.certificate.active_set import Row
+from loomopt.solving.certificate.active_set import ActiveRow
 
 
 class Derivatives(abc.ABC):
@@ -22,7 +22,7 @@ class Derivatives(abc.ABC):
     last: ClassVar[bool] = False
     """Whether no other way judges where these leave a verdict in doubt."""
 
-    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
+    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[ActiveRow]) -> None:
         self.program, self.sampler, self.rows = program, sampler, tuple(rows)
         self.names = [v.name for v in program.variables if v.name not in program.held]
         self.x = {name: x[name] for name in self.names}

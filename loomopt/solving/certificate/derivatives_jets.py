@@ -18,7 +18,7 @@ from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
-from loomopt.solving.certificate.active_set import Row
+from loomopt.solving.certificate.active_set import ActiveRow
 from loomopt.solving.certificate.derivatives import Derivatives
 
 
@@ -54,7 +54,7 @@ class Forward(Derivatives):
 
     by, error = "jets", JET_ERROR
 
-    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
+    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[ActiveRow]) -> None:
         super().__init__(program, x, sampler, rows)
         groups: dict[str, list[int]] = {}
         for k, row in enumerate(self.rows):

@@ -15,7 +15,7 @@ from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import NEWTON_SHIFT, ROUNDED, THIRD_STEP
-from loomopt.solving.certificate.active_set import Row
+from loomopt.solving.certificate.active_set import ActiveRow
 from loomopt.solving.certificate.derivatives import Derivatives
 
 DIGITS, FIRST_STEP, SECOND_STEP = 40, "1e-20", "1e-12"
@@ -31,7 +31,7 @@ class Exact(Derivatives):
 
     by, error, last = "40 digits", ROUNDED, True
 
-    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[Row]) -> None:
+    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[ActiveRow]) -> None:
         super().__init__(program, x, sampler, rows)
         self.maths = systems.mpmath(DIGITS)
         number: Callable[[Any], Number] = self.maths.number
@@ -126,7 +126,7 @@ class Exact(Derivatives):
         reading = self._reading(scaled)
         return [self._value(k, row, reading, moves[k] if len(moves) else 0) for k, row in enumerate(self.rows)]
 
-    def _value(self, k: int, row: Row, reading: Reading, move: Number) -> Number:
+    def _value(self, k: int, row: ActiveRow, reading: Reading, move: Number) -> Number:
         size = self.number(row.scale)
         if row.node:
             bound = self.number(row.limit.bound) if row.limit else 0
@@ -135,7 +135,7 @@ class Exact(Derivatives):
             return row.limit.residual(reading) / size
         return self.number(row.sign) * reading.single(row.reads) / size
 
-    def _settled(self, row: Row, node: Extreme, here: Reading) -> Number:
+    def _settled(self, row: ActiveRow, node: Extreme, here: Reading) -> Number:
         """Return u of an extreme after one Newton step in 40 digits; an extreme at a piece's end stays."""
         u, step = self.number(node.u), self.number(SECOND_STEP)
         if self.at_corner(node):
@@ -145,7 +145,7 @@ class Exact(Derivatives):
         shift = -(high - low) / (2 * step * bend) if bend else self.number(0)
         return u + shift if abs(shift) < self.number(NEWTON_SHIFT) else u
 
-    def _moving(self, k: int, row: Row, node: Extreme, directions: Sequence[Vector]) -> tuple[Floats, float]:
+    def _moving(self, k: int, row: ActiveRow, node: Extreme, directions: Sequence[Vector]) -> tuple[Floats, float]:
         """Return g_xu along each direction, and g_uu, of a row at an interior extreme."""
         u, step = self.u[k], self.number(SECOND_STEP)
         factor = self.number(row.sign) / self.number(row.scale)

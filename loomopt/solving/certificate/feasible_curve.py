@@ -21,7 +21,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, POLISH_DONE, POLISH_MET
-from loomopt.solving.certificate.active_set import Row, moved
+from loomopt.solving.certificate.active_set import ActiveRow, moved
 from loomopt.solving.certificate.valley import Closed, inverted
 from loomopt.solving.nlp.point import sampler_at
 
@@ -101,7 +101,7 @@ class FeasibleCurve:
 
     program: Program
     x: Mapping[str, float]
-    rows: tuple[Row, ...]
+    rows: tuple[ActiveRow, ...]
     scales: Mapping[str, float]
     sums: Floats
     jacobian: Floats
@@ -223,7 +223,7 @@ class FeasibleCurve:
         return None if rows is None else np.array([_value(row, sampler) for row in rows])
 
 
-def _value(row: Row, sampler: Sampler) -> float:
+def _value(row: ActiveRow, sampler: Sampler) -> float:
     if row.limit and row.node is None:
         return row.limit.excess(sampler)
     return row.sign * (row.node.value if row.node else sampler.single(row.reads)) / row.scale

@@ -64,7 +64,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Multipliers:
+class LevelMultipliers:
     """Multipliers of all rows, in natural sizes, and the slope they leave."""
 
     of: Floats
@@ -84,7 +84,7 @@ class Multipliers:
 
 
 def system(
-    active: ActiveSet, level: int, earlier: Sequence[Multipliers], fixed: Collection[str] = frozenset()
+    active: ActiveSet, level: int, earlier: Sequence[LevelMultipliers], fixed: Collection[str] = frozenset()
 ) -> System:
     """Return one level's system; earlier: the multipliers of the levels before it; fixed: variables without room."""
     bound = {k for each in earlier for k in each.positive}
@@ -103,7 +103,7 @@ def _held(active: ActiveSet, level: int, bound: set[int]) -> list[Floats]:
     return [unit[k] for k in active.levels[level] if active.zero[level] or k in bound]
 
 
-def solved(gradients: Floats, system: System) -> Multipliers:
+def solved(gradients: Floats, system: System) -> LevelMultipliers:
     """Return one level's multipliers by non-negative least squares; gradients: (rows, variables)."""
     slopes, target, one_sided = _equations(gradients, system)
     matrix = np.hstack([slopes, -slopes[:, one_sided:]])
@@ -114,10 +114,10 @@ def solved(gradients: Floats, system: System) -> Multipliers:
     found = signed[free:] @ system.held
     found[[*system.pieces, *system.inequalities]] += signed[:one_sided]
     found[list(system.equalities)] += signed[one_sided:free]
-    return Multipliers(found, float(np.abs(matrix @ weights - target).max()))
+    return LevelMultipliers(found, float(np.abs(matrix @ weights - target).max()))
 
 
-def replaceable(gradients: Floats, system: System, found: Multipliers, most: float) -> list[int]:
+def replaceable(gradients: Floats, system: System, found: LevelMultipliers, most: float) -> list[int]:
     """Return the inequalities with a multiplier without which others might leave a residual of at most `most`.
 
     Without row k of multiplier y_k what is left is no less than y_k times the distance of its slope from the span of

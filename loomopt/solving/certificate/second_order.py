@@ -28,7 +28,7 @@ from loomopt.physics.tolerances import FLAT, RANK
 from loomopt.solving.certificate.active_set import ActiveSet
 from loomopt.solving.certificate.derivatives import Derivatives
 from loomopt.solving.certificate.feasible_curve import FeasibleCurve, Lagrangian, Verdict
-from loomopt.solving.certificate.kkt import Multipliers, System
+from loomopt.solving.certificate.kkt import LevelMultipliers, System
 from loomopt.solving.certificate.valley import Closed
 from loomopt.solving.search import tie_break
 
@@ -122,7 +122,7 @@ class Critical:
         return [self.basis @ way for way in (line, -line) if np.max(self.slopes @ way, initial=-np.inf) <= FLAT]
 
 
-def critical(local: Local, system: System, multipliers: Multipliers) -> Critical:
+def critical(local: Local, system: System, multipliers: LevelMultipliers) -> Critical:
     """Return the critical cone of one level.
 
     Binding are limits with a multiplier, equalities, what earlier levels hold, and the differences between pieces that
@@ -148,7 +148,7 @@ def critical(local: Local, system: System, multipliers: Multipliers) -> Critical
     return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
 
 
-def judged(local: Local, level: int, system: System, multipliers: Multipliers) -> Curvature:
+def judged(local: Local, level: int, system: System, multipliers: LevelMultipliers) -> Curvature:
     """Return what second order says of one level with one set of multipliers."""
     cone = critical(local, system, multipliers)
     weights = multipliers.normalised(system)
@@ -281,7 +281,7 @@ def _curve(
     return FeasibleCurve(local.program, local.x, rows, scales, cone.sums, jacobian, cone.basis, curved, bends, valley)
 
 
-def _lagrangian(local: Local, level: int, multipliers: Multipliers) -> Lagrangian:
+def _lagrangian(local: Local, level: int, multipliers: LevelMultipliers) -> Lagrangian:
     """Return one level's Lagrangian as the program's own values have it."""
     active = local.active
     prices: dict[int, float] = {}
@@ -312,6 +312,6 @@ def _higher(lagrangian: Lagrangian, curve: FeasibleCurve, ways: list[Floats], sl
     return next((verdict for verdict in ("falls", "open") if verdict in found), "holds")
 
 
-def held_multiplier(active: ActiveSet, level: int, multipliers: Multipliers) -> float:
+def held_multiplier(active: ActiveSet, level: int, multipliers: LevelMultipliers) -> float:
     """Return the multiplier by which an earlier objective is held."""
     return float(sum(multipliers.of[k] for k in active.levels[level]))

@@ -37,7 +37,7 @@ CycleRow = tuple[str, float, Where | None]
 
 
 @dataclass(frozen=True)
-class Bound:
+class CycleBound:
     """What the boxes show of one row: proven, violated at `angle` (rad), or neither within the boxes allowed."""
 
     status: str
@@ -45,7 +45,7 @@ class Bound:
     angle: float | None = None
 
 
-class Box(NamedTuple):
+class AngleBox(NamedTuple):
     """Shares of a piece from low to high; bend: what holds f''/2 all over it, where a box around it has shown that."""
 
     low: float
@@ -58,10 +58,10 @@ class Box(NamedTuple):
         top = min(tops, key=lambda u: abs(u - middle), default=math.inf)
         return min(max(top, self.low), self.high) if abs(top - middle) <= NEAR_TOP * width else middle
 
-    def halves(self, bend: Number) -> "list[Box]":
+    def halves(self, bend: Number) -> "list[AngleBox]":
         """Return both halves, the left one last; bend: theirs."""
         middle = (self.low + self.high) / 2
-        return [Box(middle, self.high, bend), Box(self.low, middle, bend)]
+        return [AngleBox(middle, self.high, bend), AngleBox(self.low, middle, bend)]
 
 
 class Boxes(Reading):
@@ -81,24 +81,26 @@ class Boxes(Reading):
         pieces = map(self.cycle.switch, range(self.cycle.pieces))
         return [{name: float(value) for name, value in switch.items()} for switch in pieces]
 
-    def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> Bound:
+    def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> CycleBound:
         """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
         cycle, used = self.cycle, 0
         for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
             tops = self._tops(name, sign, piece)
-            boxes = [Box(0.0, 1.0)]
+            boxes = [AngleBox(0.0, 1.0)]
             while boxes:
                 box = boxes.pop()
                 used += 1
                 at = box.nearest(tops)
                 holds, bend = judged_box(functools.partial(self._signed, name, sign, piece), limit, box, at)
                 if holds is False:
-                    return Bound("violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at))
+                    return CycleBound(
+                        "violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at)
+                    )
                 if holds is None:
                     if used >= MOST_BOXES:
-                        return Bound("undecided", used)
+                        return CycleBound("undecided", used)
                     boxes += box.halves(bend)
-        return Bound("proven" if used else "undecided", used)
+        return CycleBound("proven" if used else "undecided", used)
 
     def _tops(self, name: str, sign: float, piece: int) -> list[float]:
         """Return where sign · quantity is highest on a piece, as refined in floats: no more than a hint."""
@@ -144,7 +146,7 @@ class Boxes(Reading):
 
 
 def judged_box(
-    series: Callable[[float, float], Number], limit: float, box: Box, at: float
+    series: Callable[[float, float], Number], limit: float, box: AngleBox, at: float
 ) -> tuple[bool | None, Number]:
     """Return True where f ≤ limit on a box, False where f(at) breaks it, None where that is open; then its bend.
 
@@ -168,7 +170,7 @@ def judged_box(
         return None, box.bend
 
 
-def _keeps(here: Number, bend: Number, box: Box, at: float, limit: float) -> bool:
+def _keeps(here: Number, bend: Number, box: AngleBox, at: float, limit: float) -> bool:
     """Say whether f(at) + f'(at) h + k h² ≤ limit all over a box; k ≤ bend, h from low − at to high − at.
 
     What is no number keeps nothing.

@@ -17,7 +17,7 @@ from loomopt.base.records import lazy
 from loomopt.model.program import Program
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import RANK
-from loomopt.solving.certificate.active_set import Row, moved
+from loomopt.solving.certificate.active_set import ActiveRow, moved
 from loomopt.solving.certificate.derivatives import Derivatives
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.nlp.point import sampler_at
@@ -44,7 +44,7 @@ class Closed:
     """
 
     program: Program
-    rows: tuple[Row, ...]
+    rows: tuple[ActiveRow, ...]
     derivatives: Derivatives
     gradients: Floats
     directions: Floats

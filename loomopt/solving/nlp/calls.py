@@ -11,7 +11,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.point import Elastic, Known, Settings, sampler_at
-from loomopt.solving.nlp.stations import Family, Stood, epigraphs, families, held, recurrent, stations
+from loomopt.solving.nlp.stations import HeldStations, RowFamily, epigraphs, families, held, recurrent, stations
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
 
 FIRST_SLOTS, LEADING = 6, 4
@@ -64,7 +64,7 @@ class Calls:
     def loose(self, sampler: Sampler, extremes: Sequence[Sequence[Extreme]]) -> list[list[Extreme]]:
         """Return of each family the extremes that no row of a station holds: these need a node."""
         corners = stations(self.program.model, sampler.given, [v.name for v in self.program.variables])
-        stood = Stood(corners, sampler.cycle)
+        stood = HeldStations(corners, sampler.cycle)
         rows = [set(held([corner.switch for corner in corners], family)) for family in self.families]
         pairs = zip(rows, extremes, strict=True)
         return [[e for e in of if stood.station(e) not in own] for own, of in pairs]
@@ -158,7 +158,7 @@ class Calls:
         share = np.where(first < 0.0, 1 / FIRST_SHARE, FIRST_SHARE)
         return np.asarray(share * first + FIRST_ROOM)
 
-    def excess(self, family: Family, extreme: Extreme, extra: Floats) -> float:
+    def excess(self, family: RowFamily, extreme: Extreme, extra: Floats) -> float:
         """Return by how much an extreme exceeds its bound, relative to the row's size."""
         if family.epigraph >= 0:
             scale = self.program.objectives[self.epigraphs[family.epigraph].objective].scale

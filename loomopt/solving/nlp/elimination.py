@@ -172,7 +172,7 @@ class Elimination:
         return found
 
 
-class Solver:
+class EliminatedSolver:
     """IPOPT on an NLP with lifted variables, called as if it had none."""
 
     def __init__(self, made: Any, eliminated: Elimination) -> None:

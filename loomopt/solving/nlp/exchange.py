@@ -17,11 +17,11 @@ from loomopt.physics.cycle import TURN, Cycle, Floats
 from loomopt.physics.tolerances import BINDING, NEEDED
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.follow import follow
-from loomopt.solving.nlp.ipopt import Answer, run
+from loomopt.solving.nlp.ipopt import IpoptAnswer, run
 from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.polish import polish
 from loomopt.solving.nlp.rows import Multipliers
-from loomopt.solving.nlp.stations import Family
+from loomopt.solving.nlp.stations import RowFamily
 from loomopt.solving.nlp.transcribe import Transcription
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
@@ -65,7 +65,7 @@ class _Round(NamedTuple):
 
     after: _Place
     nlp: Transcription
-    answer: Answer
+    answer: IpoptAnswer
     reached: bool
     violation: float
     steady: bool
@@ -227,7 +227,7 @@ def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
     return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
 
 
-def _uniform(sampler: Sampler, family: Family, count: int) -> tuple[Extreme, ...]:
+def _uniform(sampler: Sampler, family: RowFamily, count: int) -> tuple[Extreme, ...]:
     """Return equal nodes of one turn for a family's row: both signs of it where its magnitude counts."""
     pieces, u = sampler.cycle.located(TURN * np.arange(count) / count)
     on = sampler.on(family.row, family.where)[pieces]

@@ -16,7 +16,7 @@ from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.solving.nlp.lifted import Lifts, Options, chosen, identity
-from loomopt.solving.nlp.stations import Family, followed
+from loomopt.solving.nlp.stations import RowFamily, followed
 from loomopt.solving.nlp.structure import NodeParameters, Structure
 
 
@@ -36,7 +36,7 @@ class _Traced(NamedTuple):
     choices: tuple[_Choice, ...]
 
 
-class Quantities:
+class QuantityFunctions:
     """The quantities of one NLP; numbers that follow from others at once are inputs too: all nodes share them.
 
     So is what a formula chooses from many numbers by a switch: a node whose switch is known reads one of them. values:
@@ -154,7 +154,7 @@ class NodeRows(Rows):
     def __init__(
         self,
         shape: NodeParameters,
-        quantities: Quantities,
+        quantities: QuantityFunctions,
         stills: Mapping[str, Values],
         rules: Mapping[str, Sequence[Any]],
     ) -> None:
@@ -211,7 +211,7 @@ class _Built:
         values |= self.lifts.symbols(structure.recurrent)
         self.lifts.define(followed(model, structure.names, self.lifts.maths, values))
         given = model.given(self.lifts.maths, values)
-        quantities = Quantities(model, values, given, structure.node.switches, self.lifts)
+        quantities = QuantityFunctions(model, values, given, structure.node.switches, self.lifts)
         self.rows = NodeRows(structure.node, quantities, stills, rules)
         self.bounds, self.limit_scales = layout.read(vector, "limit"), layout.read(vector, "limit scale")
         self.scales, self.weights = layout.read(vector, "objective scale"), layout.read(vector, "objective weight")
@@ -280,7 +280,7 @@ class _Built:
             found += [slot[0] * self._rows(family, slot[1], self.rows.at(family.row, slot[2:])) for slot in slots]
         return found
 
-    def _rows(self, family: Family, sign: Any, value: Any) -> Any:
+    def _rows(self, family: RowFamily, sign: Any, value: Any) -> Any:
         """Return by how much a whole-cycle quantity exceeds its bound, in its natural size."""
         if family.epigraph >= 0:
             scale = self.scales[self.structure.epigraphs[family.epigraph].objective]

@@ -16,7 +16,7 @@ STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 """What IPOPT says when its callback raised, or asked it to stop."""
 
 
-class Answer(NamedTuple):
+class IpoptAnswer(NamedTuple):
     """What IPOPT said.
 
     extra: the epigraph or elastic variables; multipliers: 0 where it did not run; value: of the objective.
@@ -38,7 +38,7 @@ def run(
     extra: Floats,
     nodes: Sequence[Sequence[Extreme]],
     warm: Multipliers,
-) -> Answer:
+) -> IpoptAnswer:
     """Return IPOPT's answer from variables x (SI) and extra; warm: multipliers to start from, if there are any.
 
     Raises KeyboardInterrupt on Ctrl-C.
@@ -46,7 +46,7 @@ def run(
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
     if calls.overdetermined(arguments):
         none = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
-        return Answer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
+        return IpoptAnswer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
     if warm:
         arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.on(nlp.rows).lam_g}
     solver = nlp.solver(bool(warm), calls.settings)
@@ -61,7 +61,7 @@ def run(
     design, reached = nlp.rows.parted(flat)
     multipliers = Multipliers(nlp.rows, lam_x, lam_g)
     iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
-    return Answer(status, calls.design(design), reached, multipliers, iterations, value)
+    return IpoptAnswer(status, calls.design(design), reached, multipliers, iterations, value)
 
 
 class IterationCallback:

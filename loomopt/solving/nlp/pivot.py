@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.physics.cycle import Floats
-from loomopt.solving.nlp.rows import Binding, Flags
+from loomopt.solving.nlp.rows import BindingRows, Flags
 
 PIVOTS, PIVOT_NEWTON_STEPS, PIVOT_STEP = 20, 8, 1e-9
 """Limits exchanged before the solver must choose, Newton steps to where they meet, and the step that ends them: what
@@ -34,7 +34,7 @@ PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10
 """Rise toward a limit along a way, and relative singular value, that are no more than rounding of slopes."""
 
 
-class Derivatives(Protocol):
+class PivotDerivatives(Protocol):
     """What is asked of an NLP: functions of x, scaled, and its parameters, as CasADi calls them."""
 
     @property
@@ -50,11 +50,11 @@ class Derivatives(Protocol):
         """(x, p, weight of the objective, multipliers of rows) → the Lagrangian's second derivatives, upper half."""
 
 
-class Reached(NamedTuple):
+class PivotEnd(NamedTuple):
     """A KKT point: x scaled; what is active, and the multipliers of all, 0 for what is not."""
 
     x: Floats
-    active: Binding
+    active: BindingRows
     lam_x: Floats
     lam_g: Floats
 
@@ -62,7 +62,7 @@ class Reached(NamedTuple):
 class _Problem(NamedTuple):
     """An NLP with its numbers; firm: limits that are active whatever their multiplier: equalities, held variables."""
 
-    nlp: Derivatives
+    nlp: PivotDerivatives
     arguments: Mapping[str, Any]
     firm: Flags
 
@@ -103,7 +103,7 @@ class _Step(NamedTuple):
     active: Flags
 
 
-def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Binding, farthest: float) -> Reached | None:
+def reach(nlp: PivotDerivatives, arguments: Mapping[str, Any], active: BindingRows, farthest: float) -> PivotEnd | None:
     """Return the KKT point that pivots lead to from arguments["x0"] and what was active there.
 
     None where there is none within `farthest`, scaled.
@@ -131,12 +131,12 @@ def reach(nlp: Derivatives, arguments: Mapping[str, Any], active: Binding, farth
     return None
 
 
-def _reached(problem: _Problem, here: _Priced) -> Reached:
+def _reached(problem: _Problem, here: _Priced) -> PivotEnd:
     """Return a KKT point in the solver's words."""
     x = np.clip(here.at.x, problem.arguments["lbx"], problem.arguments["ubx"])
     rows, upper, lower = _sides(here.at.active, len(x))
     lam_g, above, below = _sides(here.multipliers, len(x))
-    return Reached(x, Binding(rows, lower, upper), above - below, lam_g)
+    return PivotEnd(x, BindingRows(rows, lower, upper), above - below, lam_g)
 
 
 def _sides(limits: Any, variables: int) -> list[Any]:

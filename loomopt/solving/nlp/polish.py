@@ -21,7 +21,7 @@ from loomopt.physics.tolerances import (
     TOUCHING,
 )
 from loomopt.solving.nlp.calls import Calls
-from loomopt.solving.nlp.rows import Binding, Multipliers
+from loomopt.solving.nlp.rows import BindingRows, Multipliers
 
 Nodes = Sequence[Sequence[Extreme]]
 
@@ -71,7 +71,7 @@ def _newton(
 
 
 def met(
-    jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: Binding, farthest: float = POLISH_FARTHEST
+    jacobian: Any, arguments: Mapping[str, Any], x: Floats, bound: BindingRows, farthest: float = POLISH_FARTHEST
 ) -> Floats | None:
     """Return x (scaled) on its binding rows and bounds, or None where that is not a clear, small step.
 

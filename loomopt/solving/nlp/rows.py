@@ -142,7 +142,7 @@ def row_map(program: Program, slots: int, elastic: bool = False) -> RowMap:
     )
 
 
-class Binding(NamedTuple):
+class BindingRows(NamedTuple):
     """Which rows and bounds bind."""
 
     rows: Flags
@@ -150,9 +150,9 @@ class Binding(NamedTuple):
     at_upper: Flags
 
 
-def binding(lam_x: Floats, lam_g: Floats) -> Binding:
+def binding(lam_x: Floats, lam_g: Floats) -> BindingRows:
     """Return what binds at multipliers: of variables positive at an upper bound, negative at a lower one."""
-    return Binding(np.abs(lam_g) > BINDING, lam_x < -BINDING, lam_x > BINDING)
+    return BindingRows(np.abs(lam_g) > BINDING, lam_x < -BINDING, lam_x > BINDING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,7 @@ class Multipliers:
         rows.at_nodes(lam_g)[:, :common] = before[:, :common]
         return Multipliers(rows, self.lam_x, lam_g)
 
-    def binding(self, rows: RowMap, counts: Sequence[int]) -> Binding:
+    def binding(self, rows: RowMap, counts: Sequence[int]) -> BindingRows:
         """Return what binds with nodes of the same NLP in other slots: so many of each family, from the first on."""
         found = binding(self.lam_x, self.on(rows).lam_g)
         rows.at_nodes(found.rows)[:] = rows.used(counts)

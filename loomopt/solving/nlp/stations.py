@@ -23,7 +23,7 @@ class Epigraph(NamedTuple):
     rows: tuple[str, ...]
 
 
-class Family(NamedTuple):
+class RowFamily(NamedTuple):
     """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place.
 
     where: the pieces they are asked for, every one without it; known: those where the quantity is known at all.
@@ -47,14 +47,14 @@ def epigraphs(program: Program, elastic: bool = False) -> tuple[Epigraph, ...]:
     return tuple(Epigraph(k, level.rows) for k, level in levels if not level.is_smooth)
 
 
-def families(program: Program, elastic: bool = False) -> list[Family]:
+def families(program: Program, elastic: bool = False) -> list[RowFamily]:
     """Return the whole-cycle rows a program needs: first those of objectives, then those of limits."""
     above = enumerate(epigraphs(program, elastic))
     peaks = [(k, row) for k, epigraph in above for row in program.objectives[epigraph.objective].quantities]
     limits, known = program.cycle_limits.items(), program.model.known_of
     return [
-        *(Family(row, epigraph=k, known=known(row)) for k, row in peaks),
-        *(Family(limit.row, limit=k, where=limit.where, known=known(limit.row)) for k, limit in limits),
+        *(RowFamily(row, epigraph=k, known=known(row)) for k, row in peaks),
+        *(RowFamily(limit.row, limit=k, where=limit.where, known=known(limit.row)) for k, limit in limits),
     ]
 
 
@@ -102,12 +102,12 @@ def _chains(model: JobModel, variables: Collection[str]) -> dict[str, Chain]:
     return {name: chain for name, chain in chains.items() if chain.roots.intersection(variables)}
 
 
-def held(switches: Sequence[Values], family: Family) -> list[int]:
+def held(switches: Sequence[Values], family: RowFamily) -> list[int]:
     """Return the places of the stations, of these switches, where a family has a row."""
     return [k for k, switch in enumerate(switches) if family.counts(switch)]
 
 
-class Stood:
+class HeldStations:
     """Stations in a cycle, each on the piece whose switches of the motion's arcs are its own."""
 
     def __init__(self, stations: Sequence[Station], cycle: Cycle) -> None:

@@ -21,9 +21,9 @@ from loomopt.solving.nlp.layout import Layout
 from loomopt.solving.nlp.rows import RowMap, row_map
 from loomopt.solving.nlp.stations import (
     Epigraph,
-    Family,
+    HeldStations,
+    RowFamily,
     Station,
-    Stood,
     epigraphs,
     families,
     held,
@@ -102,7 +102,7 @@ class Structure:
         return self.program.structure, self.slots, self.elastic, self.hints, self.corners, self.points
 
     @functools.cached_property
-    def families(self) -> list[Family]:
+    def families(self) -> list[RowFamily]:
         """Whole-cycle rows, in order."""
         return families(self.program, self.elastic)
 
@@ -200,7 +200,7 @@ class Structure:
             write(p, f"still {event}", [switch[name] for name in program.model.switches])
         for mean in means(program, self.elastic):
             write(p, f"mean {mean.name}", self._rule(cycle, mean))
-        stood = Stood(self.stations, cycle)
+        stood = HeldStations(self.stations, cycle)
         write(p, "station", stood.switches(self.open_switches))
         for k, family in enumerate(self.families):
             write(p, f"sign {k}", stood.signs(sampler, family.row)[self.held[k]])

@@ -5,7 +5,7 @@ from typing import Any
 
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
-from loomopt.solving.nlp.elimination import Elimination, Solver
+from loomopt.solving.nlp.elimination import EliminatedSolver, Elimination
 from loomopt.solving.nlp.expressions import expressions
 from loomopt.solving.nlp.point import Settings, sampler_at
 from loomopt.solving.nlp.structure import Structure, structure
@@ -114,7 +114,7 @@ class Transcription:
             if not self._derivatives:
                 functions = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
                 self._derivatives = {option: solver.get_function(made) for option, made in functions.items()}
-            self._solvers[name] = Solver(solver, self._eliminated) if self._eliminated else solver
+            self._solvers[name] = EliminatedSolver(solver, self._eliminated) if self._eliminated else solver
         return self._solvers[name]
 
     @property

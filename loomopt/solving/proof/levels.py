@@ -18,7 +18,7 @@ from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
 from loomopt.solving.proof.rows import OpenError
-from loomopt.solving.proof.task import Task, reduced, silent
+from loomopt.solving.proof.task import BoxTask, reduced, silent
 from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
 from loomopt.solving.search.search import Search, compared, judged, tried
 
@@ -32,7 +32,7 @@ LOOKED_AT = 16
 
 
 @dataclass(frozen=True)
-class Outcome:
+class LevelOutcome:
     """What is shown of all levels so far; why: why not more; better: a better design, if one turned up.
 
     lowest: the middle of an open box that could be the best; both the program's variables, SI.
@@ -70,7 +70,7 @@ class Levels:
             # A formula that decides by a value, or raises to a power that is no whole number, is none for boxes.
             self._levels, self.why = [], "a formula of this scene does not run in intervals"
 
-    def run(self, until: float, say: Callable[[str], None]) -> Outcome:
+    def run(self, until: float, say: Callable[[str], None]) -> LevelOutcome:
         """Go on until all is shown, a better design turns up, or the clock says `until`."""
         for place, level in enumerate(self._levels):
             now = time.perf_counter()
@@ -79,12 +79,12 @@ class Levels:
                 return self._outcome(better)
         return self._outcome()
 
-    def _outcome(self, better: Mapping[str, float] | None = None) -> Outcome:
+    def _outcome(self, better: Mapping[str, float] | None = None) -> LevelOutcome:
         shown = tuple(level.shown() for level in self._levels)
         still = [level for level, found in zip(self._levels, shown, strict=True) if not found.proven]
         why = "; ".join(level.why() for level in still) or self.why
         lowest = still[0].lowest() if still else None
-        return Outcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
+        return LevelOutcome(shown, sum(level.tree.boxes for level in self._levels), why, better, lowest)
 
 
 def loosening(job: Job, program: Program) -> tuple[str, ...]:
@@ -113,7 +113,7 @@ def _most(program: Program, merits: list[float]) -> dict[str, float]:
 class _Level:
     """One level's question, and the tree of its boxes."""
 
-    def __init__(self, task: Task, x: Mapping[str, float], merits: list[float], place: int, gap: float) -> None:
+    def __init__(self, task: BoxTask, x: Mapping[str, float], merits: list[float], place: int, gap: float) -> None:
         self.task, self.place, self.gap = task, place, gap
         self.objective, self.best = task.program.objectives[place], merits[place]
         lowest = _lessened(self.objective, self.best, gap)
@@ -215,7 +215,7 @@ def claimed(search: Search, asked: GlobalProof, refused: str = "") -> tuple[Sear
     until = began + asked.seconds
     reason = refused or ("" if search.passed else "there is no certified answer")
     if reason or search.best is None:
-        return search, _bound(Outcome(why=reason), 0, began)
+        return search, _bound(LevelOutcome(why=reason), 0, began)
     boxes = 0
     while True:
         levels = Levels(search.program, search.job, search.best.x, asked.gap)
@@ -225,7 +225,7 @@ def claimed(search: Search, asked: GlobalProof, refused: str = "") -> tuple[Sear
         found = _improved(search, start) if start else None
         if found is None and outcome.better:
             why = "a better design turned up, and no certified optimum was reached from it"
-            return search, _bound(Outcome(outcome.levels, outcome.boxes, why), boxes, began)
+            return search, _bound(LevelOutcome(outcome.levels, outcome.boxes, why), boxes, began)
         if found is None:
             return search, _bound(levels.run(until, asked.say), boxes, began)
         search, boxes = found, boxes + outcome.boxes
@@ -239,7 +239,7 @@ def _improved(search: Search, start: Mapping[str, float]) -> Search | None:
     return found if compared(found.best, search.best) < 0 else None
 
 
-def _bound(outcome: Outcome, boxes: int, began: float) -> GlobalBound:
+def _bound(outcome: LevelOutcome, boxes: int, began: float) -> GlobalBound:
     """Return what an outcome says; boxes: read for answers that were given up before."""
     seconds = time.perf_counter() - began
     after = f" after {seconds:.3g} s" if outcome.levels and outcome.why else ""

@@ -19,7 +19,7 @@ from loomopt.maths.systems import Number
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, Node, Where
 from loomopt.physics.tolerances import SAME_ANGLE
-from loomopt.solving.proof.task import Task
+from loomopt.solving.proof.task import BoxTask
 
 Places = NDArray[np.intp]
 
@@ -65,7 +65,7 @@ class Spots:
         )
 
 
-class Layout:
+class NodeLayout:
     """One order of the corners in the cycle, read at a design that has it."""
 
     def __init__(self, sampler: Sampler) -> None:
@@ -88,7 +88,7 @@ class Layout:
             np.array([e.sign for e in extremes])[:, None],
         )
 
-    def worst(self, task: Task, name: str, middles: Floats, where: Where | None = None) -> Spots:
+    def worst(self, task: BoxTask, name: str, middles: Floats, where: Where | None = None) -> Spots:
         """Return the node of each box at which its middle's quantity is largest; middles: (names, boxes)."""
         model, system = task.program.model, systems.numpy()
         pieces, grid = self._grid
@@ -146,7 +146,9 @@ def _value(number: Number) -> Interval:
     return number.v if isinstance(number, Enclosure) else interval(number)
 
 
-def layouts(task: Task, middles: Floats, known: dict[bytes, Layout | None]) -> Iterator[tuple[Layout | None, Places]]:
+def layouts(
+    task: BoxTask, middles: Floats, known: dict[bytes, NodeLayout | None]
+) -> Iterator[tuple[NodeLayout | None, Places]]:
     """Yield each order of corners that middles (names, boxes) have, with the places of those boxes.
 
     None where a middle has no real cycle. known: those that were met, by key.
@@ -171,8 +173,8 @@ def layouts(task: Task, middles: Floats, known: dict[bytes, Layout | None]) -> I
         yield known[name], boxes_here
 
 
-def _layout(task: Task, middle: Floats) -> Layout | None:
+def _layout(task: BoxTask, middle: Floats) -> NodeLayout | None:
     try:
-        return Layout(Sampler(task.program.model, task.values(middle), GRID))
+        return NodeLayout(Sampler(task.program.model, task.values(middle), GRID))
     except (ArithmeticError, TypeError, ValueError):
         return None

@@ -17,9 +17,9 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Where
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ACTIVE
-from loomopt.solving.proof.nodes import Layout, Spots, layouts
+from loomopt.solving.proof.nodes import NodeLayout, Spots, layouts
 from loomopt.solving.proof.rows import BoxRows, OpenError, strips
-from loomopt.solving.proof.task import Task
+from loomopt.solving.proof.task import BoxTask
 
 Mask = NDArray[np.bool_]
 
@@ -27,7 +27,7 @@ LIMIT = -1
 """What a row belongs to that is no level's: a limit."""
 
 
-class Line(NamedTuple):
+class BoxRow(NamedTuple):
     """One row, or the nodes of one whole-cycle row.
 
     of: its level, or LIMIT; row: what it reads; sign, scale: row = sign · value / scale; single: reads a value of the
@@ -69,9 +69,9 @@ class Reader:
     levels: how many of its objectives are rows; answer: the point (names,) whose extremes each box looks at too.
     """
 
-    def __init__(self, task: Task, levels: int, answer: Floats) -> None:
+    def __init__(self, task: BoxTask, levels: int, answer: Floats) -> None:
         self.task = task
-        self._known: dict[bytes, Layout | None] = {}
+        self._known: dict[bytes, NodeLayout | None] = {}
         ((self._own, _),) = layouts(task, answer[:, None], self._known)
         if self._own is None:
             raise OpenError("the answer has no real cycle")
@@ -80,25 +80,25 @@ class Reader:
         self._lines = [*self._of_limits(), *self._of_levels(task.program.objectives[:levels])]
         self.of = (LIMIT,) * pairs + tuple(line.of for line in self._lines for _ in range(line.rows))
 
-    def _of_limits(self) -> Iterator[Line]:
+    def _of_limits(self) -> Iterator[BoxRow]:
         for limit in self.task.limits:
             if isinstance(limit, CycleLimit):
                 near = tuple(limit.near(self._sampler))
-                yield Line(LIMIT, limit.row, 1.0, limit.scale, True, None, limit.bound, limit.where, near)
+                yield BoxRow(LIMIT, limit.row, 1.0, limit.scale, True, None, limit.bound, limit.where, near)
             else:
                 placed = any(map(self._stands, limit.reads))
                 for sign in (1.0, -1.0) if limit.sign == 0 else (1.0,):
-                    yield Line(LIMIT, limit.row, sign, limit.scale, placed, limit.residual)
+                    yield BoxRow(LIMIT, limit.row, sign, limit.scale, placed, limit.residual)
 
-    def _of_levels(self, objectives: Sequence[Objective]) -> Iterator[Line]:
+    def _of_levels(self, objectives: Sequence[Objective]) -> Iterator[BoxRow]:
         for place, objective in enumerate(objectives):
             top = objective.merit(self._sampler) - ACTIVE * objective.scale
             for row, sign in objective.sides:
                 read = operator.methodcaller("single", row)
-                yield Line(place, row, sign, objective.scale, self._stands(row), read)
+                yield BoxRow(place, row, sign, objective.scale, self._stands(row), read)
             for row in objective.quantities:
                 near = tuple(e for e in self._sampler.extremes(row) if e.height >= top)
-                yield Line(place, row, 1.0, objective.scale, True, extremes=near)
+                yield BoxRow(place, row, 1.0, objective.scale, True, extremes=near)
 
     def _stands(self, row: str) -> bool:
         """Say whether a row depends on the order of corners: one at an event of the motion, a mean over the cycle."""
@@ -123,7 +123,7 @@ class Reader:
         return Read(value, middle, slope, self.of)
 
     def _alike(
-        self, layout: Layout | None, low: Floats, high: Floats, middles: Floats
+        self, layout: NodeLayout | None, low: Floats, high: Floats, middles: Floats
     ) -> tuple[Interval, Interval, Interval]:
         """Return value, middle and slopes of boxes whose middles have one order of corners."""
         names, boxes = low.shape
@@ -136,7 +136,7 @@ class Reader:
             middle, _ = _stacked(points, sure, names, boxes)
         return value, middle, slope
 
-    def _spots(self, layout: Layout, middles: Floats) -> dict[int, Spots]:
+    def _spots(self, layout: NodeLayout, middles: Floats) -> dict[int, Spots]:
         """Return the nodes of every whole-cycle row, by its place."""
         found = {}
         for place, line in enumerate(self._lines):
@@ -148,7 +148,7 @@ class Reader:
         return found
 
     def _rows(
-        self, layout: Layout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int, count: int
+        self, layout: NodeLayout | None, numbers: dict[str, Number], spots: dict[int, Spots], boxes: int, count: int
     ) -> tuple[list[Number], list[Mask]]:
         """Return all rows, each (nodes, boxes), and of which boxes each is sure; None for what nothing is known of."""
         model, system = self.task.program.model, systems.boxes()

@@ -69,7 +69,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Task:
+class BoxTask:
     """What is searched for a better design.
 
     names: of the variables, in order; low, high: their ends, (names,), SI; fixed: numbers all designs share, of
@@ -129,7 +129,7 @@ class Task:
         return np.asarray(np.clip(at, self.low, self.high))
 
 
-def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> Task:
+def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, most: Mapping[str, float]) -> BoxTask:
     """Return the task of a program.
 
     loosening: variables that no row but a limit's reads, and that only loosen it; most: values, SI, that variables
@@ -150,7 +150,7 @@ def reduced(program: Program, loosening: tuple[str, ...], scale: Scale | None, m
     _finite(program.variables, inside)
     uppers = {v.name: v.upper for v in program.variables if v.name in loosening}
     lows, highs = (np.array([ends[k] for ends in inside.values()]) for k in range(2))
-    return Task(program, tuple(inside), lows, highs, fixed, uppers, scale)
+    return BoxTask(program, tuple(inside), lows, highs, fixed, uppers, scale)
 
 
 def _implied(program: Program, values: Mapping[str, Interval], name: str) -> tuple[float, float]:

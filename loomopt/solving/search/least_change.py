@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from loomopt.maths.systems import Number
-from loomopt.model.model import Instant, JobModel, Row
+from loomopt.model.model import DesignRow, Instant, JobModel
 from loomopt.model.moves import LEAST_CHANGE
 from loomopt.model.objectives import Value
 from loomopt.model.program import Program, Variable
@@ -161,7 +161,7 @@ def changing(
 @functools.lru_cache(maxsize=MODELS)
 def _measuring(model: JobModel, names: tuple[str, ...]) -> JobModel:
     """Return a model with the change of variables as a row: one for all designs, whose formulas are recorded once."""
-    row = Row(functools.partial(_change, names))
+    row = DesignRow(functools.partial(_change, names))
     return replace(model, own_rows={**model.own_rows, CHANGE: row})
 
 

@@ -15,7 +15,7 @@ from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.options import check_sought
 from loomopt.studies.accuracy import optima, readings
-from loomopt.studies.accuracy.ladders import EPSILON, Ladder, Row, Setting, climbed, grouped, knee, order, told
+from loomopt.studies.accuracy.ladders import EPSILON, Ladder, LadderRow, Setting, climbed, grouped, knee, order, told
 from loomopt.studies.accuracy.subject import Subject
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ COARSE, USUAL = 1e-3, 1e-6
 
 Ladders = Callable[[Subject, bool], Iterator[Ladder]]
 """From a scene, and whether the study is a full one, to ladders."""
-Climb = tuple[Ladder, tuple[Row, ...]]
+Climb = tuple[Ladder, tuple[LadderRow, ...]]
 """A ladder and its rows."""
 
 
@@ -43,14 +43,14 @@ LADDERS: tuple[Ladders, ...] = (_solved, _read)
 
 
 @dataclass(frozen=True)
-class Study:
+class AccuracyStudy:
     """The rows of a study, and what they come to.
 
     orders, knees: "quantity, method" → measured order, and the setting from which on the error stops falling.
     """
 
     problem: str
-    rows: tuple[Row, ...]
+    rows: tuple[LadderRow, ...]
     orders: Mapping[str, float]
     knees: Mapping[str, Setting]
     advice: str
@@ -77,7 +77,7 @@ def study(
     full: bool = False,
     on_run: Callable[[str], None] | None = None,
     ladders: Sequence[Ladders] = LADDERS,
-) -> Study:
+) -> AccuracyStudy:
     """Return the study of a scene; full: more settings and repeats; on_run: called with each run's name."""
     return concluded(scene, list(climbs(scene, full, on_run, ladders)), full)
 
@@ -98,7 +98,7 @@ def climbs(
             yield ladder, rows
 
 
-def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Study:
+def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> AccuracyStudy:
     """Return what ladders and their rows come to."""
     orders: dict[str, float] = {}
     knees: dict[str, Setting] = {}
@@ -111,10 +111,10 @@ def concluded(scene: Scene, climbs: Sequence[Climb], full: bool = False) -> Stud
     told = provenance.provenance(scene, study="full" if full else "quick")
     sampler = registry.of(scene).sampler(scene, {})
     left = [f" Not covered: {text}." for text in model.uncovered(sampler.model.effects, sampler.given.own)]
-    return Study(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
+    return AccuracyStudy(scene.name, rows, orders, knees, "".join([advice(rows), *left]), told)
 
 
-def advice(rows: Sequence[Row]) -> str:
+def advice(rows: Sequence[LadderRow]) -> str:
     """Return one sentence on what accuracy costs, from the rows of the exchange alone.
 
     Costs are in positions evaluated, which are the same on every machine; the figure of the first target counts.
@@ -128,20 +128,20 @@ def advice(rows: Sequence[Row]) -> str:
     return f"{_said(costs)} here; below {told(floor(own))} rounding takes over."
 
 
-def in_time(rows: Sequence[Row]) -> str:
+def in_time(rows: Sequence[LadderRow]) -> str:
     """Return the costs of the advice in time on this machine; "" where there are none."""
     own = _exchange(rows)
     costs = _costs(own, {row.setting: row.seconds or 0.0 for row in own})
     return f"In time on this machine: {_said(costs)}." if costs else ""
 
 
-def _exchange(rows: Sequence[Row]) -> list[Row]:
+def _exchange(rows: Sequence[LadderRow]) -> list[LadderRow]:
     """Return the rows of the exchange for the figure of the first target that were certified."""
     found = [row for row in rows if row.method == optima.EXCHANGE]
     return [row for row in found if row.quantity == found[0].quantity and row.error is not None]
 
 
-def _costs(rows: Sequence[Row], spent: Mapping[Setting, float]) -> dict[Setting, float]:
+def _costs(rows: Sequence[LadderRow], spent: Mapping[Setting, float]) -> dict[Setting, float]:
     """Return how many times as much as at 1e-3 is spent at finer accuracies: the usual, and the finest there is."""
     finest = min((row.setting for row in rows if isinstance(row.setting, float)), default=COARSE)
     named = dict.fromkeys(setting for setting in (USUAL, finest) if setting in spent and setting < COARSE)
@@ -154,7 +154,7 @@ def _said(costs: Mapping[Setting, float]) -> str:
     return " and ".join([f"{first} of {told(COARSE)}", *others])
 
 
-def floor(rows: Sequence[Row]) -> float:
+def floor(rows: Sequence[LadderRow]) -> float:
     """Return the power of ten that errors stay below from the knee on."""
     at = knee(rows)
     begun = [row.setting for row in rows].index(at) if at is not None else 0

@@ -32,7 +32,7 @@ FAILURES = (ArithmeticError, ValueError, RuntimeError, BadInput, np.linalg.LinAl
 
 
 @dataclass(frozen=True)
-class Reference:
+class LadderReference:
     """What a quantity truly is: a number or an array of any number system.
 
     uncertainty: of the value, relative to `size`; size: what errors are relative to, the value itself without one.
@@ -58,7 +58,7 @@ def _each(value: Number) -> list[Number]:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Rung:
     """What a run gave: quantity → value (none where it failed), and how it ended in the method's own words."""
 
     values: Mapping[str, Any]
@@ -79,14 +79,14 @@ class Ladder:
     quantities: tuple[str, ...]
     settings: tuple[Setting, ...]
     run: Callable[[Any], Any]
-    read: Callable[[Any, Any], Outcome]
-    reference: Callable[[str], Reference | None]
+    read: Callable[[Any, Any], Rung]
+    reference: Callable[[str], LadderReference | None]
     step: Callable[[Any], float] | None = None
     counted: Callable[[Any], int] | None = None
 
 
 @dataclass(frozen=True)
-class Row:
+class LadderRow:
     """One quantity by one method at one setting.
 
     error: relative, None where there is none to tell; seconds: least of the repeats after a warm-up; evaluations:
@@ -102,7 +102,7 @@ class Row:
     status: str
 
 
-def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None = None) -> Iterator[Row]:
+def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None = None) -> Iterator[LadderRow]:
     """Yield a ladder's rows, setting by setting; a run that fails is a row too."""
     for setting in ladder.settings:
         if on_run:
@@ -116,11 +116,11 @@ def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None =
             spent = current().positions - before
             words = " ".join(str(error).split()) or type(error).__name__
             for quantity in ladder.quantities:
-                yield Row(quantity, ladder.method, setting, None, None, spent, f"failed: {words}")
+                yield LadderRow(quantity, ladder.method, setting, None, None, spent, f"failed: {words}")
             continue
         for quantity in ladder.quantities:
             error_, status = _judged(ladder, quantity, outcome)
-            yield Row(quantity, ladder.method, setting, error_, seconds, evaluations, status)
+            yield LadderRow(quantity, ladder.method, setting, error_, seconds, evaluations, status)
 
 
 def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
@@ -137,7 +137,7 @@ def _cost(ladder: Ladder, setting: Setting, repeats: int) -> tuple[float, int]:
     return least, evaluations
 
 
-def _judged(ladder: Ladder, quantity: str, outcome: Outcome) -> tuple[float | None, str]:
+def _judged(ladder: Ladder, quantity: str, outcome: Rung) -> tuple[float | None, str]:
     """Return a quantity's error, None where it cannot be told, and the status that says why."""
     if quantity not in outcome.values:
         return None, outcome.status
@@ -159,15 +159,15 @@ def told(setting: Setting) -> str:
     return f"{setting:.0e}".replace("e-0", "e-").replace("e+00", "")
 
 
-def grouped(rows: Sequence[Row]) -> dict[str, list[Row]]:
+def grouped(rows: Sequence[LadderRow]) -> dict[str, list[LadderRow]]:
     """Return the rows of each ladder and quantity, "quantity, method" → rows from coarse to fine."""
-    found: dict[str, list[Row]] = {}
+    found: dict[str, list[LadderRow]] = {}
     for row in rows:
         found.setdefault(f"{row.quantity}, {row.method}", []).append(row)
     return found
 
 
-def order(rows: Sequence[Row], step: Callable[[Any], float]) -> float | None:
+def order(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> float | None:
     """Return the measured order of a ladder's rows: the middle one of all slopes, log error over log step.
 
     Read from the longest run of at least three rows where errors fall alike from row to row and are no rounding, of
@@ -187,7 +187,7 @@ def order(rows: Sequence[Row], step: Callable[[Any], float]) -> float | None:
     return found
 
 
-def _falling(rows: Sequence[Row], step: Callable[[Any], float]) -> list[list[tuple[float, float]]]:
+def _falling(rows: Sequence[LadderRow], step: Callable[[Any], float]) -> list[list[tuple[float, float]]]:
     """Return the stretches (log step, log error) on which errors above rounding fall from row to row."""
     stretches: list[list[tuple[float, float]]] = [[]]
     for row in rows:
@@ -211,7 +211,7 @@ def _alike(slopes: Sequence[float]) -> bool:
     return min(slopes) >= max(middle / ONE_ORDER, LEAST_ORDER) and max(slopes) <= ONE_ORDER * middle
 
 
-def knee(rows: Sequence[Row]) -> Setting | None:
+def knee(rows: Sequence[LadderRow]) -> Setting | None:
     """Return the first setting from which on the error has stopped falling; None without two errors."""
     known = [row for row in rows if row.error is not None]
     if len(known) < 2:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from loomopt.jobs.base import Family
+from loomopt.jobs.base import LawFamily
 from loomopt.model.sampling import Sampler
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
@@ -14,8 +14,8 @@ from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference, Setting
-from loomopt.studies.accuracy.subject import Subject, Target
+from loomopt.studies.accuracy.ladders import Ladder, LadderReference, Rung, Setting
+from loomopt.studies.accuracy.subject import StudiedTarget, Subject
 
 EXCHANGE, UNIFORM, TOLERANCE, HESSIAN = "exchange", "uniform points", "IPOPT tolerance", "Hessian"
 CLAIM = "claimed peak"
@@ -53,19 +53,19 @@ def ladders(subject: Subject, amount: Amount) -> Iterator[Ladder]:
             yield _family(target, family, amount.intervals)
 
 
-def _reference(target: Target, quantity: str) -> Reference | None:
+def _reference(target: StudiedTarget, quantity: str) -> LadderReference | None:
     """Return what a reading of a solve is compared with."""
     if quantity == target.quantity(CLAIM):
-        return Reference(0.0, size=1.0)
+        return LadderReference(0.0, size=1.0)
     return target.reference("design" if quantity == target.quantity("design") else target.figure)
 
 
-def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
+def _exchange(target: StudiedTarget, accuracies: Sequence[float]) -> Ladder:
     """Return what a designer gets by `solve --accuracy`: refined points, Newton's last steps, the certificate."""
 
-    def read(setting: float, answer: Solution) -> Outcome:
+    def read(setting: float, answer: Solution) -> Rung:
         if answer.status != "optimal":
-            return Outcome({}, answer.status)
+            return Rung({}, answer.status)
         x = target.variables(answer)
         sampler = Sampler(target.program.model, {**target.program.parameters, **x}, Settings(setting).sampled)
         values = {
@@ -73,7 +73,7 @@ def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
             target.quantity("design"): target.placed(x),
             target.quantity(CLAIM): _unrefined(target, sampler),
         }
-        return Outcome(values, answer.status)
+        return Rung(values, answer.status)
 
     return Ladder(
         EXCHANGE,
@@ -87,7 +87,7 @@ def _exchange(target: Target, accuracies: Sequence[float]) -> Ladder:
     )
 
 
-def _unrefined(target: Target, sampler: Sampler) -> float:
+def _unrefined(target: StudiedTarget, sampler: Sampler) -> float:
     """Return by how much refined peaks, as a certificate reads them, miss those of 40 digits, in natural sizes."""
     program, worst = target.program, 0.0
     rows = {row: o.scale for o in program.objectives for row in o.quantities}
@@ -97,7 +97,7 @@ def _unrefined(target: Target, sampler: Sampler) -> float:
     return worst
 
 
-def _solved(target: Target, settings: Settings) -> Point:
+def _solved(target: StudiedTarget, settings: Settings) -> Point:
     """Return the first point that one of the job's own starts leads to; the first failure where none does."""
     first = None
     for start in exchange.starts(target.program, len(target.program.starts)):
@@ -111,7 +111,7 @@ def _solved(target: Target, settings: Settings) -> Point:
 
 
 def _solves(
-    target: Target,
+    target: StudiedTarget,
     method: str,
     settings: tuple[Setting, ...],
     asked: Callable[[Any], Settings],
@@ -121,12 +121,12 @@ def _solves(
     """Return a ladder of bare solves, without the Newton steps that end one otherwise."""
     figure, design, claim = (target.quantity(what) for what in (target.figure, "design", CLAIM))
 
-    def read(setting: Any, point: Point) -> Outcome:
+    def read(setting: Any, point: Point) -> Rung:
         status = f"{point.status}, {point.iterations} iterations"
         if not point.reached:
-            return Outcome({}, status)
+            return Rung({}, status)
         values: dict[str, Any] = {figure: target.merit(point.x), design: target.placed(point.x)}
-        return Outcome(values | ({claim: _excess(target, point, asked(setting))} if claims else {}), status)
+        return Rung(values | ({claim: _excess(target, point, asked(setting))} if claims else {}), status)
 
     quantities = (figure, claim, design) if claims else (figure, design)
     return Ladder(
@@ -140,7 +140,7 @@ def _solves(
     )
 
 
-def _excess(target: Target, point: Point, settings: Settings) -> float:
+def _excess(target: StudiedTarget, point: Point, settings: Settings) -> float:
     """Return by how much true whole-cycle rows exceed what the solver holds for true at its points."""
     calls = Calls(target.program, settings)
     sampler = calls.sampler(point.x)
@@ -150,7 +150,7 @@ def _excess(target: Target, point: Point, settings: Settings) -> float:
     return max((calls.excess(family, e, point.extra) for family, of in found for e in of), default=0.0)
 
 
-def _uniform(target: Target, points: Sequence[int]) -> Ladder:
+def _uniform(target: StudiedTarget, points: Sequence[int]) -> Ladder:
     """Return solves on equal points of the turn: what is between them is not seen."""
 
     def asked(count: int) -> Settings:
@@ -159,7 +159,7 @@ def _uniform(target: Target, points: Sequence[int]) -> Ladder:
     return _solves(target, UNIFORM, tuple(points), asked, lambda count: 1 / count, claims=True)
 
 
-def _tolerance(target: Target, tolerances: Sequence[float]) -> Ladder:
+def _tolerance(target: StudiedTarget, tolerances: Sequence[float]) -> Ladder:
     """Return solves to ever smaller tolerances of IPOPT."""
 
     def asked(tolerance: float) -> Settings:
@@ -168,7 +168,7 @@ def _tolerance(target: Target, tolerances: Sequence[float]) -> Ladder:
     return _solves(target, TOLERANCE, tuple(tolerances), asked, float)
 
 
-def _hessian(target: Target) -> Ladder:
+def _hessian(target: StudiedTarget) -> Ladder:
     """Return solves with second derivatives, and with IPOPT's own guesses of them."""
 
     def asked(hessian: str) -> Settings:
@@ -177,24 +177,24 @@ def _hessian(target: Target) -> Ladder:
     return _solves(target, HESSIAN, ("limited-memory", "exact"), asked, None)
 
 
-def _family(target: Target, family: Family, counts: Sequence[int]) -> Ladder:
+def _family(target: StudiedTarget, family: LawFamily, counts: Sequence[int]) -> Ladder:
     """Return optima over finer and finer sets of designs, against the limit that they tend to."""
     quantity = target.quantity(target.figure)
 
-    def run(count: int) -> tuple[Target, Point]:
-        own = Target(target.scene.set(family.key, count), target.name)
+    def run(count: int) -> tuple[StudiedTarget, Point]:
+        own = StudiedTarget(target.scene.set(family.key, count), target.name)
         return own, _solved(own, Settings())
 
-    def read(count: int, result: tuple[Target, Point]) -> Outcome:
+    def read(count: int, result: tuple[StudiedTarget, Point]) -> Rung:
         own, point = result
         status = f"{point.status}, {point.iterations} iterations"
-        return Outcome({quantity: own.merit(point.x)} if point.reached else {}, status)
+        return Rung({quantity: own.merit(point.x)} if point.reached else {}, status)
 
     @functools.cache
-    def reference(_: str) -> Reference | None:
+    def reference(_: str) -> LadderReference | None:
         if target.optimum is None:
             return None
         value = family.limit(target.scene, target.optimum.x)
-        return None if value is None else Reference(value)
+        return None if value is None else LadderReference(value)
 
     return Ladder(family.method, (quantity,), tuple(counts), run, read, reference, lambda count: 1 / count)

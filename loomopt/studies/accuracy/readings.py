@@ -14,7 +14,7 @@ from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.solving.nlp import expressions
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference
+from loomopt.studies.accuracy.ladders import Ladder, LadderReference, Rung
 from loomopt.studies.accuracy.reference_digits import EXTREME_STEPS, REFERENCE_SLOPE
 from loomopt.studies.accuracy.subject import POSITIONS, Subject
 
@@ -98,8 +98,8 @@ def _crossing(subject: Subject, crossing: Crossing) -> Ladder:
         outside = np.flatnonzero(sizes > level)
         return {figure: float(angles[outside[0] - 1]) if outside.size and outside[0] else 0.0}
 
-    def reference(quantity: str) -> Reference:
-        return Reference(true)
+    def reference(quantity: str) -> LadderReference:
+        return LadderReference(true)
 
     ladder = _today(subject, SAMPLED, (figure,), SAMPLES, run, lambda count: 1 / count)
     return Ladder(ladder.method, (figure,), SAMPLES, run, ladder.read, reference, ladder.step)
@@ -128,7 +128,7 @@ def _today(
 ) -> Ladder:
     """Return a ladder whose runs give the readings of today's machine themselves."""
     reference = functools.cache(subject.reference)
-    return Ladder(method, quantities, tuple(settings), run, lambda _, found: Outcome(found), reference, step)
+    return Ladder(method, quantities, tuple(settings), run, lambda _, found: Rung(found), reference, step)
 
 
 def _derivatives(subject: Subject) -> Iterator[Ladder]:

@@ -16,7 +16,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.nlp.stations import Epigraph, Family, Stood, epigraphs, families, held, stations
+from loomopt.solving.nlp.stations import Epigraph, HeldStations, RowFamily, epigraphs, families, held, stations
 
 REFERENCE_DIGITS, CLOSED_DIGITS = 40, 60
 """Digits of references, and of those that readings in 40 digits are compared with: 20 more than any of them has."""
@@ -126,7 +126,7 @@ class _Rows:
         program, sampler = self.program, self.sampler
         found = [list(of) for of in self.point.binding]
         corners = stations(program.model, sampler.given, [variable.name for variable in program.variables])
-        stood = Stood(corners, sampler.cycle)
+        stood = HeldStations(corners, sampler.cycle)
         for family, of, prices in zip(self.families, found, self.point.multipliers.at_stations, strict=True):
             signs, own = stood.signs(sampler, family.row), held([corner.switch for corner in corners], family)
             of += [
@@ -141,7 +141,7 @@ class _Rows:
         scale = self.program.objectives[epigraph.objective].scale
         return self.number(max(self.sampler.peak(row) for row in epigraph.rows) / scale)
 
-    def _bound(self, family: Family, tops: Sequence[Number]) -> tuple[Number, float]:
+    def _bound(self, family: RowFamily, tops: Sequence[Number]) -> tuple[Number, float]:
         """Return what the rows of a family stay below, in their natural size, and that size, SI."""
         if family.limit < 0:
             place = self.tops.index(family.epigraph)

@@ -23,7 +23,7 @@ from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
 from loomopt.studies import check
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.ladders import Reference
+from loomopt.studies.accuracy.ladders import LadderReference
 from loomopt.studies.accuracy.reference_digits import CLOSED_DIGITS, REFERENCE_DIGITS
 
 REFERENCE_ACCURACY = 1e-11
@@ -40,7 +40,7 @@ class Subject:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.job = scene, registry.of(scene)
         self.studied: Studied = self.job.studied(scene)
-        self.targets = [Target(scene, name) for name in self.studied.targets if name in check.served(scene)]
+        self.targets = [StudiedTarget(scene, name) for name in self.studied.targets if name in check.served(scene)]
 
     @functools.cached_property
     def sampler(self) -> Sampler:
@@ -75,20 +75,20 @@ class Subject:
         """Today's machine in more digits than any method has."""
         return reference_digits.precise(self.sampler, CLOSED_DIGITS)
 
-    def reference(self, quantity: str) -> Reference | None:
+    def reference(self, quantity: str) -> LadderReference | None:
         """Return what a reading of today's machine truly is, in 40 digits; closed forms in 60."""
         if quantity == self.studied.motion:
             exact = self.exact
-            return Reference(self.motion(exact.maths, exact.given))
+            return LadderReference(self.motion(exact.maths, exact.given))
         if quantity in self.studied.static:
-            return Reference(self.exact.single(quantity))
+            return LadderReference(self.exact.single(quantity))
         if quantity in self.peaks:
-            return Reference(reference_digits.peak(self.sampler, *self.peaks[quantity]))
+            return LadderReference(reference_digits.peak(self.sampler, *self.peaks[quantity]))
         return None
 
 
 @dataclass(frozen=True)
-class Target:
+class StudiedTarget:
     """A target of a scene with the optimum in many digits."""
 
     scene: Scene
@@ -131,17 +131,17 @@ class Target:
             return None
         return reference_digits.optimum(self.program, self.answer.point, self.variables(self.answer))
 
-    def reference(self, what: str) -> Reference | None:
+    def reference(self, what: str) -> LadderReference | None:
         """Return the true optimum's figure, or its design in natural sizes; None where it is not unique."""
         found, moves = self.optimum, len(self.program.moves)
         if found is None or (what == "design" and found.flat > moves):
             return None
         if what == "design":
-            return Reference(self.placed(found.x), found.design_uncertainty, 1.0)
+            return LadderReference(self.placed(found.x), found.design_uncertainty, 1.0)
         objective, value = self.program.objectives[-1], found.objectives[-1]
         if objective.power != 1:
             value = value ** (1 / systems.mpmath(REFERENCE_DIGITS).number(objective.power))
-        return Reference(value, found.uncertainty, 0.0 if value else objective.scale)
+        return LadderReference(value, found.uncertainty, 0.0 if value else objective.scale)
 
     def placed(self, x: Mapping[str, Number]) -> list[Number]:
         """Return variables in natural sizes, apart from the moves that leave every figure unchanged."""

@@ -8,7 +8,7 @@ from loomopt.base.records import freeze
 from loomopt.base.refusals import refusal
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.words import Words
-from loomopt.studies.effects.study import Course, Effects, command
+from loomopt.studies.effects.study import Effects, EffectsCourse, command
 from loomopt.studies.effects.worth import NEEDED, Worth
 from loomopt.studies.run.rows import Row
 
@@ -116,7 +116,7 @@ class Found:
 
 def concluded(study: Effects, rows: Sequence[Row]) -> Found:
     """Return what rows of a study show, not all of which need be there. Raises BadInput where solve takes nothing."""
-    course = Course(study, rows)
+    course = EffectsCourse(study, rows)
     first = course.reference or course.rows[frozenset()]
     if course.reference is None and not course.wanted:
         raise refusal(f"there is nothing to compare with: {first.reason}", study.scene.origin, "effects")
@@ -144,12 +144,12 @@ def concluded(study: Effects, rows: Sequence[Row]) -> Found:
     )
 
 
-def _reference(course: Course, row: Row, on: tuple[str, ...]) -> Reference:
+def _reference(course: EffectsCourse, row: Row, on: tuple[str, ...]) -> Reference:
     figures, scales = (course.judge.figures, course.judge.scales) if course.judge else ({}, {})
     return Reference(on, figures, scales, row.status, row.reason, **row.warm)
 
 
-def _unmeasured(course: Course) -> tuple[Worth, ...]:
+def _unmeasured(course: EffectsCourse) -> tuple[Worth, ...]:
     """Return what came of leaving out each effect where that has led to no reference."""
     found = []
     for name, off in course.singles(frozenset()).items():

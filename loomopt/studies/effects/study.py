@@ -25,7 +25,7 @@ from loomopt.scenes.tables import effects as read
 from loomopt.solving import engine
 from loomopt.solving.options import OMITTED, check_numbers, target_name
 from loomopt.studies.effects.worth import Judge, Worth
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 from loomopt.studies.sweep import reason
 
 YIELDING = (State, Speed, Event)
@@ -193,15 +193,15 @@ class Effects:
         """Return the scene of the effects that combine, but for some. Raises BadInput where these cannot be off."""
         return with_only(self.scene, [name for name in self.together if name not in off])
 
-    def batch(self, rows: Sequence[Row]) -> list[Task]:
+    def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
         """Return the tasks of the next round, from all rows of earlier ones."""
-        wanted = Course(self, rows).wanted
-        return [Task(len(rows) + k, None, dict.fromkeys(self._ordered(off), 0.0)) for k, off in enumerate(wanted)]
+        wanted = EffectsCourse(self, rows).wanted
+        return [StudyTask(len(rows) + k, None, dict.fromkeys(self._ordered(off), 0.0)) for k, off in enumerate(wanted)]
 
     def _ordered(self, off: Off) -> list[str]:
         return [name for name in self.together if name in off]
 
-    def solved(self, task: Task, parent: Row | None) -> Row:
+    def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task: its place names the effects that are off."""
         from loomopt.solving.nlp import transcribe
 
@@ -255,7 +255,7 @@ def planned(
     return study
 
 
-class Course:
+class EffectsCourse:
     """How far a study has come by some of its rows: what is to be solved next, and what is known by then.
 
     base: the effects that the reference leaves off, None without one; reference: its row; measured: of these, effects

@@ -33,7 +33,7 @@ Cap = tuple[Traded, float]
 
 
 @dataclass(frozen=True)
-class Terms:
+class FrontTerms:
     """What judges the designs of a front: what its target demands of all of them, and limits on its axes.
 
     traded: both axes; base: what is demanded; program: with the limits on axes too.
@@ -110,7 +110,7 @@ def _tightest(one: Finding, *others: Finding) -> Finding:
     return one
 
 
-def _named(terms: Terms) -> tuple[Limit, ...]:
+def _named(terms: FrontTerms) -> tuple[Limit, ...]:
     """Return all limits, those on axes under the axis' own name where their row is the figure itself."""
     plain = {capped(axis): axis.axis.name for axis, _ in terms.caps if _is_figure(axis)}
     return tuple(replace(limit, name=plain.get(limit.name, limit.name)) for limit in terms.program.limits)
@@ -131,17 +131,17 @@ def answer(solver: Solver, target: str | None, found: Reached, asking: Asking, b
     for program in programs:
         point = warm.read(found.warm.get("point", {}), program)
         if point:
-            terms = Terms(solver.scene, target, solver.axes, solver.base, program, caps)
+            terms = FrontTerms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))
             certificate = certify(program, _as_read(solver.job, program, point.x), solver.accuracy)
             made = _certified(solver, terms, here, certificate, found, asking)
             return replace(made, point=point, time=_time(began, solved))
-    terms = Terms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
+    terms = FrontTerms(solver.scene, target, solver.axes, solver.base, programs[0], caps)
     made = _without(solver, terms, found)
     return replace(made, terms=terms, time=_time(began, solved))
 
 
-def _without(solver: Solver, terms: Terms, found: Reached) -> Solution:
+def _without(solver: Solver, terms: FrontTerms, found: Reached) -> Solution:
     """Return the answer where no design was reached: the nearest one there is, and what clashes."""
     clash = clashing(solver, terms.program) if found.status == "infeasible" else Clash()
     here = terms.whole(solver.job.design(solver.base, clash.x)) if clash.x else terms.evaluation({})
@@ -161,7 +161,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
 
 
 def _certified(
-    solver: Solver, terms: Terms, here: Evaluation, certificate: Certificate, found: Reached, asking: Asking
+    solver: Solver, terms: FrontTerms, here: Evaluation, certificate: Certificate, found: Reached, asking: Asking
 ) -> Solution:
     """Return the answer of a design that was reached."""
     words = Words(solver.scene)
@@ -184,7 +184,7 @@ def _as_read(job: Job, program: Program, x: Mapping[str, float]) -> dict[str, fl
     return job.values(program, job.design(program, x))
 
 
-def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
+def _explicit(terms: FrontTerms, certificate: Certificate) -> Iterator[Binding]:
     """Yield what binds, a limit on an axis as a limit of its figure."""
     caps = {capped(axis): (axis, cap) for axis, cap in terms.caps}
     for each in certificate.binding:
@@ -199,7 +199,7 @@ def _explicit(terms: Terms, certificate: Certificate) -> Iterator[Binding]:
         yield replace(each, limit=replace(limit, name=name), side=limit.sign, worth=worth)
 
 
-def _asked(words: Words, terms: Terms, asking: Asking) -> str:
+def _asked(words: Words, terms: FrontTerms, asking: Asking) -> str:
     """Return what was sought as a sentence."""
     sought, other = terms.traded[asking.first], terms.traded[1 - asking.first]
     held = [

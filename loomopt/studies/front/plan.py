@@ -62,7 +62,7 @@ class Spot(NamedTuple):
     active: tuple[Touched, ...]
 
 
-class Scale(NamedTuple):
+class FrontScale(NamedTuple):
     """From figures to positions: sign and the ends' distance of either axis (a, b), SI."""
 
     names: tuple[str, str]
@@ -106,7 +106,7 @@ def values(rows: Sequence[Row], axis: str) -> list[float]:
     return [value(row, axis) for row in rows if row.certified]
 
 
-def spots(rows: Sequence[Row], scale: Scale) -> tuple[list[Spot], list[tuple[Row, int]]]:
+def spots(rows: Sequence[Row], scale: FrontScale) -> tuple[list[Spot], list[tuple[Row, int]]]:
     """Return the front's points by b, and the rows that another dominates, each with the one that does."""
     known = [row for row in rows if row.certified]
     found = sorted((_spot(row, scale) for row in known), key=lambda spot: (spot.b, spot.a, spot.point))
@@ -123,7 +123,7 @@ def spots(rows: Sequence[Row], scale: Scale) -> tuple[list[Spot], list[tuple[Row
     return front, worse
 
 
-def _spot(row: Row, scale: Scale) -> Spot:
+def _spot(row: Row, scale: FrontScale) -> Spot:
     b, a = scale.position(1, value(row, scale.names[1])), scale.position(0, value(row, scale.names[0]))
     asked = row.place.get(scale.names[1])
     empty = b if asked is None else max(b, scale.position(1, asked))
@@ -131,7 +131,7 @@ def _spot(row: Row, scale: Scale) -> Spot:
     return Spot(row.point, b, a, empty, slope * scale.signs[0] * scale.signs[1], touched(row))
 
 
-def following(rows: Sequence[Row], scale: Scale, points: int) -> list[Next]:
+def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]:
     """Return the next batch: what is dominated again, the widest gaps until there are enough points, then changes.
 
     Before these are narrowed down, either side of each is solved from the other: its basin may be the better one there.
@@ -230,7 +230,7 @@ def crossing(left: Spot, right: Spot) -> float | None:
     return found if left.b < found < right.b else None
 
 
-def told(front: Sequence[Spot], scale: Scale) -> tuple[list[Change], list[tuple[float, float]]]:
+def told(front: Sequence[Spot], scale: FrontScale) -> tuple[list[Change], list[tuple[float, float]]]:
     """Return what changes along the front, and the stretches of b where nothing is better, SI, in the order of b."""
     changes, gaps = list[Change](), list[tuple[float, float]]()
     for left, right in itertools.pairwise(front):
@@ -271,7 +271,7 @@ def scaled(
     signs: tuple[int, int],
     sizes: tuple[float, float],
     accuracy: float = ACCURACY,
-) -> Scale:
+) -> FrontScale:
     """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI.
 
     Of ends that agree to ten times the accuracy that was asked the distance is 0.
@@ -280,4 +280,4 @@ def scaled(
     widths = [abs(one - other) for one, other in zip(*ends, strict=True)]
     least = max(ALIKE, 10 * accuracy)
     wide = tuple(width if width > least * size else 0.0 for width, size in zip(widths, sizes, strict=True))
-    return Scale(names, signs, (ends[0][0], ends[1][1]), (wide[0], wide[1]))
+    return FrontScale(names, signs, (ends[0][0], ends[1][1]), (wide[0], wide[1]))

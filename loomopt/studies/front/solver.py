@@ -7,14 +7,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 from loomopt.jobs import registry
-from loomopt.model.axes import Asked, Traded, opposite
+from loomopt.model.axes import Requested, Traded, opposite
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import evaluation
-from loomopt.solving.certificate.active_set import Row as ActiveRow
-from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.active_set import ActiveRow, active_set
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.search import least_change
@@ -67,7 +66,7 @@ class Reached:
 class Solver:
     """The programs of one front, and how they are solved; axes: the first is sought, the second is what it costs."""
 
-    def __init__(self, scene: Scene, target: str | None, asked: Asked, accuracy: float) -> None:
+    def __init__(self, scene: Scene, target: str | None, asked: Requested, accuracy: float) -> None:
         self.scene, self.accuracy, self.job = scene, accuracy, registry.of(scene)
         self.base, axes = self.job.traded(scene, target, asked)
         self.axes: tuple[Traded, Traded] = (axes[0], axes[1])

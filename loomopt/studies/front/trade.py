@@ -23,10 +23,10 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution
 from loomopt.solving.answer.words import Words
 from loomopt.studies.front import answer, plan
-from loomopt.studies.front.plan import ENDS, Next, Scale
+from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver
 from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 
 PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
@@ -138,10 +138,10 @@ class Trade:
         first, second = self.solver.axes
         return first.sign, second.sign
 
-    def batch(self, rows: Sequence[Row]) -> list[Task]:
+    def batch(self, rows: Sequence[Row]) -> list[StudyTask]:
         """Return the tasks that follow from finished rows: both ends, then rounds of halved gaps. Raises BadInput."""
         if not rows:
-            return [Task(end, None, {}, {"end": end}) for end in ENDS]
+            return [StudyTask(end, None, {}, {"end": end}) for end in ENDS]
         by_point = {row.point: row for row in rows}
         self._refuse(by_point)
         self._reaches([by_point[end] for end in ENDS])
@@ -155,13 +155,13 @@ class Trade:
         first = len(rows)
         return [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
 
-    def _task(self, point: int, each: Next, scale: Scale, rows: Mapping[int, Row], wide: bool) -> Task:
+    def _task(self, point: int, each: Next, scale: FrontScale, rows: Mapping[int, Row], wide: bool) -> StudyTask:
         others = [rows[other].warm for other in each.near[1:]]
         held = rows[ENDS[0]].warm["held"]
         ask = {"also": others, "held": held, "wide": wide}
         ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
         length = len(each.near) + WIDE * wide
-        return Task(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
+        return StudyTask(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
 
     @property
     def sizes(self) -> tuple[float, float]:
@@ -169,7 +169,7 @@ class Trade:
         first, second = (axis.objective.scale ** (1 / axis.axis.power) for axis in self.solver.axes)
         return first, second
 
-    def scale(self, rows: Sequence[Row]) -> Scale:
+    def scale(self, rows: Sequence[Row]) -> FrontScale:
         """Return the scale of finished rows."""
         return plan.scaled({row.point: row for row in rows}, self.axes, self.signs, self.sizes, self.accuracy)
 
@@ -226,13 +226,13 @@ class Trade:
         return self.scene
 
     @working()
-    def solve(self, task: Task, parent: Row | None) -> Solution:
+    def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()
         found, asking, _ = self.reach(task, parent)
         return answer.answer(self.solver, self.target, found, asking, began)
 
-    def solved(self, task: Task, parent: Row | None) -> Row:
+    def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task; it depends on nothing but its arguments."""
         began = time.perf_counter()
         found, _, place = self.reach(task, parent)
@@ -252,7 +252,7 @@ class Trade:
             told,
         )
 
-    def reach(self, task: Task, parent: Row | None) -> Met:
+    def reach(self, task: StudyTask, parent: Row | None) -> Met:
         """Return what a task comes to."""
         if "end" in task.ask:
             return self._end(int(task.ask["end"]), task.ask.get("also", ()))

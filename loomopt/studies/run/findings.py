@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution
-from loomopt.studies.run.rows import Row, Side, Study, Task
+from loomopt.studies.run.rows import Row, Side, Study, StudyTask
 
 
 class Change(NamedTuple):
@@ -92,7 +92,7 @@ class SceneStudy(Study, Protocol):
     def scene_at(self, point: int) -> Scene:
         """Return the scene that a point's design stands in."""
 
-    def solve(self, task: Task, parent: Row | None) -> Solution:
+    def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Return the whole answer of a task, the same digits as its row. Raises BadInput."""
 
 

@@ -101,7 +101,7 @@ def digest(rows: Iterable[Row]) -> str:
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyTask:
     """One point to be solved.
 
     place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
@@ -122,8 +122,8 @@ class Study(Protocol):
     def key(self) -> str:
         """A hash of all that its rows depend on."""
 
-    def batch(self, rows: Sequence[Row]) -> Sequence[Task]:
+    def batch(self, rows: Sequence[Row]) -> Sequence[StudyTask]:
         """Return the next tasks, from all rows of earlier batches and from nothing else; none at the end."""
 
-    def solved(self, task: Task, parent: Row | None) -> Row:
+    def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task, from its arguments and from nothing else."""

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.refusals import refusal
 from loomopt.model.session import working
-from loomopt.studies.run.rows import Row, Study, Task
+from loomopt.studies.run.rows import Row, Study, StudyTask
 
 if TYPE_CHECKING:
     from loomopt.studies.run.store import Store
 
-    Work = tuple[Task, Row | None]
+    Work = tuple[StudyTask, Row | None]
     """A task with the row of its parent."""
 
 OnRow = Callable[[Row], None]
@@ -57,7 +57,7 @@ def run(
     return tuple(rows.values())
 
 
-def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[Task, Row | None]]:
+def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[StudyTask, Row | None]]:
     """Yield every task of a study that was run, with the row of its parent."""
     known, done = {row.point: row for row in rows}, dict[int, Row]()
     while batch := study.batch(list(done.values())):
@@ -77,7 +77,7 @@ KILLED = "KilledWorker"
 DIED = f"the process that solved it died {MOST_DEATHS} times: out of memory?"
 
 
-def solved(study: bytes, task: "Task", parent: "Row | None") -> str:
+def solved(study: bytes, task: "StudyTask", parent: "Row | None") -> str:
     """Return the row of a task as JSON text; what goes wrong is a failed row with its reason."""
     import json
 
@@ -104,7 +104,7 @@ def _unpacked_row(text: str) -> "Row":
     return Row.from_dict(json.loads(text))
 
 
-def _failed(task: "Task", reason: str, seconds: float = 0.0) -> "Row":
+def _failed(task: "StudyTask", reason: str, seconds: float = 0.0) -> "Row":
     from loomopt.studies.run.rows import Row
 
     return Row(task.point, task.place, task.parent, "failed", reason, seconds=seconds)

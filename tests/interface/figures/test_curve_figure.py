@@ -55,7 +55,7 @@ def drawn(name, kind):
             if c.startswith(f"{v} [")
         }
     return outputs.plotted(
-        tables.curves(scene, design), scene, design, outputs.Subject(f"design for {target}") if design else None
+        tables.curves(scene, design), scene, design, outputs.DrawnSubject(f"design for {target}") if design else None
     )
 
 

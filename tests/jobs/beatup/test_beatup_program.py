@@ -7,7 +7,7 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.model.limits import BoundLimit, DesignLimit, Limit, RatioLimit
-from loomopt.model.moves import AxisMove, ScaleMove, Wish
+from loomopt.model.moves import AxisMove, Preference, ScaleMove
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
 from loomopt.model.program import Program, Variable
 from loomopt.physics.tolerances import NO_MASS
@@ -124,9 +124,9 @@ def test_moves_are_data_the_counterweights_first():
         ("scale", LENGTHS, ScaleMove),
     ]
     used, none = found[0].wishes
-    assert used == Wish("most", "least added mass, so the largest radius", "s", used.above)
+    assert used == Preference("most", "least added mass, so the largest radius", "s", used.above)
     assert used.above == pytest.approx(NO_MASS * ROOM)
-    assert none == Wish("today", "no mass, so the radius nearest today's")
+    assert none == Preference("today", "no mass, so the radius nearest today's")
     assert found[1].today == {name: BEATUP.mechanism[name] for name in LENGTHS}
     assert [move.name for move in JOB.program(BEATUP.set("bounds.r4e", "70 mm"), "balance").moves] == ["scale"]
 

@@ -16,7 +16,7 @@ from loomopt.jobs.rapier import drawing as rapier_drawing
 from loomopt.jobs.rapier.drawing import FRONT, LINKS, OVER, REAR
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 from loomopt.picture.drawing import sheet
 from loomopt.picture.shapes import LAYERS, Circle, Line, Text
 
@@ -54,8 +54,8 @@ def travel(design, phi1):
     """Return the rapier's travel, m, and its derivative at crank angles."""
     d = Dimensions(*(design[field.name] for field in dataclasses.fields(Dimensions)))
     stand = Sley(systems.numpy(), d).stand
-    front = Pose(systems.numpy(), d, stand, np.array(0.0)).relative
-    pose = Pose(systems.numpy(), d, stand, phi1)
+    front = RapierPose(systems.numpy(), d, stand, np.array(0.0)).relative
+    pose = RapierPose(systems.numpy(), d, stand, phi1)
     return d.travel * pose.phi63(front), d.travel * pose.phi63_1
 
 

@@ -9,7 +9,7 @@ from loomopt.jobs.rapier import model as rapier
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.effects.rapier import head_inertia, tape_friction
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 
 EFFECTS = {module.EFFECT.name: module.EFFECT for module in (head_inertia, tape_friction)}
 SPEED = 50.0
@@ -34,7 +34,7 @@ def plain(name):
 def numbers(phi1):
     """Return the value of each printed symbol, from the kernel: angles from its joints, rates from its derivatives."""
     stand = Sley(FLOAT, BUILT).stand
-    pose, front = (Pose(FLOAT, BUILT, stand, angle) for angle in (phi1, 0.0))
+    pose, front = (RapierPose(FLOAT, BUILT, stand, angle) for angle in (phi1, 0.0))
     joints = pose.joints
 
     def direction(one, other):
@@ -116,7 +116,7 @@ def test_printed_dead_centres_are_the_sleys(geometry):
     assert value(angle, named) == pytest.approx(named["beta_r"], rel=1e-13)
     rear = value(crank, named)
     stand = Sley(FLOAT, BUILT).stand
-    assert abs(Pose(FLOAT, BUILT, stand, rear).phi3_1) < 1e-14
+    assert abs(RapierPose(FLOAT, BUILT, stand, rear).phi3_1) < 1e-14
 
 
 @pytest.mark.parametrize("phi1", ANGLES)
@@ -159,6 +159,6 @@ def test_latex_has_indices_before_primes_so_that_powers_may_follow(geometry):
 
 def test_the_drive_of_these_tests_assembles_all_round():
     d, stand = BUILT, Sley(systems.numpy(), BUILT).stand
-    base = Pose(systems.numpy(), d, stand, np.linspace(0, 2 * np.pi, 721)).base
+    base = RapierPose(systems.numpy(), d, stand, np.linspace(0, 2 * np.pi, 721)).base
     assert np.all(np.hypot(base.x, base.y) < d.l5 + d.l6)
     assert np.all(np.hypot(base.x, base.y) > abs(d.l5 - d.l6))

@@ -45,10 +45,10 @@ def test_a_travel_that_would_better_be_longer_has_a_price_of_that_side():
 
 def test_variables_without_room_are_held_on_both_sides():
     from loomopt.model.limits import BoundLimit
-    from loomopt.solving.certificate.active_set import ActiveSet, Row
+    from loomopt.solving.certificate.active_set import ActiveRow, ActiveSet
 
     limit = BoundLimit("kept", -1, "a", 1.0, 1.0)
-    rows = (Row("kept", "a", 1.0, 1.0, 0, 0.0, limit), Row("f", "f", 1.0, 1.0, 0, 0.0))
+    rows = (ActiveRow("kept", "a", 1.0, 1.0, 0, 0.0, limit), ActiveRow("f", "f", 1.0, 1.0, 0, 0.0))
     active = ActiveSet(rows, 1, ((1,),), (False,), (0.0,))
     assert kkt.system(active, 0, []).inequalities == (0,)
     assert kkt.system(active, 0, [], frozenset({"a"})).equalities == (0,)

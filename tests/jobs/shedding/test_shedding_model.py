@@ -9,8 +9,8 @@ import pytest
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.shedding.model import FramePose
-from loomopt.jobs.shedding.scene import Frame
+from loomopt.jobs.shedding.model import FrameMotion
+from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
 from loomopt.physics.mechanisms.cam_laws import LAWS
@@ -98,7 +98,7 @@ def test_derivatives_are_those_of_the_displacement_in_many_digits(scene):
     found, expected = [], []
     for angle, switches in nodes(sampled):
         here = physics.kinematics.pose(systems.FLOAT, sampled.given, Node(angle, switches))
-        assert isinstance(here, FramePose)
+        assert isinstance(here, FrameMotion)
         around = [Node(MANY.number(angle) + step, switches) for step in (h, 0, -h)]
         after, middle, before = (physics.kinematics.pose(MANY, given, node) for node in around)
         found.append([here.q, here.q1, here.q2, here.q3])
@@ -115,7 +115,7 @@ def test_derivatives_are_those_casadi_takes(scene):
     for piece in range(sampled.cycle.pieces):
         node = Node(theta, sampled.cycle.switch(piece))
         pose = physics.kinematics.pose(systems.casadi(), sampled.given, node)
-        assert isinstance(pose, FramePose)
+        assert isinstance(pose, FrameMotion)
         taken = ca.vertcat(*[ca.jacobian(ca.SX(value), theta) for value in (pose.q, pose.q1, pose.q2)])
         both = ca.Function("both", [theta], [taken, ca.vertcat(pose.q1, pose.q2, pose.q3)])
         for share in (0.0, 0.3, 0.9):
@@ -156,7 +156,7 @@ def test_travel_ends_and_rests_exactly(scene):
     physics, sampled = JOB.model(scene), JOB.sampler(scene, {})
     for angle, switches in nodes(sampled):
         pose = physics.kinematics.pose(systems.FLOAT, sampled.given, Node(angle, switches))
-        assert isinstance(pose, FramePose)
+        assert isinstance(pose, FrameMotion)
         segment = switches["segment"]
         if segment in (FAR, NEAR):
             assert (pose.q, pose.q1, pose.q2, pose.q3) == (scene.mechanism["travel"] * (segment == FAR), 0, 0, 0)
@@ -166,7 +166,7 @@ def test_travel_ends_and_rests_exactly(scene):
 
 def test_displacement_and_velocity_are_continuous_and_higher_orders_as_the_law_claims(scene):
     """Up to the law's own order; where it claims less, the jump is there."""
-    sampled, name = JOB.sampler(scene, {}), scene.table(Frame).law
+    sampled, name = JOB.sampler(scene, {}), scene.table(HealdFrame).law
     smooth = LAWS[name].smooth if name in LAWS else {"spline": 2, "table": 1}[name]
 
     def side(piece, share):

@@ -7,7 +7,7 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.program import SPARE
-from loomopt.jobs.shedding.scene import Frame
+from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.objectives import Peak, Value
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
@@ -156,7 +156,7 @@ def test_what_a_target_lacks_is_named(scene, target, problem):
 def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
     law = {f"law_{k}": value for k, value in enumerate(cycloid_like(8))}
     adopted, target = JOB.adopted(SCENE, {"K1": 1e5, **law}, "law")
-    assert (adopted.table(Frame).law, target) == ("spline", "stiffness")
-    assert adopted.table(Frame).law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
+    assert (adopted.table(HealdFrame).law, target) == ("spline", "stiffness")
+    assert adopted.table(HealdFrame).law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
     assert adopted.limits["law_acceleration"].max == pytest.approx(2 * math.pi)
     assert JOB.adopted(SCENE, {"K1": 1e5}, "force") == (SCENE, "force")

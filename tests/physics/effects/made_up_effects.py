@@ -4,7 +4,7 @@ import math
 from importlib.metadata import EntryPoint
 
 from loomopt.base.quantities import Coordinate, PositiveLength, PureNumber
-from loomopt.physics.effects.kinds import Axis, Check, Demand, Load, Speed
+from loomopt.physics.effects.kinds import Check, Demand, FlatNumber, Load, Speed
 from loomopt.physics.schema import Figure, Table
 
 BEGINS, ENDS = 1.1, 2.6
@@ -118,7 +118,7 @@ PLATE: Check[object] = Check(
     figures=(Figure("plate", "length", "thickness of the plate"),),
     demands=(Demand("plate", -1, "strong"),),
     least="plate",
-    axes=(Axis(name="spare", key="spare"),),
+    axes=(FlatNumber(name="spare", key="spare"),),
     examples=({"thickness": "5 mm", "spare": "7 mm", "strong": "3 mm"},),
 )
 

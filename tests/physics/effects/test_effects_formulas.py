@@ -97,7 +97,7 @@ def setting(number, phi, omega_dot, own):
 def value(system, function, own, phi, omega_dot=None):
     """Return a term with the paper's linkage at crank angle φ."""
     angle, given, mine, rate = setting(lambda name, x: system.number(x), phi, omega_dot, own)
-    joints = crank_rocker.Pose(system, crank_rocker.Lengths(*(given[f"l{k}"] for k in (1, 2, 3, 4))), angle)
+    joints = crank_rocker.CrankRockerPose(system, crank_rocker.Lengths(*(given[f"l{k}"] for k in (1, 2, 3, 4))), angle)
     pose = Pose(angle, given["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints, rate)
     return float(function(system, pose, given, mine))
 
@@ -148,7 +148,9 @@ def test_a_term_is_its_formula(label):
 def test_terms_take_arrays_of_crank_angles(label):
     function, own = CASES[label]
     phi = np.array([0.2, 1.15, 2.4, 4.0, 5.9])
-    joints = crank_rocker.Pose(systems.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi)
+    joints = crank_rocker.CrankRockerPose(
+        systems.numpy(), crank_rocker.Lengths(*(GIVEN[f"l{k}"] for k in (1, 2, 3, 4))), phi
+    )
     pose = Pose(phi, GIVEN["speed"], -joints.psi, -joints.psi_1, -joints.psi_2, joints)
     found = np.broadcast_to(function(systems.numpy(), pose, GIVEN, own), phi.shape)
     assert found == pytest.approx([value(systems.FLOAT, function, own, angle) for angle in phi], rel=1e-12, abs=1e-12)

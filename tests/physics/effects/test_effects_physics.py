@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from loomopt.jobs.beatup.model import ReedPose
+from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
 from loomopt.physics.effects.beatup import bearing_friction, centrifugal, gravity, resistance, rod_inertia
@@ -30,7 +30,7 @@ small = st.floats(-3, 3)
 
 
 def pose(phi, omega_dot=None, system=systems.FLOAT):
-    joints = crank_rocker.Pose(system, crank_rocker.Lengths(*LENGTHS), phi)
+    joints = crank_rocker.CrankRockerPose(system, crank_rocker.Lengths(*LENGTHS), phi)
     return Pose(phi, SPEED, -joints.psi, -joints.psi_1, -joints.psi_2, joints, omega_dot)
 
 
@@ -103,8 +103,8 @@ def test_a_rod_whose_inertia_is_that_of_its_point_masses_has_one_model_only():
     own = {"m2": 4.0, "s2": 0.03, "JS2": 4.0 * 0.03 * (0.065 - 0.03)}
     lengths = crank_rocker.Lengths(LENGTHS[0], 0.065, LENGTHS[2], LENGTHS[3])
     for phi in np.linspace(0, TURN, 50):
-        rod = crank_rocker.Pose(systems.FLOAT, lengths, float(phi))
-        here = ReedPose(phi, SPEED, rod, 30.0)
+        rod = crank_rocker.CrankRockerPose(systems.FLOAT, lengths, float(phi))
+        here = ReedMotion(phi, SPEED, rod, 30.0)
         lumped, exact = (rod_inertia.MODELS[name](systems.FLOAT, here, same, own) for name in ("lumped", "exact"))
         assert lumped == pytest.approx(exact, rel=1e-12, abs=1e-11)
 

@@ -9,7 +9,7 @@ from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_laws import LAWS
 from loomopt.physics.mechanisms.cam_motion import (
-    Column,
+    LawColumn,
     Named,
     Spline,
     Tabulated,
@@ -181,7 +181,7 @@ def test_a_choice_among_knots_reads_one():
     counted = Counted(law.prepared(FLOAT, named_knots(cycloid_like(256))))
     law.at(FLOAT, counted, 0.3, 76)
     assert counted.reads == 4
-    column = Column(counted, law.knots["s"])
+    column = LawColumn(counted, law.knots["s"])
     assert (len(column), list(column)) == (257, [counted[name] for name in law.knots["s"]])
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.physics.mechanisms.crank_rocker import Lengths, Pose, dead_centres
+from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose, Lengths, dead_centres
 from reference import crank_rocker_synthesis
 
 EPS = 2.0**-52
@@ -95,7 +95,7 @@ def assert_few_ulp(found, reference, data, ulps):
 @given(linkages(), angles)
 @REPEATABLE
 def test_psi_and_its_derivatives_to_four_ulp_times_condition(lengths, phi):
-    pose = Pose(systems.FLOAT, lengths, phi)
+    pose = CrankRockerPose(systems.FLOAT, lengths, phi)
     found = (pose.psi, pose.psi_1, pose.psi_2)
     assert_few_ulp(found, motion(lengths.side), [*numbers(lengths), phi], 4)
 
@@ -106,7 +106,7 @@ def test_closed_forms_to_twenty_digits(lengths, phi):
     system = systems.mpmath(60)
     exact = [MP.mpf(x) for x in (*numbers(lengths), phi)]
     l1, l2, l3, l4, angle = exact
-    pose = Pose(system, Lengths(l1, l2, l3, l4, lengths.side), angle)
+    pose = CrankRockerPose(system, Lengths(l1, l2, l3, l4, lengths.side), angle)
     for found, value in zip((pose.psi, pose.psi_1, pose.psi_2), motion(lengths.side)(*exact), strict=True):
         assert abs(found - value) <= MP.mpf(10) ** -20 * (1 + abs(value))
 
@@ -115,7 +115,7 @@ def automatic():
     """Return ψ' and ψ'' by AD of ψ alone, both as closed forms, and the sizes of both: |f| + Σ|x ∂f/∂x|."""
     data, side = ca.SX.sym("x", 5), ca.SX.sym("side")
     l1, l2, l3, l4, phi = ca.vertsplit(data)
-    pose = Pose(systems.casadi(), Lengths(l1, l2, l3, l4, side), phi)
+    pose = CrankRockerPose(systems.casadi(), Lengths(l1, l2, l3, l4, side), phi)
     first = ca.jacobian(pose.psi, phi)
     closed = ca.vertcat(pose.psi_1, pose.psi_2)
     size = ca.fabs(closed) + ca.mtimes(ca.fabs(ca.jacobian(closed, data)), ca.fabs(data))
@@ -166,14 +166,14 @@ SCANNED = [PAPER, Lengths(0.3, 0.95, 0.6, 1.0), Lengths(0.1, 0.3, 0.85, 1.0), Le
 def test_dead_centres_are_the_extremes_of_a_dense_scan(lengths, side):
     lengths = lengths._replace(side=side)
     phi, step = np.linspace(0, 2 * math.pi, 200_000, endpoint=False, retstep=True)
-    psi = side * Pose(systems.numpy(), lengths, phi).psi
+    psi = side * CrankRockerPose(systems.numpy(), lengths, phi).psi
     centres = dead_centres(systems.FLOAT, lengths)
     front, rear = int(np.argmin(psi)), int(np.argmax(psi))
     for place, angle, extreme in (
         (front, centres.beta, side * centres.psi_front),
         (rear, math.pi + centres.beta_r, side * centres.psi_rear),
     ):
-        bend = Pose(systems.FLOAT, lengths, angle).psi_2
+        bend = CrankRockerPose(systems.FLOAT, lengths, angle).psi_2
         assert abs(math.remainder(phi[place] - angle, 2 * math.pi)) <= step
         assert 0 <= abs(psi[place] - extreme) <= abs(bend) * step**2 / 7 + 8 * EPS
     assert psi[rear] - psi[front] == pytest.approx(centres.swing, abs=1e-9)
@@ -186,10 +186,10 @@ def test_the_closed_form_at_front_dead_centre_is_the_general_one_there(lengths):
     system = systems.mpmath(60)
     exact = Lengths(*[*map(MP.mpf, numbers(lengths)), lengths.side])
     centres = dead_centres(system, exact)
-    pose = Pose(system, exact, centres.beta)
+    pose = CrankRockerPose(system, exact, centres.beta)
     assert abs(pose.psi_1) <= MP.mpf(10) ** -45
     assert abs(pose.psi_2 - centres.psi_2_front) <= MP.mpf(10) ** -45 * abs(centres.psi_2_front)
-    pose = Pose(systems.FLOAT, lengths, dead_centres(systems.FLOAT, lengths).beta)
+    pose = CrankRockerPose(systems.FLOAT, lengths, dead_centres(systems.FLOAT, lengths).beta)
     size = AUTOMATIC([*numbers(lengths), pose.phi], lengths.side)[2]
     assert abs(pose.psi_2 - float(centres.psi_2_front)) <= 8 * EPS * float(size[1])
     assert abs(pose.psi_1) <= 8 * EPS * float(size[0])
@@ -279,7 +279,7 @@ def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
     Those of the dead centres are made of two.
     """
     scaled = Lengths(*[*(length * 2.0**power for length in numbers(lengths)), lengths.side])
-    first, second = Pose(systems.FLOAT, lengths, phi), Pose(systems.FLOAT, scaled, phi)
+    first, second = CrankRockerPose(systems.FLOAT, lengths, phi), CrankRockerPose(systems.FLOAT, scaled, phi)
     assert (first.psi_1, first.psi_2) == (second.psi_1, second.psi_2)
     assert first.psi == pytest.approx(second.psi, rel=EPS, abs=0)
     one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, scaled)
@@ -291,7 +291,7 @@ def test_a_change_of_scale_changes_no_angle(lengths, phi, power):
 @REPEATABLE
 def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
     mirrored = lengths._replace(side=-lengths.side)
-    first, second = Pose(systems.FLOAT, lengths, phi), Pose(systems.FLOAT, mirrored, -phi)
+    first, second = CrankRockerPose(systems.FLOAT, lengths, phi), CrankRockerPose(systems.FLOAT, mirrored, -phi)
     assert (second.psi, second.psi_1, second.psi_2) == (-first.psi, first.psi_1, -first.psi_2)
     one, two = dead_centres(systems.FLOAT, lengths), dead_centres(systems.FLOAT, mirrored)
     signs = {"swing": 1}
@@ -300,6 +300,6 @@ def test_the_mirror_image_turned_the_other_way_moves_alike(lengths, phi):
 
 def test_curves_are_the_poses_whatever_the_shape_and_the_chunk():
     phi = np.linspace(-7, 7, 60).reshape(3, 4, 5)
-    pose = Pose(systems.numpy(), PAPER, phi)
+    pose = CrankRockerPose(systems.numpy(), PAPER, phi)
     for found, whole in zip(crank_rocker.curves(PAPER, phi, chunk=7), (pose.psi, pose.psi_1, pose.psi_2), strict=True):
         assert found == pytest.approx(whole, rel=1e-14)

@@ -24,7 +24,7 @@ def front(system, lengths, side):
 def near(lengths, side, off):
     """Return the general pose a little beside front dead centre, in 40 digits."""
     at = front(MANY, lengths, side)
-    return crank_rocker.Pose(MANY, at.lengths, at.phi + MANY.number(off))
+    return crank_rocker.CrankRockerPose(MANY, at.lengths, at.phi + MANY.number(off))
 
 
 @sides
@@ -52,6 +52,6 @@ def test_links_keep_their_lengths_and_crank_and_rod_their_line(lengths, side):
     assert math.hypot(*at.dyad.link1) == pytest.approx(lengths[1], rel=1e-15)
     assert math.hypot(*at.dyad.link2) == pytest.approx(lengths[2], rel=1e-14)
     assert (at.cos_crank_rod, at.sin_crank_rod) == (pytest.approx(1, rel=1e-15), pytest.approx(0, abs=1e-15))
-    general = crank_rocker.Pose(systems.FLOAT, at.lengths, at.phi)
+    general = crank_rocker.CrankRockerPose(systems.FLOAT, at.lengths, at.phi)
     assert at.dyad.area4 == pytest.approx(general.dyad.area4, rel=1e-9)
     assert at.psi == pytest.approx(crank_rocker.dead_centres(systems.FLOAT, at.lengths).psi_front, rel=1e-14)

@@ -8,7 +8,7 @@ import pytest
 
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 
 GIVEN = Dimensions(
     l1=0.076385,
@@ -46,7 +46,7 @@ def poses(dimensions, phi1, system=None, **turned):
     """Return the pose at phi1, and the driving link's direction at front dead centre."""
     system = system or systems.numpy()
     stand = Sley(system, dimensions, **turned).stand
-    return Pose(system, dimensions, stand, phi1), Pose(system, dimensions, stand, 0 * phi1).relative
+    return RapierPose(system, dimensions, stand, phi1), RapierPose(system, dimensions, stand, 0 * phi1).relative
 
 
 def travel(dimensions, phi1, **turned):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
 MECHANISM = lo.load("rapier").mechanism
@@ -44,7 +44,7 @@ def drives(draw, wide):
 
 
 def pose(d, degrees):
-    return Pose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.radians(degrees))
+    return RapierPose(systems.numpy(), d, Sley(systems.FLOAT, d).stand, np.radians(degrees))
 
 
 def opens(d, degrees):

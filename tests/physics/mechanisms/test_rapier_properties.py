@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import loomopt as lo
 from loomopt.maths import systems
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Pose, Sley
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=25)
 MECHANISM = lo.load("rapier").mechanism
@@ -48,7 +48,7 @@ def drives(draw):
 
 def pose_of(d, phi=PHI, system=None, **turned):
     system = system or systems.numpy()
-    return Pose(system, d, Sley(system, d, **turned).stand, phi)
+    return RapierPose(system, d, Sley(system, d, **turned).stand, phi)
 
 
 def curves(d, phi=PHI, system=None, **turned):
@@ -136,7 +136,7 @@ def automatic():
     system = systems.casadi()
     d = Dimensions(*ca.vertsplit(numbers))
     stand = Sley(system, d).stand
-    angle = Pose(system, d, stand, phi).phi63(Pose(system, d, stand, 0).relative)
+    angle = RapierPose(system, d, stand, phi).phi63(RapierPose(system, d, stand, 0).relative)
     found = [angle]
     for _ in range(3):
         found.append(ca.gradient(found[-1], phi))

@@ -5,7 +5,7 @@ import math
 import mpmath
 import pytest
 
-from loomopt.physics.motion.free import Body, Moving, Piece, Zone, bound, response, safe
+from loomopt.physics.motion.free import Body, FreePiece, Moving, Zone, bound, response, safe
 
 MP = mpmath.MPContext()
 MP.dps = 120
@@ -53,7 +53,7 @@ def test_nothing_moves_at_once():
 @pytest.mark.parametrize("regime", REGIMES)
 def test_a_piece_obeys_its_equation_and_begins_where_it_is_said(regime):
     sigma, kappa = REGIMES[regime]
-    piece = Piece(0.0, 0.04, -0.7, 0, 0, sigma, kappa, 5.0)
+    piece = FreePiece(0.0, 0.04, -0.7, 0, 0, sigma, kappa, 5.0)
     assert piece.at(0.0)[:2] == (0.04, -0.7)
     for time in (0.004, 0.03, 0.2):
         at = piece.at(time)
@@ -67,7 +67,7 @@ def test_a_piece_obeys_its_equation_and_begins_where_it_is_said(regime):
 @pytest.mark.parametrize("regime", REGIMES)
 def test_no_acceleration_exceeds_its_bound(regime):
     sigma, kappa = REGIMES[regime]
-    piece = Piece(0.0, 0.04, -0.7, 0, 0, sigma, kappa, 5.0)
+    piece = FreePiece(0.0, 0.04, -0.7, 0, 0, sigma, kappa, 5.0)
     for begun in (0.0, 0.01, 0.1):
         most = bound(piece, piece.at(begun), 0.5)
         assert all(abs(piece.at(begun + 0.5 * k / 200).a) <= most * (1 + 1e-12) for k in range(201))

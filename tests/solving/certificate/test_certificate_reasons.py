@@ -11,14 +11,21 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import certificate, kkt, second_order
 from loomopt.solving.certificate.active_set import active_set
-from loomopt.solving.certificate.certificate import COMPLEMENTARY, LARGEST_PRICE, Cycle, JudgedLevel, certified, certify
+from loomopt.solving.certificate.certificate import (
+    COMPLEMENTARY,
+    LARGEST_PRICE,
+    JudgedLevel,
+    WholeCycle,
+    certified,
+    certify,
+)
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import Multipliers
+from loomopt.solving.certificate.kkt import LevelMultipliers
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.verdict import Level
 
-NONE = Multipliers(np.zeros(0), 0.0)
+NONE = LevelMultipliers(np.zeros(0), 0.0)
 
 
 def judged(curvature=None, **residuals):
@@ -45,7 +52,7 @@ def not_least(*levels):
     ],
 )
 def test_the_whole_cycle_is_covered_to_the_accuracy(violation, bound, reasons):
-    assert len(list(certificate._open(Cycle(violation, bound), 1e-8))) == reasons
+    assert len(list(certificate._open(WholeCycle(violation, bound), 1e-8))) == reasons
 
 
 # Levels -------------------------------------------------------------------------------------------------------------
@@ -92,12 +99,12 @@ def tried(monkeypatch, of, found):
     def solved(gradients, system):
         row = next(k for k in (0, 1, 2) if k not in system.inequalities)
         left_out.append(row)
-        return Multipliers(np.full(4, float(row)), found[row][0])
+        return LevelMultipliers(np.full(4, float(row)), found[row][0])
 
     def curved(place, level, system, multipliers):
         return worst if multipliers is first else found[int(multipliers.of[0])][1]
 
-    first = Multipliers(np.array(of), 0.0)
+    first = LevelMultipliers(np.array(of), 0.0)
     monkeypatch.setattr(kkt, "solved", solved)
     monkeypatch.setattr(second_order, "judged", curved)
     here = local()
@@ -118,27 +125,27 @@ def test_rows_that_bind_are_left_out_in_turn_until_the_curvature_is_better(monke
 def test_residuals_name_the_dearest_limit():
     here = local(x=-3e-8, y=2e-8)
     system = kkt.system(here.active, 0, [])
-    found = certificate._residuals(here, 0, system, Multipliers(np.array([0.5, -2.0, 0.25, 1.0]), 9.0), 0.125)
+    found = certificate._residuals(here, 0, system, LevelMultipliers(np.array([0.5, -2.0, 0.25, 1.0]), 9.0), 0.125)
     assert (found.objective, found.stationarity, found.price, found.dearest) == ("f", 0.125, 2.0, "y")
     assert found.complementarity == pytest.approx(4e-8)
     assert found.held == 0.0
     bare = kkt.System((3,), (), (), np.zeros((0, 4)))
-    none = certificate._residuals(here, 0, bare, Multipliers(np.zeros(4), 0.0), 0.0)
+    none = certificate._residuals(here, 0, bare, LevelMultipliers(np.zeros(4), 0.0), 0.0)
     assert (none.complementarity, none.price, none.dearest) == (0.0, 0.0, "")
 
 
 def test_a_later_level_tells_what_the_earlier_ones_are_held_by():
     here = local(("f", "g"))
-    system = kkt.system(here.active, 1, [Multipliers(np.zeros(5), 0.0)])
-    found = certificate._residuals(here, 1, system, Multipliers(np.array([0, 0, 0, -3.0, 1.0]), 0.0), 0.0)
+    system = kkt.system(here.active, 1, [LevelMultipliers(np.zeros(5), 0.0)])
+    found = certificate._residuals(here, 1, system, LevelMultipliers(np.array([0, 0, 0, -3.0, 1.0]), 0.0), 0.0)
     assert (found.objective, found.held) == ("g", 3.0)
 
 
 def test_a_limit_is_worth_what_the_first_objective_it_moves_would_fall():
     here = local(("f", "g"))
     levels = [
-        JudgedLevel(judged().level, Multipliers(np.array([0.0, POSITIVE, 0.0, 1.0, 0.0]), 0.0)),
-        JudgedLevel(judged().level, Multipliers(np.array([3.0, 2.0, 0.0, 0.0, 1.0]), 0.0)),
+        JudgedLevel(judged().level, LevelMultipliers(np.array([0.0, POSITIVE, 0.0, 1.0, 0.0]), 0.0)),
+        JudgedLevel(judged().level, LevelMultipliers(np.array([3.0, 2.0, 0.0, 0.0, 1.0]), 0.0)),
     ]
     found = [(each.limit.row, each.objective.figure, each.worth) for each in certificate._binding(here, levels)]
     assert found == [("x", "g", 3.0), ("y", "g", 2.0)]
@@ -195,7 +202,7 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
     def fails(*_):
         raise ZeroDivisionError
 
-    first = Multipliers(np.zeros(4), residual)
+    first = LevelMultipliers(np.zeros(4), residual)
     monkeypatch.setattr(kkt, "solved", lambda *_: first)
     monkeypatch.setattr(certificate, "_best", fails)
     if raises:
@@ -209,7 +216,9 @@ def test_without_second_derivatives_only_a_slope_that_is_left_decides(residual, 
 @pytest.mark.parametrize(("bound", "by"), [("proven", "bounded"), ("undecided", "refined"), ("violated", "refined")])
 def test_by_what_the_whole_cycle_is_covered_is_told(bound, by):
     here = local()
-    assert certificate._certificate(here, Cycle(0.0, bound), certificate.judged_levels(here), 1e-8).whole_cycle == by
+    assert (
+        certificate._certificate(here, WholeCycle(0.0, bound), certificate.judged_levels(here), 1e-8).whole_cycle == by
+    )
 
 
 def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():

@@ -9,7 +9,7 @@ from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import Multipliers, System, replaceable, solved
+from loomopt.solving.certificate.kkt import LevelMultipliers, System, replaceable, solved
 
 
 def at(program, x):
@@ -62,7 +62,7 @@ def test_pieces_of_an_objective_share_a_multiplier_of_one():
 
 
 def multipliers(*of):
-    return Multipliers(np.array(of, dtype=float), 0.0)
+    return LevelMultipliers(np.array(of, dtype=float), 0.0)
 
 
 TWO = {"a": lambda v: 2 * v["x"], "b": lambda v: v["x"] + v["y"] ** 2, "c": lambda v: v["x"] - v["y"]}
@@ -129,5 +129,5 @@ def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
     """Slopes (1, 0), twice that, and (0, 1): the first two can stand for each other, the third for none."""
     gradients = np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [-2.0, -1.0]])
     one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
-    found = Multipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
+    found = LevelMultipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
     assert replaceable(gradients, one, found, STATIONARY) == [0, 1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.moves import AxisMove, ScaleMove, Wish
+from loomopt.model.moves import AxisMove, Preference, ScaleMove
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.active_set import active_set
@@ -124,7 +124,7 @@ def test_a_fall_of_third_order_is_found_by_probing():
 
 def moved(rows, along=("y",), kind=AxisMove, limits=(), objectives=("f", "g"), least=-9.0):
     today, bounds = dict.fromkeys(along, 1.0), dict.fromkeys(along, (least, 9.0))
-    move = kind("slide", along, (Wish("today", "tidier"),), today, bounds)
+    move = kind("slide", along, (Preference("today", "tidier"),), today, bounds)
     return toy.program("xy", rows, limits=limits, objectives=objectives, moves=(move,))
 
 

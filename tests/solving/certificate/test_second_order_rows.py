@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.moves import AxisMove, Wish
+from loomopt.model.moves import AxisMove, Preference
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import Multipliers
+from loomopt.solving.certificate.kkt import LevelMultipliers
 from loomopt.solving.certificate.second_order import Critical, Local
 
 
@@ -158,7 +158,7 @@ def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read
     limits = (("y", 1, 5.0), ("w", 1, 1.0))
     local = local_at(toy.program("xy", rows, waves, limits=limits, sizes={"y": 2.0}), x=1.0, y=0.0)
     assert (local.active.limits, len(local.active.rows)) == (3, 4)
-    found = Multipliers(np.array([0.25, 0.5, 0.0, 1.0]), 0.125)
+    found = LevelMultipliers(np.array([0.25, 0.5, 0.0, 1.0]), 0.125)
     assert higher(local, 0, found, [np.array([0.0, 1.0])]) == "holds"
     assert read == [(0, {1: 0.75}, {}, {"x": 0.0, "y": 2.0}, 0.125)]
 
@@ -166,7 +166,7 @@ def test_rows_of_one_limit_add_up_and_pieces_of_the_objective_have_no_price(read
 def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
     rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "g": lambda v: v["x"] - v["y"]}
     local = local_at(toy.program("xy", rows, objectives=("p, q", "g")), x=1.0, y=1.0)
-    found = Multipliers(np.array([3.0, 5.0, 1.0]), 0.0)
+    found = LevelMultipliers(np.array([3.0, 5.0, 1.0]), 0.0)
     assert second_order.held_multiplier(local.active, 0, found) == 8.0
     higher(local, 1, found, [np.array([1.0, 0.0])])
     higher(local, 0, found, [np.array([1.0, 0.0])])
@@ -179,7 +179,7 @@ def test_earlier_levels_are_held_by_what_their_pieces_carry(read):
 def sliding(bend):
     """Return two levels, of which x² + bend · y² is the first; z changes nothing and is a move."""
     rows = {"f": lambda v: v["x"] ** 2 + bend * v["y"] ** 2, "g": lambda v: v["x"] ** 3}
-    move = AxisMove("slide", ("z",), (Wish("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
+    move = AxisMove("slide", ("z",), (Preference("today", "tidier"),), {"z": 1.0}, {"z": (-9.0, 9.0)})
     return toy.program("xyz", rows, objectives=("f", "g"), moves=(move,), sizes={"z": 3.0})
 
 

@@ -15,7 +15,15 @@ from loomopt.model.model import Integral
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import current
 from loomopt.solving.certificate import taylor_bounds
-from loomopt.solving.certificate.taylor_bounds import Box, Boxes, _keeps, between_points, cycle_rows, judged, judged_box
+from loomopt.solving.certificate.taylor_bounds import (
+    AngleBox,
+    Boxes,
+    _keeps,
+    between_points,
+    cycle_rows,
+    judged,
+    judged_box,
+)
 
 TURN = 2 * math.pi
 flint = importlib.import_module("flint")
@@ -49,7 +57,7 @@ def box_of(name, low, high, at, limit, sign=1.0, bend=None):
     made = boxes()
     if bend is not None:
         bend = made.maths.number(bend)
-    return judged_box(functools.partial(made._signed, name, sign, 0), limit, Box(low, high, bend), at)[0]
+    return judged_box(functools.partial(made._signed, name, sign, 0), limit, AngleBox(low, high, bend), at)[0]
 
 
 @pytest.mark.parametrize(
@@ -111,8 +119,8 @@ def test_a_parabola_is_kept_below_its_highest_value_and_no_lower(slope, bend, pl
     for margin, kept in ((1e-6, True), (-1e-6, False)):
         limit = 0.25 + highest + margin
         if blur == 0.0 or not kept:
-            assert _keeps(here, ball(bend, blur), Box(low, high), at, limit) is kept
-    assert _keeps(here, ball(bend, blur), Box(low, high), at, 0.25 + highest + 3 * blur + 1e-6)
+            assert _keeps(here, ball(bend, blur), AngleBox(low, high), at, limit) is kept
+    assert _keeps(here, ball(bend, blur), AngleBox(low, high), at, 0.25 + highest + 3 * blur + 1e-6)
 
 
 @pytest.mark.parametrize("broken", range(3))
@@ -121,26 +129,26 @@ def test_what_is_no_number_keeps_nothing(broken):
         series = [flint.arb(0.5), flint.arb(0.1), flint.arb(-1.0)]
         series[broken] = nothing
         for at in (0.0, 0.5, 1.0):
-            assert judged_box(lambda centre, half: series, 1e9, Box(0.0, 1.0), at)[0] is (broken > 0 or None)  # noqa: B023
-            assert not _keeps(series[:2], series[2], Box(0.0, 1.0), at, 1e9)
+            assert judged_box(lambda centre, half: series, 1e9, AngleBox(0.0, 1.0), at)[0] is (broken > 0 or None)  # noqa: B023
+            assert not _keeps(series[:2], series[2], AngleBox(0.0, 1.0), at, 1e9)
 
 
 def test_where_no_series_is_the_box_stays_open_with_what_is_known_of_its_bend():
     def nowhere(centre, half):
         raise ValueError("a ball around zero in a denominator")
 
-    assert judged_box(nowhere, 1.0, Box(0.0, 1.0), 0.5) == (None, None)
-    assert judged_box(nowhere, 1.0, Box(0.0, 1.0, 4.0), 0.5) == (None, 4.0)
+    assert judged_box(nowhere, 1.0, AngleBox(0.0, 1.0), 0.5) == (None, None)
+    assert judged_box(nowhere, 1.0, AngleBox(0.0, 1.0, 4.0), 0.5) == (None, 4.0)
 
 
 def test_a_box_is_expanded_at_the_top_in_it_or_toward_the_one_beside_it_and_in_the_middle_far_from_any():
-    box = Box(0.5, 0.75)
+    box = AngleBox(0.5, 0.75)
     assert box.nearest([]) == 0.625
     assert box.nearest([0.7, 0.1, 0.9]) == 0.7
     assert box.nearest([0.3]) == 0.5
     assert box.nearest([0.9]) == 0.75
     assert box.nearest([0.1]) == box.nearest([0.24]) == 0.625
-    assert box.halves(2.0) == [Box(0.625, 0.75, 2.0), Box(0.5, 0.625, 2.0)]
+    assert box.halves(2.0) == [AngleBox(0.625, 0.75, 2.0), AngleBox(0.5, 0.625, 2.0)]
 
 
 @pytest.fixture
@@ -257,7 +265,7 @@ def test_both_signs_count_unless_a_quantity_has_one():
     ],
 )
 def test_the_worst_of_all_rows_is_said(statuses, said):
-    found = [taylor_bounds.Bound(status, 1) for status in statuses]
+    found = [taylor_bounds.CycleBound(status, 1) for status in statuses]
     with mock.patch.object(Boxes, "bound", side_effect=found):
         assert judged(sampler_of(signed=True), [("level", 1.0, None), ("hill", 1.0, None)], 1e-9) == said
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Arcs, Chain, Group
 from loomopt.model.limits import CycleLimit, DesignLimit
-from loomopt.model.model import JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, JobModel
 from loomopt.model.objectives import Value
 from loomopt.model.program import Program, Variable
 from loomopt.physics.balance import Given
@@ -104,9 +104,9 @@ def at_design(name, at):
 
 def model(bend=0.0, lifted=True):
     """Return the model: whole-cycle quantities wave (signed) and swing, rows of every step's height and a bowl."""
-    rows = {name: Row(functools.partial(at_design, name)) for name in HEIGHTS}
-    rows["bowl"] = Row(lambda at: sum((at.values[name] - 2) ** 2 for name in NAMES) + at.values[HEIGHTS[-1]])
-    quantities = {"wave": Quantity(wave, signed=True), "swing": Quantity(swing)}
+    rows = {name: DesignRow(functools.partial(at_design, name)) for name in HEIGHTS}
+    rows["bowl"] = DesignRow(lambda at: sum((at.values[name] - 2) ** 2 for name in NAMES) + at.values[HEIGHTS[-1]])
+    quantities = {"wave": CycleQuantity(wave, signed=True), "swing": CycleQuantity(swing)}
     return JobModel(Steps(bend, lifted, ("steps", bend, lifted)), own_quantities=quantities, own_rows=rows)
 
 

@@ -14,7 +14,7 @@ from loomopt.model.program import Variable
 from loomopt.model.sampling import Extreme
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Known, Settings
-from loomopt.solving.nlp.stations import Family
+from loomopt.solving.nlp.stations import RowFamily
 
 X = {"x": 0.5, "y": -2.0}
 
@@ -176,7 +176,7 @@ def test_an_extreme_exceeds_its_epigraph_or_its_limit_in_natural_size():
     task = program([("wave", 1, 3.0)], levels)
     task = replace(task, limits=(replace(task.limits[0], scale=5.0),))
     calls = calls_of(task)
-    assert calls.families == [Family("circle", epigraph=0), Family("wave", limit=0)]
+    assert calls.families == [RowFamily("circle", epigraph=0), RowFamily("wave", limit=0)]
     assert calls.excess(calls.families[0], Extreme(0, 0.1, -4.0), np.array([1.5])) == pytest.approx(0.5)
     assert calls.excess(calls.families[1], Extreme(0, 0.1, -4.0), np.array([1.5])) == pytest.approx(0.2)
     assert calls.excess(calls.families[1], Extreme(0, 0.1, -4.0, signed=True), np.array([1.5])) == pytest.approx(-1.4)

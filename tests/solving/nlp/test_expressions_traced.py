@@ -7,7 +7,7 @@ from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
-from loomopt.solving.nlp.expressions import Quantities
+from loomopt.solving.nlp.expressions import QuantityFunctions
 from loomopt.solving.nlp.lifted import Lifts
 
 X = {name: 0.1 + 0.05 * k for k, name in enumerate(NAMES)}
@@ -19,7 +19,7 @@ def made(bend=0.05):
     values = {name: ca.SX.sym(name) for name in (*NAMES, "raise")}
     lifts = Lifts(ca.vertcat(*values.values()))
     given = task.model.given(lifts.maths, values)
-    return Quantities(task.model, values, given, task.model.switches, lifts), values, task.model
+    return QuantityFunctions(task.model, values, given, task.model.switches, lifts), values, task.model
 
 
 def value(expression, symbols, lifts, place=None, number=0.0):

@@ -10,7 +10,7 @@ from loomopt.physics.cycle import TURN
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Settings, sampler_at
-from loomopt.solving.nlp.stations import Family, Stood, held, stations
+from loomopt.solving.nlp.stations import HeldStations, RowFamily, held, stations
 from loomopt.solving.nlp.structure import structure
 
 
@@ -19,7 +19,7 @@ def stood():
     """Return where the toy's stations stand, and the design's sampler."""
     task = program()
     sampler = sampler_at(task, task.starts[0])
-    return Stood(stations(task.model, sampler.given, list(task.starts[0])), sampler.cycle), sampler
+    return HeldStations(stations(task.model, sampler.given, list(task.starts[0])), sampler.cycle), sampler
 
 
 def test_each_stands_where_its_step_begins(stood):
@@ -35,7 +35,7 @@ def test_a_law_falls_on_its_return_and_its_pieces_end_there():
     scene = registry.load("shedding").set("targets.law.intervals", 12)
     task = registry.of(scene).program(scene, "law")
     sampler = sampler_at(task, task.starts[0])
-    at = Stood(stations(task.model, sampler.given, [v.name for v in task.variables]), sampler.cycle)
+    at = HeldStations(stations(task.model, sampler.given, [v.name for v in task.variables]), sampler.cycle)
     rise, back, near = (sampler.given.values[name] for name in ("rise", "return", "begin.near"))
     knots = np.arange(1, 12) / 12
     assert sampler.cycle.angles(at.pieces, at.u) == pytest.approx([*(rise * knots), *(near - back * knots)], rel=1e-14)
@@ -64,7 +64,7 @@ def test_where_a_load_jumps_at_a_corner_the_other_side_is_another_row(stood):
     switched = sampler.cycle.switches.copy()
     switched[before, sampler.cycle.names.index("raised")] = 0.0
     other = type(sampler.cycle)(sampler.cycle.starts, sampler.cycle.names, switched, sampler.cycle.order)
-    assert Stood(stations_of(sampler), other).station(Extreme(before, 1.0, 1.0)) is None
+    assert HeldStations(stations_of(sampler), other).station(Extreme(before, 1.0, 1.0)) is None
 
 
 def stations_of(sampler):
@@ -76,17 +76,17 @@ def test_signs_are_those_of_the_values_where_magnitudes_count(stood):
     assert at.signs(sampler, "wave").tolist() == [1.0] * COUNT, "signed"
     task = program()
     low = sampler_at(task, dict.fromkeys(task.starts[0], -0.5))
-    own = Stood(stations_of(low), low.cycle)
+    own = HeldStations(stations_of(low), low.cycle)
     assert own.signs(low, "swing").tolist() == [-1.0] * COUNT
-    assert Stood((), low.cycle).signs(low, "swing").tolist() == []
+    assert HeldStations((), low.cycle).signs(low, "swing").tolist() == []
 
 
 def test_families_of_part_of_the_turn_have_rows_there_only():
     switches = [{"segment": 0.0, "law": 1.0}, {"segment": 2.0, "law": 1.0}]
-    assert held(switches, Family("lift")) == [0, 1]
-    assert held(switches, Family("lift", where=("segment", 2.0))) == [1]
-    assert held(switches, Family("lift", where=("segment", 1.0))) == []
-    assert held(switches, Family("lift", where=("raised", 1.0))) == [], "whether it holds there is not known"
+    assert held(switches, RowFamily("lift")) == [0, 1]
+    assert held(switches, RowFamily("lift", where=("segment", 2.0))) == [1]
+    assert held(switches, RowFamily("lift", where=("segment", 1.0))) == []
+    assert held(switches, RowFamily("lift", where=("raised", 1.0))) == [], "whether it holds there is not known"
 
 
 @pytest.mark.parametrize("where", [None, ("step", 2.0)])

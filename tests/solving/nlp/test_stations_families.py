@@ -2,7 +2,7 @@
 
 from waves import objective, program
 
-from loomopt.solving.nlp.stations import Epigraph, Family, epigraphs, families
+from loomopt.solving.nlp.stations import Epigraph, RowFamily, epigraphs, families
 
 
 def test_one_variable_stands_above_each_objective_and_one_family_for_each_quantity():
@@ -10,16 +10,16 @@ def test_one_variable_stands_above_each_objective_and_one_family_for_each_quanti
     limit = [("wave", 1, 9.0)]
     worst = program(limit, (objective(**peaks), objective("bowl")))
     assert epigraphs(worst) == (Epigraph(0, ("circle", "shifted")),)
-    assert families(worst) == [Family("circle", 0), Family("shifted", 0), Family("wave", limit=0)]
+    assert families(worst) == [RowFamily("circle", 0), RowFamily("shifted", 0), RowFamily("wave", limit=0)]
     both = program(limit, (objective("bowl"), objective("circle", "peak"), objective("shifted", "peak")))
     assert epigraphs(both) == (Epigraph(1, ("circle",)), Epigraph(2, ("shifted",)))
-    assert families(both) == [Family("circle", 0), Family("shifted", 1), Family("wave", limit=0)]
+    assert families(both) == [RowFamily("circle", 0), RowFamily("shifted", 1), RowFamily("wave", limit=0)]
     magnitudes = program(limit, (objective("x", "magnitude", ("y",)), objective("x", "value", ("y",))))
     assert epigraphs(magnitudes) == (Epigraph(0, ("x", "y")), Epigraph(1, ("x", "y")))
-    assert families(magnitudes) == [Family("wave", limit=0)]
+    assert families(magnitudes) == [RowFamily("wave", limit=0)]
     assert epigraphs(program(limit, (objective("x"), objective("y")))) == ()
     assert epigraphs(worst, elastic=True) == ()
-    assert families(worst, elastic=True) == [Family("wave", limit=0)]
+    assert families(worst, elastic=True) == [RowFamily("wave", limit=0)]
 
 
 def test_a_family_stands_below_one_thing_only():

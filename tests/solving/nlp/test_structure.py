@@ -8,7 +8,7 @@ from beatup_nlps import program_of, put
 from waves import Still, objective, program
 
 from loomopt.maths import systems
-from loomopt.model.model import Integral, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Integral, JobModel
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN, split
 from loomopt.solving.nlp.calls import Calls
@@ -78,10 +78,10 @@ WHOLE = Integral("mean", "root", "square of wave")
 def averaged():
     """Return a model with two means: at three angles with data, and over the whole cycle."""
     quantities = {
-        "square": Quantity(of_datum, figure=False),
-        "square of wave": Quantity(lambda at: (at.values["x"] + at.maths.cos(at.node.phi)) ** 2, figure=False),
+        "square": CycleQuantity(of_datum, figure=False),
+        "square of wave": CycleQuantity(lambda at: (at.values["x"] + at.maths.cos(at.node.phi)) ** 2, figure=False),
     }
-    rows = {"x": Row(lambda at: at.values["x"])}
+    rows = {"x": DesignRow(lambda at: at.values["x"])}
     return JobModel(Still("averaged"), own_quantities=quantities, own_rows=rows, integrals=(TABLE, WHOLE))
 
 

@@ -9,7 +9,7 @@ from support.worst import objective_of
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Arcs, Group
 from loomopt.model.limits import CycleLimit, DesignLimit
-from loomopt.model.model import Instant, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program, Variable
 from loomopt.physics.balance import Given
@@ -75,9 +75,9 @@ WAVES: dict[str, Wave] = {
 
 def model(arcs: tuple[Arcs, ...] = (), signed: Collection[str] = ()) -> JobModel:
     quantities = {
-        name: Quantity(functools.partial(at_node, wave), signed=name in signed) for name, wave in WAVES.items()
+        name: CycleQuantity(functools.partial(at_node, wave), signed=name in signed) for name, wave in WAVES.items()
     }
-    rows = {name: Row(functools.partial(at_design, row)) for name, row in ROWS.items()}
+    rows = {name: DesignRow(functools.partial(at_design, row)) for name, row in ROWS.items()}
     return JobModel(Still(("still", tuple(signed))), own_quantities=quantities, own_rows=rows, arcs=arcs)
 
 

@@ -13,7 +13,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.proof import task
 from loomopt.solving.proof.levels import loosening
-from loomopt.solving.proof.task import Task, reduced
+from loomopt.solving.proof.task import BoxTask, reduced
 from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search
 
@@ -29,7 +29,7 @@ class Solved(NamedTuple):
         return self.search.best.x
 
     @property
-    def task(self) -> Task:
+    def task(self) -> BoxTask:
         return reduced(self.program, loosening(self.job, self.program), task.silent(self.program), {})
 
 

@@ -9,7 +9,7 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.options import GlobalProof
-from loomopt.solving.proof.levels import Levels, Outcome, claimed
+from loomopt.solving.proof.levels import LevelOutcome, Levels, claimed
 from loomopt.solving.search.multistart import resolved
 from loomopt.solving.search.search import Search, objectives
 
@@ -36,7 +36,7 @@ def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypa
     worse = solved("beatup", "balance", "bounds.l3.min=152 mm")
     assert worse.search.best is not None
     here = replace(worse.search, program=wide.program, candidates=(worse.search.best,))
-    monkeypatch.setattr(Levels, "run", lambda self, until, say: Outcome(why="open", lowest=wide.x))
+    monkeypatch.setattr(Levels, "run", lambda self, until, say: LevelOutcome(why="open", lowest=wide.x))
     found, _ = claimed(here, GlobalProof(1e-3, 0.2))
     assert found.best is not None
     assert found.best.objectives[1] < here.best.objectives[1] - 1e-3
@@ -44,7 +44,7 @@ def test_a_promising_box_is_tried_though_no_middle_of_one_is_admissible(monkeypa
 
 def test_a_better_design_that_leads_to_no_certified_optimum_is_told():
     found = solved("beatup", "balance")
-    better = Outcome(better=found.x, why="a better design was found")
+    better = LevelOutcome(better=found.x, why="a better design was found")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Levels, "run", lambda self, until, say: better)
         search, bound = claimed(found.search, GlobalProof())

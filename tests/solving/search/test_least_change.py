@@ -9,7 +9,7 @@ from support.rapiers import ROOM
 
 import loomopt as lo
 from loomopt.maths.systems import FLOAT
-from loomopt.model.moves import AxisMove, Wish
+from loomopt.model.moves import AxisMove, Preference
 from loomopt.physics.mechanisms.cam_spline import spline
 from loomopt.solving.certificate import second_order
 from loomopt.solving.certificate.certificate import certify
@@ -106,7 +106,9 @@ def test_a_design_that_gets_no_certificate_stays_and_says_what_is_open(monkeypat
     assert (best.certificate.settled, best.certificate.open) == ((), ("y",))
 
 
-@pytest.mark.parametrize("moves", [(), (AxisMove("y", ("y",), (Wish("least", "tidy"),), {"y": 0.0}, {"y": (-9, 9)}),)])
+@pytest.mark.parametrize(
+    "moves", [(), (AxisMove("y", ("y",), (Preference("least", "tidy"),), {"y": 0.0}, {"y": (-9, 9)}),)]
+)
 def test_nothing_is_solved_where_nothing_is_left(moves, monkeypatch):
     monkeypatch.setattr(least_change, "tried", lambda *_: pytest.fail("solved again"))
     rows = {"f": lambda v: v["x"] ** 2 + (0 if moves else v["y"] ** 2)}
@@ -179,7 +181,7 @@ def test_only_moves_along_the_level_are_looked_at(monkeypatch):
         return True
 
     monkeypatch.setattr(tie_break, "_is_same", counted)
-    axes = [AxisMove(n, (n,), (Wish("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
+    axes = [AxisMove(n, (n,), (Preference("today", "tidy"),), {n: 0.0}, {n: (-9.0, 9.0)}) for n in "xyz"]
     program = toy.program("xyz", {"f": lambda v: v["x"] ** 2 + (v["y"] - v["z"]) ** 2}, moves=tuple(axes))
     certificate = certify(program, {"x": 0.0, "y": 1.0, "z": 1.0}, 1e-8)
     ways = least_change.left(program, {"x": 0.0, "y": 1.0, "z": 1.0}, certificate, ())

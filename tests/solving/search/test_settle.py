@@ -5,14 +5,14 @@ import pytest
 from support import toy
 
 import loomopt as lo
-from loomopt.model.moves import AxisMove, ScaleMove, Wish
+from loomopt.model.moves import AxisMove, Preference, ScaleMove
 from loomopt.solving.search.tie_break import moved, unchanging
 from reference.beatup import DESIGN, LENGTHS, Machine
 
 
 def slide(goal, low=-100.0, high=100.0):
     """Return the move of y alone that wants it at goal."""
-    return AxisMove("slide", ("y",), (Wish("today", "tidier"),), {"y": goal}, {"y": (low, high)})
+    return AxisMove("slide", ("y",), (Preference("today", "tidier"),), {"y": goal}, {"y": (low, high)})
 
 
 def scene_of(M0):
@@ -139,7 +139,7 @@ def test_nothing_is_said_to_be_settled_where_nothing_moved():
 
 def a_move(kind=AxisMove, toward="today", along=("y",), today=None, bounds=None, **wish):
     today, bounds = today or dict.fromkeys(along, 1.0), bounds or dict.fromkeys(along, (0.5, 4.0))
-    return kind("slide", along, (Wish(toward, "tidier", **wish),), today, bounds)
+    return kind("slide", along, (Preference(toward, "tidier", **wish),), today, bounds)
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,11 @@ def test_a_negative_coordinate_scales_with_the_lengths():
 
 
 def test_the_first_wish_that_holds_is_followed():
-    wishes = Wish("most", "heavy", when="x", above=1.0), Wish("least", "light", when="x", above=0.5), Wish("today", "")
+    wishes = (
+        Preference("most", "heavy", when="x", above=1.0),
+        Preference("least", "light", when="x", above=0.5),
+        Preference("today", ""),
+    )
     move = AxisMove("slide", ("y",), wishes, {"y": 1.0}, {"y": (0.0, 2.0)})
     found = [move.wished({"x": x, "y": 1.0}).toward for x in (1.5, 1.0, 0.5)]
     assert found == ["most", "least", "today"]

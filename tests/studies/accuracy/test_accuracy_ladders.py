@@ -6,13 +6,13 @@ import pytest
 
 import loomopt as lo
 from loomopt.studies.accuracy import accuracy, optima
-from loomopt.studies.accuracy.ladders import Ladder, Outcome, Reference, Row, climbed, knee, order
+from loomopt.studies.accuracy.ladders import Ladder, LadderReference, LadderRow, Rung, climbed, knee, order
 
 pytestmark = pytest.mark.slow
 
 
-def _ladder(run, reference=lambda _: Reference(1.0), settings=(1.0, 0.1)):
-    return Ladder("toy", ("q",), settings, run, lambda _, value: Outcome({"q": value}), reference, float)
+def _ladder(run, reference=lambda _: LadderReference(1.0), settings=(1.0, 0.1)):
+    return Ladder("toy", ("q",), settings, run, lambda _, value: Rung({"q": value}), reference, float)
 
 
 def test_a_run_that_fails_is_a_row_with_the_reason():
@@ -23,12 +23,12 @@ def test_a_run_that_fails_is_a_row_with_the_reason():
 
     kept, failed = climbed(_ladder(run), 2)
     assert (kept.error, kept.status) == (0.25, "done")
-    assert failed == Row("q", "toy", 0.1, None, None, 0, "failed: the linkage parts")
+    assert failed == LadderRow("q", "toy", 0.1, None, None, 0, "failed: the linkage parts")
 
 
 def test_an_error_is_told_only_against_a_reference_a_hundred_times_tighter():
     def told(error, uncertainty):
-        return next(climbed(_ladder(lambda _: 1.0 + error, lambda _: Reference(1.0, uncertainty), (1.0,)), 1))
+        return next(climbed(_ladder(lambda _: 1.0 + error, lambda _: LadderReference(1.0, uncertainty), (1.0,)), 1))
 
     assert told(1e-3, 0.9e-5).error == pytest.approx(1e-3)
     assert told(1e-3, 1.1e-5).error is None
@@ -66,7 +66,7 @@ def test_without_a_limit_law_the_rows_of_intervals_say_so():
 
 
 def rows_of(steps, found):
-    return [Row("q", "toy", step, error, 1.0, 1, "done") for step, error in zip(steps, found, strict=True)]
+    return [LadderRow("q", "toy", step, error, 1.0, 1, "done") for step, error in zip(steps, found, strict=True)]
 
 
 @pytest.mark.parametrize("power", [1, 2, 4])

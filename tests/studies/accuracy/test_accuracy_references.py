@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.subject import Target
+from loomopt.studies.accuracy.subject import StudiedTarget
 
 pytestmark = pytest.mark.slow
 
@@ -24,13 +24,13 @@ pytestmark = pytest.mark.slow
     ],
 )
 def test_reference_optima_are_the_known_ones(name, target, known):
-    reference = Target(lo.load(name), target)
+    reference = StudiedTarget(lo.load(name), target)
     assert float(reference.optimum.objectives[-1]) == pytest.approx(known, rel=2e-12)
     assert reference.optimum.uncertainty < 1e-20
 
 
 def test_a_reference_optimum_is_the_same_in_60_digits_and_from_a_rough_start():
-    target = Target(lo.load("beatup-light"), "balance")
+    target = StudiedTarget(lo.load("beatup-light"), "balance")
     x, point = target.variables(target.answer), target.answer.point
     rough = {name: value * (1 + 1e-7 * (-1) ** k) for k, (name, value) in enumerate(x.items())}
     found = [reference_digits.optimum(target.program, point, start, count) for start, count in ((x, 60), (rough, 40))]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from loomopt.base.quantities import Torque
 from loomopt.jobs.beatup.scene import SCHEMA
 from loomopt.jobs.registry import load
-from loomopt.physics.effects.kinds import Clash, Load, ranked
+from loomopt.physics.effects.kinds import EffectClash, Load, ranked
 from loomopt.physics.schema import Table
 from loomopt.scenes.scene import build
 
@@ -38,8 +38,8 @@ EFFECTS = (
     push("push", 201),
     push("pull", 202),
     push("leaning", 203, sign=-1, beside=("push",)),
-    push("lone", 204, clashes=(Clash("push", "both push"),)),
-    push("shaft", 10, Moving, clashes=(Clash("push", "it bends"), Clash("motor", "it turns"))),
+    push("lone", 204, clashes=(EffectClash("push", "both push"),)),
+    push("shaft", 10, Moving, clashes=(EffectClash("push", "it bends"), EffectClash("motor", "it turns"))),
     push("motor", 11, Moving),
     push("lost", 205, beside=("nowhere",)),
     push("blind", 206, needs=("mechanism.m4",)),

@@ -14,7 +14,7 @@ from loomopt.interface import finished
 from loomopt.solving import engine
 from loomopt.studies.effects import study
 from loomopt.studies.run import run
-from loomopt.studies.run.rows import Task
+from loomopt.studies.run.rows import StudyTask
 
 TABLE = {  # shift of M3 and of the peak, N·m; regret of M3, % of its natural size
     "inertia": (677.009, -77.527, 13.804),
@@ -105,9 +105,9 @@ def test_regret_alone_is_a_trap(beatup):
     ],
 )
 def test_omissions_do_not_add_up(plan, rows, off, regret):
-    course = study.Course(plan, rows)
+    course = study.EffectsCourse(plan, rows)
     gone = frozenset({"gravity", *off}) | course.base
-    row = plan.solved(Task(0, None, dict.fromkeys(gone, 0.0)), None)
+    row = plan.solved(StudyTask(0, None, dict.fromkeys(gone, 0.0)), None)
     worth = course.judge.without("", plan.without(gone), row, 0.01)
     assert 100 * worth.regret["M3_fdc"] == pytest.approx(regret, abs=6e-3 if regret > 1 else 6e-4)
 
@@ -128,7 +128,7 @@ def test_the_same_study_whoever_computes_it(shedding):
 def test_a_plan_in_another_process_is_the_same(plan, rows):
     again = pickle.loads(pickle.dumps(plan))
     assert again.key == plan.key
-    assert again.solved(Task(0, None, rows[3].place), None).design == rows[3].design
+    assert again.solved(StudyTask(0, None, rows[3].place), None).design == rows[3].design
     assert again.batch(rows[:1]) == plan.batch(rows[:1])
     assert plan.batch(rows) == []
 

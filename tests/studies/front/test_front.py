@@ -14,7 +14,7 @@ from loomopt.jobs import registry
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import run
-from loomopt.studies.run.rows import Row, Side, Task
+from loomopt.studies.run.rows import Row, Side, StudyTask
 
 RPM = math.pi / 30
 CLOSE = 1e-9
@@ -28,7 +28,7 @@ def ends(trade):
 def at(trade, value, parent, **more):
     """Return the row with the second axis held at a value, from a parent; cold without one."""
     ask = {"also": [], "held": (parent.warm["held"] if parent else []), "wide": False} | more
-    task = Task(99, parent.point if parent else None, {trade.axes[1]: value}, ask)
+    task = StudyTask(99, parent.point if parent else None, {trade.axes[1]: value}, ask)
     return trade.solved(task, parent)
 
 

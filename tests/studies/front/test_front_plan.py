@@ -6,10 +6,10 @@ import math
 import pytest
 
 from loomopt.studies.front import plan
-from loomopt.studies.front.plan import NARROW, Scale
+from loomopt.studies.front.plan import NARROW, FrontScale
 from loomopt.studies.run.rows import Row, Side
 
-SCALE = Scale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
+SCALE = FrontScale(("a", "b"), (1, 1), (0.0, 0.0), (1.0, 1.0))
 
 
 def row(point, b, a, slope=-1.0, active=("l1 min",), asked=None, certified=True, again=None, fine=False, parent=None):

@@ -14,7 +14,7 @@ from loomopt.studies.front import solver as solving
 from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import read_front
 from loomopt.studies.run import run
-from loomopt.studies.run.rows import Task
+from loomopt.studies.run.rows import StudyTask
 
 RPM = math.pi / 30
 
@@ -28,7 +28,7 @@ def ends(problem, axes, target=None, **more):
 def at(trade, value, parent):
     """Return the row with the second axis held at a value, from a parent."""
     ask = {"also": [], "held": parent.warm["held"], "wide": False}
-    return trade.solved(Task(99, parent.point, {trade.axes[1]: value}, ask), parent)
+    return trade.solved(StudyTask(99, parent.point, {trade.axes[1]: value}, ask), parent)
 
 
 def test_a_design_above_its_limit_is_uncertified_and_does_not_say_that_there_is_none(monkeypatch):
@@ -105,7 +105,7 @@ def test_an_answer_that_keeps_contact_up_to_a_speed_is_judged_and_proven_by_it()
     trade = front.trade(lo.load("shedding"), ("K1", "contact_speed"), points=3)
     parent = trade.solved(trade.batch(())[0], None)
     ask = {"also": [], "held": parent.warm["held"], "wide": False}
-    task = Task(99, parent.point, {"contact_speed": 200 * RPM}, ask)
+    task = StudyTask(99, parent.point, {"contact_speed": 200 * RPM}, ask)
     answer = results.solved(trade.solve(task, parent), trade.scene)
     limit = next(each for each in answer.limits if each.name == "contact_speed")
     assert limit.min == pytest.approx(200 * RPM)

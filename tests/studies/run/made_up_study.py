@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from loomopt.studies.run.rows import Row, Task
+from loomopt.studies.run.rows import Row, StudyTask
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,9 @@ class Chain:
     def batch(self, rows):
         first = len(rows)
         points = range(first, min(first + 8, self.count))
-        return [Task(k, k - 8 if k >= 8 else None, {"k": float(k)}, {"add": k}, 1 + (k in self.long)) for k in points]
+        return [
+            StudyTask(k, k - 8 if k >= 8 else None, {"k": float(k)}, {"add": k}, 1 + (k in self.long)) for k in points
+        ]
 
     def solved(self, task, parent):
         with self.log.open("a") as file:

@@ -14,7 +14,7 @@ from loomopt.physics.effects.kinds import Load
 from loomopt.physics.schema import Table, Values
 
 if TYPE_CHECKING:
-    from loomopt.physics.effects.kinds import Oscillator
+    from loomopt.physics.effects.kinds import SteadyOscillator
 
 
 class Own(Table):
@@ -41,7 +41,7 @@ def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Numb
 
 
 def response(
-    maths: Maths, oscillator: "Oscillator", pose: ReedPose, given: Values, own: Values, switch: Number
+    maths: Maths, oscillator: "SteadyOscillator", pose: ReedPose, given: Values, own: Values, switch: Number
 ) -> tuple[Number, Number]:
     """Return z, rad, and z˙ in answer to the pulse M0 cos Ωt, |t| ≤ τ, once a turn.
 

@@ -14,11 +14,11 @@ from pydantic import Field
 
 from loomopt.base.quantities import PositiveRotaryDamping, PositiveRotaryStiffness
 from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.effects.kinds import Clash, Peak, State
+from loomopt.physics.effects.kinds import EffectClash, State, StatePeak
 from loomopt.physics.schema import Figure, Table, Values
 
 if TYPE_CHECKING:
-    from loomopt.physics.effects.kinds import Carried, Motion, Oscillator, Written
+    from loomopt.physics.effects.kinds import Carried, Motion, SteadyOscillator, Written
     from loomopt.physics.motion import harmonic
 
 NAME = "shaft_torsion"
@@ -77,14 +77,14 @@ def derived(maths: Maths, given: Values, own: Values, carried: "Carried") -> dic
     return harmonic.named(NAME, constants) | harmonic.named(TWIST, twist) | harmonic.named(TORQUE, torque)
 
 
-def oscillator(maths: Maths, given: Values, own: Values) -> "Oscillator":
+def oscillator(maths: Maths, given: Values, own: Values) -> "SteadyOscillator":
     """Return the shaft with what moves on it."""
     from loomopt.physics.motion import harmonic
 
     return harmonic.Oscillator(maths, own["regime"], harmonic.read_constants(NAME, given))
 
 
-def _series(name: str, given: Values, own: Values) -> "harmonic.Series":
+def _series(name: str, given: Values, own: Values) -> "harmonic.FourierSeries":
     from loomopt.physics.motion import harmonic
 
     return harmonic.read_series(name, given, int(own["harmonics"]))
@@ -139,9 +139,9 @@ EFFECT = State(
     needs=("operation.speed",),
     beside=("inertia",),
     clashes=(
-        Clash("gravity", "the weight would act on the reed, which the shaft's steady state does not carry yet"),
-        Clash("bearing_friction", "it would act on the rocker or the reed, which no source tells"),
-        Clash("speed_fluctuation", "the steady state of the shaft is that of a constant speed"),
+        EffectClash("gravity", "the weight would act on the reed, which the shaft's steady state does not carry yet"),
+        EffectClash("bearing_friction", "it would act on the rocker or the reed, which no source tells"),
+        EffectClash("speed_fluctuation", "the steady state of the shaft is that of a constant speed"),
     ),
     carries=("inertia", "counterweight_inertia", "resistance"),
     derived=derived,
@@ -160,9 +160,9 @@ EFFECT = State(
         Figure("reed_front", "angle", "least angle of the reed itself, nearest to the fell", sides=("min",)),
     ),
     peaks={
-        "shaft_peak": Peak(lambda at: at.force()),
-        "twist_peak": Peak(lambda at: at.coordinate()),
-        "reed_front": Peak(lambda at: at.coordinate() - at.pose.q, least=True),
+        "shaft_peak": StatePeak(lambda at: at.force()),
+        "twist_peak": StatePeak(lambda at: at.coordinate()),
+        "reed_front": StatePeak(lambda at: at.coordinate() - at.pose.q, least=True),
     },
     columns={
         "psi_r [rad]": lambda at: at.coordinate() - at.pose.q,

@@ -9,7 +9,7 @@ import math
 from pydantic import Field
 
 from loomopt.base.quantities import PositiveStiffness
-from loomopt.base.units import Shown
+from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.kinds import Check, Motion
 from loomopt.physics.schema import Figure, Table, Values
@@ -31,7 +31,7 @@ def head_overrun(maths: Maths, given: Values, own: Values) -> Number:
     return -given[MASS] * given[ACCELERATION] * given["speed"] ** 2 / own["stiffness"]
 
 
-def remark(given: Values, own: Values, shown: Shown) -> str:
+def remark(given: Values, own: Values, shown: ShowValue) -> str:
     """Say where the stretch is no longer quasi-static."""
     natural = math.sqrt(own["stiffness"] / given[MASS])
     if natural >= SLOW * given["speed"]:

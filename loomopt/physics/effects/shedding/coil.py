@@ -11,9 +11,9 @@ from typing import Literal
 from pydantic import Field
 
 from loomopt.base.quantities import Force, PositiveDensity, PositiveLength, PositiveNumber, PositivePressure, PureNumber
-from loomopt.base.units import Shown, usual
+from loomopt.base.units import ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number
-from loomopt.physics.effects.kinds import Axis, Check, Demand
+from loomopt.physics.effects.kinds import Check, Demand, FlatNumber
 from loomopt.physics.mechanisms.tension_spring import WIRES, Coil, strength
 from loomopt.physics.schema import Figure, Table, Values
 
@@ -116,7 +116,7 @@ def explain(
     bounds: Mapping[str, tuple[float, float]],
     own: Own,
     clash: Collection[str],
-    shown: Shown = usual,
+    shown: ShowValue = usual,
 ) -> str:
     """Say why coils that surge late enough are stressed too much, and what helps; "" where that is not what clashes.
 
@@ -152,7 +152,7 @@ EFFECT: Check[object] = Check(
     figures=FIGURES,
     margins=MARGINS,
     least="spring_mass",
-    axes=(Axis(name="initial tension", key="initial_tension"),),
+    axes=(FlatNumber(name="initial tension", key="initial_tension"),),
     sold=sold,
     explain=explain,
     demands=(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from loomopt.base.quantities import Quantity
-from loomopt.physics.effects.kinds import Clash, Event, Motion, Rule, Terms
+from loomopt.physics.effects.kinds import EffectClash, Event, EventTerms, Motion, Rule
 from loomopt.physics.schema import Figure, Table, Values
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def read(course: "Course") -> dict[str, float | None]:
     }
 
 
-def rules(terms: Terms) -> Sequence[Rule]:
+def rules(terms: EventTerms) -> Sequence[Rule]:
     """Return where the frame leaves the cam, its motion in flight, and what a landing makes of it."""
     symbol, total = terms.symbol, terms.total
     X, omega = symbol("X"), symbol("omega")
@@ -125,7 +125,7 @@ EFFECT = Event(
     rank=70,
     needs=("operation.speed",),
     beside=("inertia",),
-    clashes=(Clash("warp_tension", UNKNOWN, "shape", ("step", "levels")),),
+    clashes=(EffectClash("warp_tension", UNKNOWN, "shape", ("step", "levels")),),
     force="cam_force",
     least="lift",
     free=free,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Group, Kinematics
-from loomopt.model.model import Instant, JobModel, Quantity, Row
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, JobModel
 from loomopt.model.numbers import numbers, words
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node
@@ -93,13 +93,13 @@ def obliquity(at: Instant) -> Number:
 
 
 QUANTITIES = {
-    "peak_torque": Quantity(lambda at: at.crank_torque),
-    "peak_acceleration": Quantity(lambda at: at.pose.q2),
+    "peak_torque": CycleQuantity(lambda at: at.crank_torque),
+    "peak_acceleration": CycleQuantity(lambda at: at.pose.q2),
 }
 ROWS = {
-    "stroke": Row(lambda at: 2 * at.values["crank"]),
-    "reach": Row(lambda at: at.values["crank"] + at.values["rod"]),
-    "obliquity": Row(obliquity),
+    "stroke": DesignRow(lambda at: 2 * at.values["crank"]),
+    "reach": DesignRow(lambda at: at.values["crank"] + at.values["rod"]),
+    "obliquity": DesignRow(obliquity),
 }
 """Figures over the cycle and of the design alone, SI."""
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from loomopt.base.quantities import PositiveLength, Speed
-from loomopt.base.units import Shown
+from loomopt.base.units import ShowValue
 from loomopt.physics.effects import declared
 from loomopt.physics.schema import Figure, Table, Target
 from loomopt.scenes.schema import SceneSchema
@@ -32,7 +32,7 @@ FIGURES = (
 )
 
 
-def fault(design: Mapping[str, float], shown: Shown) -> str:
+def fault(design: Mapping[str, float], shown: ShowValue) -> str:
     """Say why a design cannot work; "" when it can."""
     longest = shown(design["rod"], "length")
     return "" if design["crank"] < design["rod"] else f"the crank must be shorter than the rod, {longest}"
