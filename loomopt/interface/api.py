@@ -9,7 +9,6 @@ from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs.registry import load, scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
-from loomopt.scenes import designs
 from loomopt.scenes.designs import Given as Design
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import solution
@@ -232,8 +231,8 @@ def _design(given: Design | solution.Evaluation | None, scene: Scene) -> dict[st
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
     if isinstance(given, solution.Evaluation):
         if given.scene:
-            from loomopt.scenes import answers
+            from loomopt.scenes import designs
 
-            answers.check_job(given.scene.job, scene, "<answer>")
+            designs.check_job(given.scene.job, scene, "<answer>")
         given = given.design
     return designs.checked(given, scene) if given else {}

@@ -22,7 +22,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import Check, Event, label
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

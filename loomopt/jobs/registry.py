@@ -21,7 +21,7 @@ from loomopt.scenes import packaged
 from loomopt.scenes.document import Paths, read_document
 from loomopt.scenes.packaged import entry_points
 from loomopt.scenes.scene import Scene, build
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

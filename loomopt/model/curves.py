@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from loomopt.base.records import Frozen
 from loomopt.base.units import SI_UNIT
-from loomopt.maths import peaks, systems
+from loomopt.maths import systems, turning_points
 from loomopt.model.drive import motor_power
 from loomopt.model.model import Formula, Instant
 from loomopt.model.sampling import Sampler
@@ -186,7 +186,7 @@ def sparse_curves(sampler: Sampler, rows: CurveRows, accuracy: float) -> tuple[d
     """
     steps = next(count for least, count in SPARSE_STEPS if accuracy >= least)
     also = [sampler.cycle.angles(*sampler.grid(steps)) % TURN]
-    also += [peaks.graded_nodes(centre) for centre in sampler.singular]
+    also += [turning_points.graded_nodes(centre) for centre in sampler.singular]
     for _ in range(SPARSE_ROUNDS):
         found = rows(steps, np.concatenate(also).tolist())
         added, left = _around_tops(found, accuracy / 10)

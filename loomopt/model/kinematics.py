@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from loomopt.base.records import Frozen
-from loomopt.maths import peaks
+from loomopt.maths import turning_points
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Floats, Node
@@ -68,7 +68,7 @@ def _tops(squares: Callable[[Floats], Sequence[Floats]]) -> Iterator[tuple[float
 
         top = int(np.argmax(sampled))
         if sampled[top] > 1 - WORTH_A_LOOK * NEARLY_SINGULAR:
-            found = peaks.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
+            found = turning_points.sectioned(height, float(angles[top]) - step, float(angles[top]) + step)
             yield found, float(height(np.array([found]))[0])
 
 

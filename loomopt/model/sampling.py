@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from loomopt.base.records import lazy
-from loomopt.maths import peaks, systems
-from loomopt.maths.peaks import inside_samples, vertex
+from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import Number
+from loomopt.maths.turning_points import inside_samples, vertex
 from loomopt.model.model import Integral, JobModel, Stills
 from loomopt.model.reading import DATUM, Quantities, Reading, Rows, quadrature
 from loomopt.model.session import current
@@ -222,7 +222,7 @@ class Sampler:
             return self.heights(name, self._at_angles(name, angles))
 
         found = []
-        for angle in (peak for centre in self.singular for peak in peaks.spike_peaks(heights, centre)):
+        for angle in (peak for centre in self.singular for peak in turning_points.spike_peaks(heights, centre)):
             value = float(self._at_angles(name, np.array([angle]))[0])
             found.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
         return found

@@ -10,8 +10,7 @@ from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit,
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table
 from loomopt.scenes.document import looked_up
-from loomopt.scenes.schema import SceneSchema
-from loomopt.scenes.tables import Bound, LimitRange, table
+from loomopt.scenes.tables import Bound, LimitRange, SceneSchema, table
 
 KINDS = {"speed" if kind == "angular speed" else kind.replace(" ", "_"): kind for kind in SI_UNIT if kind != "number"}
 """Key of [display] → kind of quantity."""

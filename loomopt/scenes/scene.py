@@ -13,8 +13,7 @@ from loomopt.physics.schema import Table
 from loomopt.scenes import display
 from loomopt.scenes import tables as read
 from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
-from loomopt.scenes.schema import SceneSchema
-from loomopt.scenes.tables import Bound, JobNames, LimitRange
+from loomopt.scenes.tables import Bound, JobNames, LimitRange, SceneSchema
 
 _Own = TypeVar("_Own", bound=Table)
 

@@ -10,9 +10,9 @@ from test_benchmarks_small import ATTEMPTS
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import active_set
 
 
 @pytest.fixture(scope="module")

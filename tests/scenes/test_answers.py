@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.interface.files import outputs
-from loomopt.scenes import answers
+from loomopt.scenes import designs
 
 SCENE = lo.load("beatup")
 CHANGED = SCENE.set("operation.M0", "700 N*m").with_effect("gravity").without_effect("resistance")
@@ -51,7 +51,7 @@ def test_the_document_told_is_a_copy(answer):
 
 
 def test_a_whole_answer_brings_its_scene_and_its_target(answer, file):
-    handed = answers.read(file(), SCENE)
+    handed = designs.read_given(file(), SCENE)
     assert handed.scene.hash == CHANGED.hash
     assert handed.scene.origin == SCENE.origin, "tables beside the scene's file are found there"
     assert (handed.target, handed.design) == ("balance", dict(answer.design))
@@ -61,50 +61,50 @@ def test_a_whole_answer_brings_its_scene_and_its_target(answer, file):
 def test_a_design_alone_holds_in_the_scene_at_hand(tmp_path, content):
     place = tmp_path / "design.json"
     place.write_text(json.dumps(content))
-    assert tuple(answers.read(place, SCENE)) == ({"l1": 0.03}, SCENE, None, None)
+    assert tuple(designs.read_given(place, SCENE)) == ({"l1": 0.03}, SCENE, None, None)
 
 
 def test_what_an_answers_scene_has_otherwise_is_told_with_what_the_file_says():
-    assert answers.changes(SCENE, SCENE) == []
-    assert answers.changes(SCENE, lo.scene(json.loads(json.dumps(SCENE.document)))) == []
-    assert answers.changes(SCENE, CHANGED) == [
+    assert designs.scene_changes(SCENE, SCENE) == []
+    assert designs.scene_changes(SCENE, lo.scene(json.loads(json.dumps(SCENE.document)))) == []
+    assert designs.scene_changes(SCENE, CHANGED) == [
         "gravity on",
         "resistance off",
         "operation.M0 = 700 N*m (beatup.toml: 745 N*m)",
     ]
     tilted = CHANGED.set("effects.gravity.tilt", "10 deg")
     was = SCENE.given("available.gravity.tilt")
-    assert f"effects.gravity.tilt = 10 deg (beatup.toml: {was})" in answers.changes(SCENE, tilted)
+    assert f"effects.gravity.tilt = 10 deg (beatup.toml: {was})" in designs.scene_changes(SCENE, tilted)
     fewer = lo.scene({**SCENE.document, "limits": {}})
-    assert "limits.swing.min left out (beatup.toml: 22.9 deg)" in answers.changes(SCENE, fewer)
+    assert "limits.swing.min left out (beatup.toml: 22.9 deg)" in designs.scene_changes(SCENE, fewer)
     limited = SCENE.set("limits.beta.max", "66 deg")
-    assert answers.changes(SCENE, limited) == ["limits.beta.max = 66 deg"]
+    assert designs.scene_changes(SCENE, limited) == ["limits.beta.max = 66 deg"]
     freed = SCENE.set("bounds.l1.free", False)
-    assert answers.changes(freed, freed.free(["l1"])) == ["bounds.l1.free = true (beatup.toml: false)"]
+    assert designs.scene_changes(freed, freed.free(["l1"])) == ["bounds.l1.free = true (beatup.toml: false)"]
 
 
 def test_another_scene_of_the_job_is_told_by_its_name_and_not_without_end():
     small = SCENE.update(dict.fromkeys(("bounds.r4e.max", "bounds.r4e.min"), "1 mm"))
-    told = answers.changes(SCENE, small.set("problem.name", "mine"))
+    told = designs.scene_changes(SCENE, small.set("problem.name", "mine"))
     assert told[0] == "problem.name = mine (beatup.toml: beatup)"
     many = {f"bounds.l{k}.{end}": f"{170 + k} mm" for k in range(1, 5) for end in ("min", "max")}
     many |= {f"mechanism.l{k}": f"{100 * SCENE.mechanism[f'l{k}']} cm" for k in range(1, 5)}
-    told = answers.changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
-    assert len(told) == answers.MOST_TOLD + 1
+    told = designs.scene_changes(SCENE, SCENE.update(many | {"operation.M0": "1 N*m", "operation.speed": "1 rpm"}))
+    assert len(told) == designs.MOST_TOLD + 1
     assert told[-1] == "and 6 more"
     assert len(", ".join(told)) < 2000
 
 
 def test_what_is_told_of_a_file_obeys_no_terminal_and_has_an_end():
     rapier = lo.load("rapier")
-    (told,) = answers.changes(rapier, rapier.set("targets.match.table", "a\x1b[31m" + "b" * 500 + ".csv"))
+    (told,) = designs.scene_changes(rapier, rapier.set("targets.match.table", "a\x1b[31m" + "b" * 500 + ".csv"))
     assert told.startswith("targets.match.table = a")
     assert told.isprintable()
     assert len(told) < 250
 
 
 def test_what_is_expected_is_no_part_of_the_machine():
-    assert answers.changes(SCENE, SCENE.set("targets.balance.expected.peak_torque", "1 N*m")) == []
+    assert designs.scene_changes(SCENE, SCENE.set("targets.balance.expected.peak_torque", "1 N*m")) == []
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_what_is_expected_is_no_part_of_the_machine():
 )
 def test_what_is_wrong_with_an_answer_is_named_with_its_file(file, changes, problem):
     with pytest.raises(lo.BadInput) as caught:
-        answers.read(file(**changes), SCENE)
+        designs.read_given(file(**changes), SCENE)
     assert problem in str(caught.value)
     assert str(caught.value).startswith(str(caught.value.file))
     assert caught.value.file.endswith("answer.json")
@@ -139,6 +139,6 @@ def test_an_answers_scene_names_files_beside_it_only(tmp_path):
         document["mechanism"] = {**document["mechanism"], "law_table": named}
         path.write_text(json.dumps({"design": {}, "target": "stiffness", "scene": {"document": document}}))
         with pytest.raises(lo.BadInput) as refused:
-            answers.read(path, scene)
+            designs.read_given(path, scene)
         assert "law_table" in refused.value.key
         assert "HOME" not in str(refused.value)

@@ -30,7 +30,7 @@ from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Drawing
 from loomopt.scenes import scene
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
 from support.worst import objective_of

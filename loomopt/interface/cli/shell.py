@@ -126,10 +126,10 @@ def read_request(
         scene, given, name, status = changed(scene, sets, on, off), dict[str, float](), target, None
     else:
         from loomopt.base.errors import clean
-        from loomopt.scenes import answers, designs
+        from loomopt.scenes import designs
 
-        handed = answers.read(design, scene)
-        own = answers.changes(scene, handed.scene)
+        handed = designs.read_given(design, scene)
+        own = designs.scene_changes(scene, handed.scene)
         scene = changed(handed.scene, sets, on, off)
         given, name = designs.checked(handed.design, scene, str(design)), target or handed.target
         status = handed.status if name == handed.target and not (sets or on or off) else None

@@ -8,8 +8,7 @@ from typing import Any
 
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
-from loomopt.interface.figures.figure import COLOURS, STYLES, blank, own_style, save
-from loomopt.interface.figures.heads import Entry, head
+from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, blank, head, own_style, save
 from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes import provenance

@@ -10,8 +10,7 @@ import numpy as np
 from loomopt.base import files
 from loomopt.base.units import factor, show
 from loomopt.interface.figures import figure
-from loomopt.interface.figures.figure import COLOURS, STYLES
-from loomopt.interface.figures.heads import LEGEND, SIZE, Entry, head
+from loomopt.interface.figures.figure import COLOURS, HEAD_LEGEND, HEAD_SIZE, STYLES, Entry, head
 from loomopt.model.curves import ANGLE
 from loomopt.physics.cycle import Floats
 from loomopt.picture.job_views import Marks, Span
@@ -200,7 +199,7 @@ def _entitle(page: Any, title: str, below: str, both: bool) -> None:
         design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
         lines, texts = [design, Line2D([], [], color=TODAY, linestyle=DASHED)], ["design", "today, dashed"]
         place = 1 - EDGE / page.get_figwidth(), 1 - EDGE / high
-        page.legend(lines, texts, loc="upper right", bbox_to_anchor=place, borderaxespad=0.0, ncols=2, **LEGEND)
+        page.legend(lines, texts, loc="upper right", bbox_to_anchor=place, borderaxespad=0.0, ncols=2, **HEAD_LEGEND)
 
 
 def _bracketed(panel: Panel) -> str:
@@ -265,7 +264,7 @@ def _tick(value: float, _: int) -> str:
 def _in_g(axes: Any, size: float) -> None:
     """Give axes of an acceleration a second scale, in g; size: of the first one's unit, m/s²."""
     scale = axes.secondary_yaxis("right", functions=(lambda y: y * size / GRAVITY, lambda g: g * GRAVITY / size))
-    scale.set_ylabel("[g]", fontsize=SIZE)
+    scale.set_ylabel("[g]", fontsize=HEAD_SIZE)
     scale.yaxis.set_major_formatter(_tick)
     scale.spines["right"].set_visible(False)
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, suffix
-from loomopt.interface.figures.figure import COLOURS, blank, own_style, save
-from loomopt.interface.figures.heads import Entry, head
+from loomopt.interface.figures.figure import COLOURS, Entry, blank, head, own_style, save
 from loomopt.interface.files import outputs
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain

@@ -3,7 +3,7 @@
 import functools
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -155,3 +155,83 @@ def _characters(path: str) -> frozenset[str]:
         return frozenset(map(chr, font.get_charmap())) if font.scalable else frozenset()
     except (OSError, RuntimeError):
         return frozenset()
+
+
+Entry = tuple[Any, str]
+"""What a legend shows a line or a point as, and what it says of it."""
+HEAD_SIZE = 8.0
+"""Of texts, pt."""
+HEAD_GAP = 4.0
+"""Between rows, pt."""
+HEAD_COLOUR = "#374151"
+HEAD_LEGEND: dict[str, Any] = {"fontsize": HEAD_SIZE, "frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
+HEAD_LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}
+"""What every legend looks like."""
+
+
+def head(axes: Any, title: str, entries: Sequence[Entry] = (), names: Sequence[tuple[float, str]] = ()) -> float:
+    """Write names at their places on the axis, above them a legend, above that a title; return the height, pt.
+
+    The figure's layout must have given the axes their width.
+    """
+    high = _names(axes, names)
+    if entries:
+        high += _legend(axes, entries, high) + HEAD_GAP
+    axes.set_title(plain(title), loc="left", fontsize=9.0, pad=high + HEAD_GAP, parse_math=False)
+    return high + HEAD_GAP + 12.0
+
+
+def _points(axes: Any) -> float:
+    """Return how many points a pixel is."""
+    return 72.0 / float(axes.figure.dpi)
+
+
+def _legend(axes: Any, entries: Sequence[Entry], above: float) -> float:
+    """Write a legend that begins so many points above the axes, in as many columns as have room; return its height."""
+    from matplotlib.transforms import ScaledTranslation
+
+    canvas, width = axes.figure.canvas.get_renderer(), axes.get_window_extent().width
+    place = axes.transAxes + ScaledTranslation(0.0, (above + HEAD_GAP) / 72.0, axes.figure.dpi_scale_trans)
+    for count in range(min(len(entries), 4), 0, -1):
+        legend = axes.legend(
+            [line for line, _ in entries],
+            [plain(text) for _, text in entries],
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            bbox_transform=place,
+            ncols=count,
+            borderaxespad=0.0,
+            **HEAD_LEGEND,
+        )
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+        box = legend.get_window_extent(canvas)
+        if box.width <= width:
+            break
+    return float(box.height) * _points(axes)
+
+
+def _names(axes: Any, names: Sequence[tuple[float, str]]) -> float:
+    """Write names above an axis, each in the lowest row where it meets no other; return the height of all rows, pt."""
+    canvas, box = axes.figure.canvas.get_renderer(), axes.get_window_extent()
+    low, high = axes.get_xlim()
+    wide = (high - low) / box.width
+    ends: list[float] = []
+    for place, name in sorted(names):
+        text = axes.annotate(
+            plain(name),
+            (place, 1.0),
+            (0.0, 3.0),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="center",
+            fontsize=HEAD_SIZE,
+            color=HEAD_COLOUR,
+            parse_math=False,
+        )
+        half = wide * text.get_window_extent(canvas).width / 2
+        centre = min(max(place, low + half), high - half)
+        row = next((row for row, end in enumerate(ends) if centre - half > end), len(ends))
+        ends[row : row + 1] = [centre + half + wide * HEAD_SIZE / 2]
+        text.xy, text.xyann = (centre, 1.0), (0.0, 3.0 + 1.35 * HEAD_SIZE * row)
+    return HEAD_GAP / 2 + 1.35 * HEAD_SIZE * len(ends) if ends else 0.0

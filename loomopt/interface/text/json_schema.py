@@ -11,8 +11,7 @@ from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.schema import Table
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import TABLES
-from loomopt.scenes.schema import SceneSchema
-from loomopt.scenes.tables import Problem
+from loomopt.scenes.tables import Problem, SceneSchema
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -12,7 +12,7 @@ from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 
 
 class Operation(Table):

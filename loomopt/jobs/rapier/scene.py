@@ -14,7 +14,7 @@ from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 
 MATCHED = {"phi1": "angle", "S": "length"}
 """Columns of the table that a head's travel should match, with their kinds."""

@@ -33,7 +33,7 @@ from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 CYCLOID = 2 * math.pi

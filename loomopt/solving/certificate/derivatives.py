@@ -7,7 +7,7 @@ from typing import ClassVar
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
-from loomopt.solving.certificate.active_set import ActiveRow
+from loomopt.solving.certificate.kkt import ActiveRow
 
 
 class Derivatives(abc.ABC):

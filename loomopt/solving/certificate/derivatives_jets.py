@@ -18,8 +18,8 @@ from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
-from loomopt.solving.certificate.active_set import ActiveRow
 from loomopt.solving.certificate.derivatives import Derivatives
+from loomopt.solving.certificate.kkt import ActiveRow
 
 
 class JetReading(Reading):

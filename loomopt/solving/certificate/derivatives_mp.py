@@ -15,8 +15,8 @@ from loomopt.model.reading import Reading
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import NEWTON_SHIFT, ROUNDED, THIRD_STEP
-from loomopt.solving.certificate.active_set import ActiveRow
 from loomopt.solving.certificate.derivatives import Derivatives
+from loomopt.solving.certificate.kkt import ActiveRow
 
 DIGITS, FIRST_STEP, SECOND_STEP = 40, "1e-20", "1e-12"
 """Digits of the number system, and the steps of its differences. First, one-sided: error 1e-20 of both kinds. Second,

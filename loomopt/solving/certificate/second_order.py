@@ -25,11 +25,9 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FLAT, RANK
-from loomopt.solving.certificate.active_set import ActiveSet
 from loomopt.solving.certificate.derivatives import Derivatives
-from loomopt.solving.certificate.feasible_curve import FeasibleCurve, Lagrangian, Verdict
-from loomopt.solving.certificate.kkt import LevelMultipliers, System
-from loomopt.solving.certificate.valley import Closed
+from loomopt.solving.certificate.feasible_curve import Closed, FeasibleCurve, Lagrangian, Verdict
+from loomopt.solving.certificate.kkt import ActiveSet, LevelMultipliers, System
 from loomopt.solving.search import tie_break
 
 FAINT = 1e-4

@@ -11,7 +11,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.solving.nlp.point import Elastic, Known, Settings, sampler_at
-from loomopt.solving.nlp.stations import HeldStations, RowFamily, epigraphs, families, held, recurrent, stations
+from loomopt.solving.nlp.rows import HeldStations, RowFamily, chained, epigraphs, families, held, stations
 from loomopt.solving.nlp.transcribe import Transcription, transcribe
 
 FIRST_SLOTS, LEADING = 6, 4
@@ -48,7 +48,7 @@ class Calls:
         self.elastic = elastic = ways is not None
         self.families, self.epigraphs = families(program, elastic), epigraphs(program, elastic)
         names = [variable.name for variable in program.variables]
-        self.slots, self.leading = BESIDE_STATIONS if recurrent(program.model, names) else (FIRST_SLOTS, LEADING)
+        self.slots, self.leading = BESIDE_STATIONS if chained(program.model, names) else (FIRST_SLOTS, LEADING)
         count = len(program.objectives)
         self.weights = [settings.penalty ** (count - 1 - k) for k in range(count)]
         self.built = 0.0

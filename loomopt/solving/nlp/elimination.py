@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from loomopt.physics.cycle import Floats
-from loomopt.solving.nlp.expressions import Expressions
-from loomopt.solving.nlp.lifted import Lifted
+from loomopt.solving.nlp.expressions import Expressions, Lifted
 from loomopt.solving.nlp.rows import RowMap
 
 

@@ -20,8 +20,7 @@ from loomopt.solving.nlp.follow import follow
 from loomopt.solving.nlp.ipopt import IpoptAnswer, run
 from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
 from loomopt.solving.nlp.polish import polish
-from loomopt.solving.nlp.rows import Multipliers
-from loomopt.solving.nlp.stations import RowFamily
+from loomopt.solving.nlp.rows import Multipliers, RowFamily
 from loomopt.solving.nlp.transcribe import Transcription
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32

@@ -17,17 +17,18 @@ from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, quadrature
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Cycle, Floats, Node, node_angle
-from loomopt.solving.nlp.layout import Layout
-from loomopt.solving.nlp.rows import RowMap, row_map
-from loomopt.solving.nlp.stations import (
+from loomopt.solving.nlp.rows import (
     Epigraph,
     HeldStations,
+    Layout,
     RowFamily,
+    RowMap,
     Station,
+    chained,
     epigraphs,
     families,
     held,
-    recurrent,
+    row_map,
     stations,
 )
 
@@ -136,7 +137,7 @@ class Structure:
     @functools.cached_property
     def recurrent(self) -> tuple[str, ...]:
         """Derived values that follow one after the other, in order."""
-        return recurrent(self.program.model, self.names)
+        return chained(self.program.model, self.names)
 
     @property
     def names(self) -> list[str]:

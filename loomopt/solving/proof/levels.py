@@ -17,8 +17,7 @@ from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
 from loomopt.solving.certificate.verdict import GlobalBound, GlobalLevel
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.proof.reading import Reader
-from loomopt.solving.proof.rows import OpenError
-from loomopt.solving.proof.task import BoxTask, reduced, silent
+from loomopt.solving.proof.task import BoxTask, OpenError, reduced, silent
 from loomopt.solving.proof.tree import Question, Tree, grown, multipliers
 from loomopt.solving.search.search import Search, compared, judged, tried
 

@@ -18,8 +18,7 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ACTIVE
 from loomopt.solving.proof.nodes import NodeLayout, Spots, layouts
-from loomopt.solving.proof.rows import BoxRows, OpenError, strips
-from loomopt.solving.proof.task import BoxTask
+from loomopt.solving.proof.task import BoxRows, BoxTask, OpenError, strips
 
 Mask = NDArray[np.bool_]
 

@@ -16,7 +16,7 @@ from loomopt.solving.answer.solution import Clash
 from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
-from loomopt.solving.nlp.stations import families
+from loomopt.solving.nlp.rows import families
 from loomopt.solving.search.search import Search
 
 

@@ -12,7 +12,7 @@ from loomopt.model.session import working
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
-from loomopt.solving.search.batch import SCREENED_STARTS
+from loomopt.solving.search.screening import SCREENED_STARTS
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.nlp.stations import Epigraph, HeldStations, RowFamily, epigraphs, families, held, stations
+from loomopt.solving.nlp.rows import Epigraph, HeldStations, RowFamily, epigraphs, families, held, stations
 
 REFERENCE_DIGITS, CLOSED_DIGITS = 40, 60
 """Digits of references, and of those that readings in 40 digits are compared with: 20 more than any of them has."""

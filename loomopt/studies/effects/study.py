@@ -16,7 +16,7 @@ from loomopt.physics.effects.declared import Fault, faults
 from loomopt.physics.effects.kinds import Effect, Event, Speed, State
 from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.scenes import answers, designs
+from loomopt.scenes import designs
 from loomopt.scenes.document import looked_up, replaced
 from loomopt.scenes.numbers import files
 from loomopt.scenes.provenance import versions
@@ -116,7 +116,7 @@ def command(scene: Scene, target: str, names: Collection[str]) -> str | None:
     except BadInput:
         return None
     words = ["loomopt", "solve", problem, "--target", target]
-    before, after = dict(answers.values(file.document)), dict(answers.values(scene.document))
+    before, after = dict(designs.document_values(file.document)), dict(designs.document_values(scene.document))
     if before.keys() - after.keys():
         return None  # what was taken out of a scene no option takes out
     idle = tuple(f"effects.{effect.name}." for effect in known(scene) if effect.name not in names)

@@ -22,7 +22,7 @@ from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution
 from loomopt.solving.answer.words import Words
-from loomopt.studies.front import answer, plan
+from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver
 from loomopt.studies.run.findings import Findings
@@ -230,7 +230,7 @@ class Trade:
         """Return the whole answer of a task: the limit on the other axis is one of its limits. Raises BadInput."""
         began = time.perf_counter()
         found, asking, _ = self.reach(task, parent)
-        return answer.answer(self.solver, self.target, found, asking, began)
+        return solver.whole_answer(self.solver, self.target, found, asking, began)
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task; it depends on nothing but its arguments."""
@@ -288,7 +288,7 @@ class Trade:
 
     def _clash(self, asking: Asking) -> str:
         """Return which limits clash, and why; "" where that is not found."""
-        limits = answer.clashing(self.solver, self.solver.program(asking)).limits
+        limits = solver.clashing(self.solver, self.solver.program(asking)).limits
         why = registry.of(self.scene).explain(self.scene, limits.values())
         return "; ".join([f"limits that clash: {', '.join(limits)}", *([why] if why else [])]) if limits else ""
 

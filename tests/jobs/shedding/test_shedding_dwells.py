@@ -45,7 +45,7 @@ def test_a_travel_that_would_better_be_longer_has_a_price_of_that_side():
 
 def test_variables_without_room_are_held_on_both_sides():
     from loomopt.model.limits import BoundLimit
-    from loomopt.solving.certificate.active_set import ActiveRow, ActiveSet
+    from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet
 
     limit = BoundLimit("kept", -1, "a", 1.0, 1.0)
     rows = (ActiveRow("kept", "a", 1.0, 1.0, 0, 0.0, limit), ActiveRow("f", "f", 1.0, 1.0, 0, 0.0))

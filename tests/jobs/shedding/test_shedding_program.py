@@ -11,7 +11,7 @@ from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.model.limits import CycleLimit, DesignLimit
 from loomopt.model.objectives import Peak, Value
 from loomopt.physics.mechanisms.cam_spline import cycloid_like
-from loomopt.solving.nlp.stations import families
+from loomopt.solving.nlp.rows import families
 
 SCENE = registry.load("shedding")
 JOB = registry.of(SCENE)

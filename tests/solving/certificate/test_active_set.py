@@ -8,7 +8,7 @@ from support import toy
 from loomopt.model.limits import RatioLimit
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import ACTIVE
-from loomopt.solving.certificate.active_set import active_set
+from loomopt.solving.certificate.kkt import active_set
 
 
 def active(program, x):

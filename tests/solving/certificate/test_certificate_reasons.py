@@ -10,7 +10,6 @@ from support import toy
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import certificate, kkt, second_order
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.certificate import (
     COMPLEMENTARY,
     LARGEST_PRICE,
@@ -21,7 +20,7 @@ from loomopt.solving.certificate.certificate import (
 )
 from loomopt.solving.certificate.derivatives_jets import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import LevelMultipliers
+from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.verdict import Level
 

@@ -8,8 +8,8 @@ import pytest
 from support import toy
 
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import active_set
 
 
 def exact_at(program, x):

@@ -7,9 +7,8 @@ from support import toy
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import LevelMultipliers, System, replaceable, solved
+from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, replaceable, solved
 
 
 def at(program, x):

@@ -7,9 +7,9 @@ from support import toy
 from loomopt.model.moves import AxisMove, Preference, ScaleMove
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import kkt, second_order
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import Local
 
 

@@ -10,9 +10,8 @@ from loomopt.model.moves import AxisMove, Preference
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
-from loomopt.solving.certificate.active_set import active_set
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.kkt import LevelMultipliers
+from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Critical, Local
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from loomopt.jobs import registry
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Settings, sampler_at
-from loomopt.solving.nlp.stations import epigraphs, families
+from loomopt.solving.nlp.rows import epigraphs, families
 from loomopt.solving.nlp.transcribe import transcribe
 
 EFFECTS = ("counterweight_inertia", "rocker_inertia", "rod_inertia", "gravity", "bearing_friction", "centrifugal")

@@ -14,7 +14,7 @@ from loomopt.model.program import Variable
 from loomopt.model.sampling import Extreme
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Known, Settings
-from loomopt.solving.nlp.stations import RowFamily
+from loomopt.solving.nlp.rows import RowFamily
 
 X = {"x": 0.5, "y": -2.0}
 

@@ -12,7 +12,7 @@ from loomopt.maths import systems
 from loomopt.model.reading import Reading
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Elastic, Settings
-from loomopt.solving.nlp.stations import families
+from loomopt.solving.nlp.rows import families
 
 CASES: list[tuple[tuple[str, ...], str, tuple[tuple[str, str], ...]]]
 CASES = [((), target, ()) for target in TARGETS]

@@ -7,8 +7,7 @@ from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.maths import systems
 from loomopt.physics.cycle import Node
-from loomopt.solving.nlp.expressions import QuantityFunctions
-from loomopt.solving.nlp.lifted import Lifts
+from loomopt.solving.nlp.expressions import Lifts, QuantityFunctions
 
 X = {name: 0.1 + 0.05 * k for k, name in enumerate(NAMES)}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from loomopt.solving.nlp.layout import Layout
+from loomopt.solving.nlp.rows import Layout
 
 
 def test_layout_gives_back_what_was_written():

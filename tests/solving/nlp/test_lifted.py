@@ -11,8 +11,7 @@ from steps import COUNT, HEIGHTS, NAMES, program
 from loomopt.model.program import Variable
 from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.solving.nlp.calls import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
-from loomopt.solving.nlp.expressions import expressions
-from loomopt.solving.nlp.lifted import Lifts, Options, chosen, identity
+from loomopt.solving.nlp.expressions import Lifts, Options, chosen, expressions, identity
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.nlp.structure import structure
 

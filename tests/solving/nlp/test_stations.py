@@ -10,7 +10,7 @@ from loomopt.physics.cycle import TURN
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.calls import Calls
 from loomopt.solving.nlp.point import Settings, sampler_at
-from loomopt.solving.nlp.stations import HeldStations, RowFamily, held, stations
+from loomopt.solving.nlp.rows import HeldStations, RowFamily, held, stations
 from loomopt.solving.nlp.structure import structure
 
 

@@ -2,7 +2,7 @@
 
 from waves import objective, program
 
-from loomopt.solving.nlp.stations import Epigraph, RowFamily, epigraphs, families
+from loomopt.solving.nlp.rows import Epigraph, RowFamily, epigraphs, families
 
 
 def test_one_variable_stands_above_each_objective_and_one_family_for_each_quantity():

@@ -9,7 +9,7 @@ from loomopt.maths.intervals import Interval, interval
 from loomopt.model.sampling import Sampler
 from loomopt.solving.proof.nodes import layouts
 from loomopt.solving.proof.reading import Reader
-from loomopt.solving.proof.rows import BoxRows, OpenError, _summed, strips
+from loomopt.solving.proof.task import BoxRows, OpenError, _summed, strips
 
 
 def test_means_hold_the_quadrature_of_designs_in_the_box():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from machines_in_boxes import designs, solved
 
-from loomopt.solving.proof.rows import OpenError
-from loomopt.solving.proof.task import reduced
+from loomopt.solving.proof.task import OpenError, reduced
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,7 @@ from loomopt.jobs import registry
 from loomopt.physics.tolerances import NEEDED, PRICED
 from loomopt.solving.answer.words import Words
 from loomopt.solving.nlp.point import Point
-from loomopt.solving.nlp.rows import Multipliers, row_map
-from loomopt.solving.nlp.stations import families
+from loomopt.solving.nlp.rows import Multipliers, families, row_map
 from loomopt.solving.search import elastic
 
 WAVES = {"w": lambda m, v, phi: v["x"] + m.cos(phi), "z": lambda m, v, phi: v["x"] - 1 + m.cos(phi)}

@@ -6,7 +6,7 @@ from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import ShowValue
 from loomopt.physics.effects import declared
 from loomopt.physics.schema import Figure, Table, Target
-from loomopt.scenes.schema import SceneSchema
+from loomopt.scenes.tables import SceneSchema
 from loomopt_press.model import LONGER
 
 
