@@ -1,9 +1,9 @@
 """What tables of a scene are made of, and what a designer reads and asks: figures and targets."""
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from loomopt.maths.systems import Number
 
@@ -12,6 +12,12 @@ class Table(BaseModel):
     """One table of a scene: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+class TargetTable(Table):
+    """What every target's table may hold."""
+
+    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 Values = Mapping[str, Number]

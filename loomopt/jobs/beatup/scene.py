@@ -1,7 +1,6 @@
 """What a beat-up scene may hold: its tables, design variables, figures and targets."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from pydantic import Field
 
@@ -11,7 +10,7 @@ from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import crank_rocker
-from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
 from loomopt.scenes.tables import SceneSchema
 
 
@@ -33,12 +32,6 @@ class Mechanism(Table):
     r4e: Length = Field(0.0, description="distance of the counterweight from the rocking shaft D")
     m4: PositiveMass | None = Field(None, description="mass of the reed system without counterweight")
     r4: Length | None = Field(None, description="centre of mass of the reed system from the rocking shaft D")
-
-
-class TargetTable(Table):
-    """What every target's table may hold."""
-
-    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class TorqueTarget(TargetTable):

@@ -1,7 +1,6 @@
 """What a rapier scene may hold: its tables, design variables, figures and targets."""
 
 import math
-from typing import Any
 
 from pydantic import Field
 
@@ -11,7 +10,7 @@ from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
 from loomopt.physics.effects import declared
 from loomopt.physics.mechanisms import rapier_drive
-from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
@@ -49,12 +48,6 @@ class Mechanism(Table):
     i1: PositiveNumber = Field(description="gear ratio from driving link to tape wheel, first stage")
     i2: PositiveNumber = Field(1.0, description="gear ratio from driving link to tape wheel, second stage")
     wheel: PositiveLength = Field(description="diameter of the tape wheel")
-
-
-class TargetTable(Table):
-    """What every target's table may hold."""
-
-    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class MatchTarget(TargetTable):

@@ -29,7 +29,7 @@ from loomopt.physics.effects import declared
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
-from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target
+from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -82,12 +82,6 @@ class HealdFrame(Table):
 # `return` is a word of the language: no field of a class can be written so.
 RETURNED = {"return": (SegmentAngle, Field(description="cam angle of the return"))}
 Mechanism: type[Table] = create_model("Mechanism", __base__=HealdFrame, **RETURNED)  # type: ignore[call-overload]
-
-
-class TargetTable(Table):
-    """What every target's table may hold."""
-
-    expected: dict[str, Any] | None = Field(None, description="what the target is known to reach: shown, never used")
 
 
 class LawTarget(TargetTable):
