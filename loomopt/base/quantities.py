@@ -110,10 +110,10 @@ def read(text: str, kind: str) -> float:
     except QuantityError as error:
         raise _misreading(text, kind, error.problem, error.remedy) from None
     _check_dimension(unit, unit_text, number, kind)
-    return _rounded(_exact(number, kind) * unit.factor, kind)
+    return _rounded(_as_written(number, kind) * unit.factor, kind)
 
 
-def exact(value: float, unit_text: str, kind: str) -> str:
+def shortest_text(value: float, unit_text: str, kind: str) -> str:
     """Return the shortest text in `unit_text` that `read` turns into the same SI float64; without a unit for "1"."""
     shared = Fraction(value) / parse_unit(unit_text).factor
     for digits in range(1, _MOST_DIGITS):
@@ -163,13 +163,13 @@ def _pure_number(text: str) -> float:
     match = _RATIO.fullmatch(text)
     if not match:
         raise _misreading(text, "number")
-    over, under = _exact(match[1], "number"), _exact(match[2] or "1", "number")
+    over, under = _as_written(match[1], "number"), _as_written(match[2] or "1", "number")
     if under == 0:
         raise _refusal("number", "the ratio divides by zero")
     return _rounded(over / under, "number")
 
 
-def _exact(number: str, kind: str) -> Fraction:
+def _as_written(number: str, kind: str) -> Fraction:
     """Return the number as written, its size checked before any digits are expanded."""
     mantissa = re.split("[eE]", number)[0]
     if not re.search("[1-9]", mantissa):

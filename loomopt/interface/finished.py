@@ -86,11 +86,11 @@ class DesignStudy:
             "problem": self.study.scene.name,
             "target": self.study.target,
             **({"message": self.findings.message} if self.findings.message else {}),
-            "rows": [self.study.told(row) for row in self.rows],
+            "rows": [self.study.row_json(row) for row in self.rows],
             "units": study_table.units(self.study, self.rows),
             "changes": [change.as_dict() for change in self.findings.changes],
             "gaps": list(self.findings.gaps),
-            "provenance": study_table.told(self.study),
+            "provenance": study_table.study_provenance(self.study),
         }
 
     def __len__(self) -> int:
@@ -132,7 +132,7 @@ def conducted(
             problem = f"it holds {counted(study, known, 'of the')} of this study already"
             remedy = "Resume (--resume, or resume=True), or name another file"
             raise refusal(problem, str(store), "store", remedy=remedy)
-        opened.begin(study.key, told(study))
+        opened.begin(study.key, study_identity(study))
         return DesignStudy(study, run.run(study, executor, opened, on_row))
 
 
@@ -146,7 +146,7 @@ def who(executor: Executor | run.Making | None, count: int | None) -> Executor |
     return executors.workers(count) if count is not None else executor
 
 
-def told(study: SceneStudy) -> Mapping[str, object]:
+def study_identity(study: SceneStudy) -> Mapping[str, object]:
     """Return what a store says of a study: what its key is made of, and the scene that makes it again."""
     from loomopt.scenes.document import copied
 

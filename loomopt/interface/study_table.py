@@ -111,7 +111,7 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
     cells["parent"] = pd.array([row.parent for row in rows], dtype="Int64")
     cells |= {"time [s]": [row.seconds for row in rows], "reason": [row.reason for row in rows]}
     found = TableFrame(cells, index=pd.Index([row.point for row in rows], name="point"))
-    found.attrs.update(told(study))
+    found.attrs.update(study_provenance(study))
     return found
 
 
@@ -119,9 +119,9 @@ def _floats(column: Column) -> list[float]:
     return [math.nan if value is None else value for value in column.shown]
 
 
-def told(study: SceneStudy) -> dict[str, str]:
+def study_provenance(study: SceneStudy) -> dict[str, str]:
     """Return where the rows of a study come from, once for all."""
-    return provenance(study.scene, study=study.name, target=study.target or "none", **study.asked)
+    return provenance(study.scene, study=study.name, target=study.target or "none", **study.conditions)
 
 
 def units(study: SceneStudy, rows: Sequence[Row]) -> dict[str, str]:

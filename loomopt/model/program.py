@@ -111,7 +111,7 @@ class Program:
         )
 
     @lazy
-    def ways(self) -> dict[int, tuple[int, ...]]:
+    def excess_places(self) -> dict[int, tuple[int, ...]]:
         """Relaxable limits by place → the places of their excesses: two of an equality, above and below.
 
         The rows of one limit's side give way together.
@@ -151,7 +151,7 @@ class Program:
         return tuple(limit for k, limit in enumerate(self.limits) if k not in self.bound_limits)
 
     @lazy
-    def told(self) -> frozenset[str]:
+    def named_limits(self) -> frozenset[str]:
         """Names of limits that a designer reads: a hidden row of such a name is part of it."""
         return frozenset(limit.name for limit in self.limits if not limit.hidden)
 

@@ -128,7 +128,7 @@ class Sweep:
         return list(dict.fromkeys(each.figure for each in program.objectives))
 
     @property
-    def asked(self) -> dict[str, object]:
+    def conditions(self) -> dict[str, object]:
         """What is asked of every row, for people."""
         ends = ((axis.key, axis.texts[0], axis.texts[-1], len(axis.texts)) for axis in self.axes)
         over = "; ".join(f"{key} = {first} ... {last}, {count} values" for key, first, last, count in ends)
@@ -213,9 +213,9 @@ class Sweep:
         """Return nothing: the target says what is sought."""
         return {}
 
-    def told(self, row: Row) -> dict[str, object]:
+    def row_json(self, row: Row) -> dict[str, object]:
         """Return what `--json` prints of a row."""
-        return row.told()
+        return row.row_json()
 
     def read(self, rows: Sequence[Row]) -> Findings:
         """Return rows in the order of their points; of a sweep over one number what changes along it, and its gaps."""

@@ -138,7 +138,7 @@ def test_rows_of_one_side_give_way_together_and_kinds_apart():
         DesignLimit("p", -1, "p", 1.0, 1.0), DesignLimit("p", 0, "p", 1.0, 1.0),
         DesignLimit("p", 1, "x", 1.0, 1.0, relaxable=False),
     )  # fmt: skip
-    assert replace(PROGRAM, limits=limits).ways == {0: (0,), 1: (0,), 2: (1,), 3: (2,), 4: (3, 4)}
+    assert replace(PROGRAM, limits=limits).excess_places == {0: (0,), 1: (0,), 2: (1,), 3: (2,), 4: (3, 4)}
 
 
 # One more kind, of which nothing else knows ------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import loomopt as lo
-from loomopt.base.quantities import exact, read
+from loomopt.base.quantities import read, shortest_text
 from loomopt.base.units import SI_UNIT, QuantityError, parse_unit
 from loomopt.scenes import packaged
 
@@ -45,6 +45,6 @@ def _text(text: str) -> str:
     try:
         powers = parse_unit(unit).powers if unit else None
         kind = next((kind for kind in UNITS if powers == parse_unit(SI_UNIT[kind]).powers), None)
-        return exact(read(text, kind), UNITS[kind], kind) if kind and number else text
+        return shortest_text(read(text, kind), UNITS[kind], kind) if kind and number else text
     except QuantityError:
         return text

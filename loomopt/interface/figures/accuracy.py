@@ -13,7 +13,7 @@ from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes import provenance
 from loomopt.studies.accuracy.accuracy import AccuracyStudy, in_time
-from loomopt.studies.accuracy.ladders import LadderRow, grouped, told
+from loomopt.studies.accuracy.ladders import LadderRow, grouped, setting_text
 from loomopt.studies.accuracy.readings import NUMBERS
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
@@ -30,7 +30,7 @@ def parts(study: AccuracyStudy) -> list[str | Grid]:
         for place, row in enumerate(rows):
             name = (row.quantity, row.method) if place == 0 else ("", "")
             error, seconds = ("" if value is None else f"{value:.1e}" for value in (row.error, row.seconds))
-            lines.append((*name, told(row.setting), error, seconds, str(row.evaluations), _words(row)))
+            lines.append((*name, setting_text(row.setting), error, seconds, str(row.evaluations), _words(row)))
     head = ("quantity", "method", "setting", "error", "time [s]", "positions", "status")
     named = dict.fromkeys([*study.orders, *study.knees])
     found = tuple((joined(name), _order(study, name), _knee(study, name)) for name in named)
@@ -54,7 +54,7 @@ def _order(study: AccuracyStudy, name: str) -> str:
 
 
 def _knee(study: AccuracyStudy, name: str) -> str:
-    return told(study.knees[name]) if name in study.knees else ""
+    return setting_text(study.knees[name]) if name in study.knees else ""
 
 
 def check(path: Path) -> None:

@@ -93,7 +93,7 @@ def _panel(
         entries.append((drawn, label))
         for y, value in zip(at, values, strict=True):
             axes.annotate(
-                _told(value),
+                _share_text(value),
                 (1.0, y),
                 (4.0, 0.0),
                 xycoords=("axes fraction", "data"),
@@ -116,7 +116,7 @@ def _length(value: float | None, label: str, least: float, most: float) -> float
     return min(max(100 * size, least), most)
 
 
-def _told(value: float | None) -> str:
+def _share_text(value: float | None) -> str:
     """Return a share as the number beside a bar."""
     if value is None:
         return "none"

@@ -194,7 +194,7 @@ def _drawn(study: SceneStudy, findings: Findings, chosen: Sequence[Row]) -> Any:
     rows = findings.rows
     columns = study_table.columns(study, rows)
     places, sought = columns["place"], columns["sought"]
-    panels = sought or studies.told(study, rows)[:MOST_PANELS]
+    panels = sought or studies.shown_columns(study, rows)[:MOST_PANELS]
     sketches = [] if registry.of(study.scene).views.missing(study.scene) else [_sketch(study, row) for row in chosen]
     changes = named(findings)
     said = lines(study, changes)

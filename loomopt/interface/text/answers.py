@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from loomopt.base.quantities import exact
+from loomopt.base.quantities import shortest_text
 from loomopt.base.units import factor
 from loomopt.interface.tables import rows
 from loomopt.interface.text.layout import Grid, joined
@@ -95,7 +95,7 @@ def retyped(found: Evaluation, scene: Scene) -> str:
     words, told = Words(scene), []
     for name, value in found.design.items():
         if name not in scene.schema.lists:
-            text, unit = exact(value, words.unit(name), words.kind(name)), words.unit(name)
+            text, unit = shortest_text(value, words.unit(name), words.kind(name)), words.unit(name)
             told.append(joined(f'"{name}": {text}' if unit == "1" else f'"{name}": "{text}"'))
     return f"to retype: {{{', '.join(told)}}}"
 

@@ -93,7 +93,9 @@ def verdict(found: Found) -> list[str]:
     said = f"{listed(found.left_out)} may be left out" if found.left_out else "no effect may be left out"
     lines = [f"At {share}, {said}{': ' if call else ''}{call}"]
     if found.together and found.largest_omission:
-        lines.append(f"Left out together, and what is found so judged with all on: {_most(found.together.largest)}.")
+        lines.append(
+            f"Left out together, and what is found so judged with all on: {_largest_change(found.together.largest)}."
+        )
         if len(found.left_out) > 1 and abs(found.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = found.largest_omission.by, found.largest_omission.of, found.largest_omission.value
             lines[-1] += f" Most comes from {found.largest_omission.effect}: {_moved(by, of, value)}."
@@ -108,7 +110,7 @@ def verdict(found: Found) -> list[str]:
     return lines
 
 
-def _most(largest: tuple[str, str, float]) -> str:
+def _largest_change(largest: tuple[str, str, float]) -> str:
     """Return the largest change in words."""
     return f"at most {_moved(*largest)}" if abs(largest[2]) > SHOWN_AS_ZERO else "nothing changes"
 

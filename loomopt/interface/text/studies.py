@@ -48,7 +48,7 @@ def table(path: Path, frame: "pd.DataFrame") -> None:
         atomically(path, frame.to_parquet)
 
 
-def told(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[Column]:
+def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[Column]:
     """Return the columns that a study is about: what it seeks and shows, and what differs of the design."""
     columns = study_table.columns(study, rows, si)
     known = [*columns["design"], *columns["figures"], *columns["multipliers"]]
@@ -68,7 +68,7 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     rows: of all points that were solved.
     """
     found = study.read(rows)
-    columns = [*study_table.columns(study, found.rows, si)["place"], *told(study, found.rows, si)]
+    columns = [*study_table.columns(study, found.rows, si)["place"], *shown_columns(study, found.rows, si)]
     heads = ["", *(column.name if column.unit == "1" else f"{column.name}\n{column.unit}" for column in columns)]
     lines = []
     for place, row in enumerate(found.rows):

@@ -115,7 +115,10 @@ def _labels(found: LinkageDrawing, units: Units) -> list[Label]:
         Label(FRONT, c, line + quarter, "C"),
         Label(REAR, rear["B"], line + math.pi, "B'"),
         Label(REAR, rear["C"], line - quarter, "C'"),
-        *(Label("masses", at[name], 0.0, f"{name}  {_told(name, own, units)}") for name, own in found.masses.items()),
+        *(
+            Label("masses", at[name], 0.0, f"{name}  {_mass_text(name, own, units)}")
+            for name, own in found.masses.items()
+        ),
         *(Label("masses", rear[name], -quarter, f"{name}'") for name in found.masses),
         Label("notes", c.towards(fell, POINTER * found.height), fell, "fell"),
         around("dimensions", d, swing, *turns, f"swing = {math.degrees(centres.swing):.2f}°"),
@@ -127,7 +130,7 @@ def _labels(found: LinkageDrawing, units: Units) -> list[Label]:
     ]
 
 
-def _told(name: str, own: Mass, units: Units) -> str:
+def _mass_text(name: str, own: Mass, units: Units) -> str:
     """Say a centre's mass and radius."""
     mass, radius = MASSES[name]
     return f"{mass} = {show(own.mass, units.mass)}, {radius} = {units.size(own.radius)}"

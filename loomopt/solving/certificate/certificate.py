@@ -249,5 +249,5 @@ def _binding(local: Local, levels: Sequence[JudgedLevel]) -> Iterator[Binding]:
     for k, row in enumerate(local.active.rows[: local.active.limits]):
         multipliers = [float(each.multipliers.of[k]) for each in levels]
         first = next((level for level, multiplier in enumerate(multipliers) if abs(multiplier) > POSITIVE), None)
-        if first is not None and row.limit and row.limit.name in local.program.told:
+        if first is not None and row.limit and row.limit.name in local.program.named_limits:
             yield priced(local.sampler, row.limit, local.program.objectives[first], multipliers[first])

@@ -163,7 +163,7 @@ class Calls:
         if family.epigraph >= 0:
             scale = self.program.objectives[self.epigraphs[family.epigraph].objective].scale
             return float(extreme.height / scale - extra[family.epigraph])
-        limit, ways = self.program.limits[family.limit], self.program.ways
+        limit, ways = self.program.limits[family.limit], self.program.excess_places
         bound = limit.bound / limit.scale
         bound += extra[ways[family.limit][0]] if self.elastic and family.limit in ways else 0.0
         return float(extreme.height / limit.scale - bound)

@@ -222,7 +222,7 @@ def _stands(calls: Calls, nlp: Transcription, here: _Place, extra: Floats) -> bo
 def _relaxed(program: Program, extra: Floats) -> dict[int, float]:
     """Return the excess each relaxable limit needs, SI, where it is more than rounding."""
     limits = program.limits
-    needs = {k: extra[way[0]] - (extra[way[1]] if len(way) == 2 else 0.0) for k, way in program.ways.items()}
+    needs = {k: extra[way[0]] - (extra[way[1]] if len(way) == 2 else 0.0) for k, way in program.excess_places.items()}
     return {k: float(need * limits[k].scale) for k, need in needs.items() if abs(need) > NEEDED}
 
 

@@ -334,7 +334,7 @@ class _Built:
 
     def given_way(self, place: int) -> Any:
         """Return by how much a limit gives way, in its natural size; of an equality with its sign."""
-        ways = [self.extra[way] for way in self.structure.ways.get(place, ())]
+        ways = [self.extra[way] for way in self.structure.excess_places.get(place, ())]
         return ways[0] - ways[1] if len(ways) == 2 else total(ways)
 
     def limits(self) -> Any:

@@ -120,8 +120,8 @@ class Point:
 class Elastic:
     """How limits give way in an elastic solve: the least weighted sum of their excesses is sought.
 
-    costs: of each excess, in its natural size, in order of `Program.ways`; infinite where the limit is firm, nothing
-    for 1 throughout. beside: where an elastic solve ended that this one starts from, if any.
+    costs: of each excess, in its natural size, in order of `Program.excess_places`; infinite where the limit is firm,
+    nothing for 1 throughout. beside: where an elastic solve ended that this one starts from, if any.
     """
 
     costs: tuple[float, ...] = ()

@@ -318,7 +318,7 @@ def row_map(program: Program, slots: int, elastic: bool = False) -> RowMap:
     above = epigraphs(program, elastic)
     names = [variable.name for variable in program.variables]
     switches = station_switches(program.model, names)
-    ways = {way for ways in program.ways.values() for way in ways}
+    ways = {way for ways in program.excess_places.values() for way in ways}
     return RowMap(
         tuple(program.single_limits if elastic else program.design_limits),
         tuple(len(program.objectives[epigraph.objective].sides) for epigraph in above),

@@ -118,9 +118,9 @@ class Structure:
         return row_map(self.program, self.slots, self.elastic)
 
     @functools.cached_property
-    def ways(self) -> dict[int, tuple[int, ...]]:
+    def excess_places(self) -> dict[int, tuple[int, ...]]:
         """Limits that may give way by place → the places of their excess variables."""
-        return self.program.ways if self.elastic else {}
+        return self.program.excess_places if self.elastic else {}
 
     @functools.cached_property
     def means(self) -> list[Integral]:

@@ -61,7 +61,7 @@ class Levels:
         if self.why:
             return
         try:
-            task = reduced(program, loosening(job, program), silent(program), _most(program, self.merits))
+            task = reduced(program, loosening(job, program), silent(program), _no_larger(program, self.merits))
             self._levels = [_Level(task, x, self.merits, place, gap) for place in range(len(self.merits))]
         except OpenError as error:
             self.why = str(error)
@@ -101,7 +101,7 @@ def _unserved(program: Program, sampler: Sampler) -> str:
     return ""
 
 
-def _most(program: Program, merits: list[float]) -> dict[str, float]:
+def _no_larger(program: Program, merits: list[float]) -> dict[str, float]:
     """Return what variables that are the first objective need not exceed, SI: the answer's own."""
     first = program.objectives[0]
     if not first.is_smooth or first.row not in {v.name for v in program.variables}:

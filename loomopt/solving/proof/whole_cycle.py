@@ -112,7 +112,7 @@ def _readings(
 def _proofs(program: Program, job: Job, words: Words, own: _Read, whole: _Read) -> Iterator[Proof]:
     """Yield the proofs: limits of the cycle and of single values, assembly, claimed peaks."""
     for limit in program.row_limits:
-        hidden = limit.row if limit.name in program.told else limit.name
+        hidden = limit.row if limit.name in program.named_limits else limit.name
         text = hidden if limit.hidden else words.limit(limit)
         if isinstance(limit, CycleLimit):
             peak = own.sampler.peak(limit.row, limit.where)

@@ -45,8 +45,8 @@ def clash(search: Search, words: Words) -> Clash:
         return Clash()
     needs = _by_limit(program, nearest.relaxed)
     found = [words.relaxation(program.limits[k], need, alone=len(needs) == 1) for k, need in needs.items()]
-    known = {program.ways[k] for k in needs} if len(needs) == 1 else set()
-    single_ways = list(dict.fromkeys(way for way in program.ways.values() if way not in known))
+    known = {program.excess_places[k] for k in needs} if len(needs) == 1 else set()
+    single_ways = list(dict.fromkeys(way for way in program.excess_places.values() if way not in known))
     for place, ways in enumerate(single_ways, 1):
         step = settings.at(f"looking for the least relaxation {place} of {len(single_ways)}")
         single = _alone(program, ways, nearest, step)
@@ -81,7 +81,7 @@ def _priced(program: Program, point: Point, words: Words) -> dict[str, str]:
     for rows in (prices.at_stations, prices.at_nodes):
         found += [(place, float(np.abs(own).max(initial=0.0))) for place, own in zip(places, rows, strict=True)]
     priced = (program.limits[place] for place, price in found if abs(price) > PRICED)
-    return {words.limit(limit): limit.name for limit in priced if limit.name in program.told}
+    return {words.limit(limit): limit.name for limit in priced if limit.name in program.named_limits}
 
 
 def _by_limit(program: Program, relaxed: Mapping[int, float]) -> dict[int, float]:

@@ -15,7 +15,17 @@ from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.options import check_sought
 from loomopt.studies.accuracy import optima, readings
-from loomopt.studies.accuracy.ladders import EPSILON, Ladder, LadderRow, Setting, climbed, grouped, knee, order, told
+from loomopt.studies.accuracy.ladders import (
+    EPSILON,
+    Ladder,
+    LadderRow,
+    Setting,
+    climbed,
+    grouped,
+    knee,
+    order,
+    setting_text,
+)
 from loomopt.studies.accuracy.subject import Subject
 
 if TYPE_CHECKING:
@@ -66,7 +76,7 @@ class AccuracyStudy:
         import pandas as pd
 
         columns = {"error": "error [1]", "seconds": "time [s]"}
-        frame = pd.DataFrame([dict(vars(row)) | {"setting": told(row.setting)} for row in self.rows])
+        frame = pd.DataFrame([dict(vars(row)) | {"setting": setting_text(row.setting)} for row in self.rows])
         frame = frame.rename(columns=columns)
         frame.attrs.update(self.provenance)
         return frame
@@ -122,10 +132,9 @@ def advice(rows: Sequence[LadderRow]) -> str:
     own = _exchange(rows)
     costs = _costs(own, {row.setting: row.evaluations for row in own})
     if not costs:
-        return (
-            f"No solve was certified at an accuracy of {told(COARSE)} and a finer one, so there is no cost to compare."
-        )
-    return f"{_said(costs)} here; below {told(floor(own))} rounding takes over."
+        coarse = setting_text(COARSE)
+        return f"No solve was certified at an accuracy of {coarse} and a finer one, so there is no cost to compare."
+    return f"{_said(costs)} here; below {setting_text(floor(own))} rounding takes over."
 
 
 def in_time(rows: Sequence[LadderRow]) -> str:
@@ -150,8 +159,8 @@ def _costs(rows: Sequence[LadderRow], spent: Mapping[Setting, float]) -> dict[Se
 
 def _said(costs: Mapping[Setting, float]) -> str:
     """Return costs as a phrase."""
-    first, *others = (f"{told(setting)} costs {cost:.2g}x" for setting, cost in costs.items())
-    return " and ".join([f"{first} of {told(COARSE)}", *others])
+    first, *others = (f"{setting_text(setting)} costs {cost:.2g}x" for setting, cost in costs.items())
+    return " and ".join([f"{first} of {setting_text(COARSE)}", *others])
 
 
 def floor(rows: Sequence[LadderRow]) -> float:

@@ -106,7 +106,7 @@ def climbed(ladder: Ladder, repeats: int, on_run: Callable[[str], None] | None =
     """Yield a ladder's rows, setting by setting; a run that fails is a row too."""
     for setting in ladder.settings:
         if on_run:
-            on_run(f"{ladder.method} {told(setting)}")
+            on_run(f"{ladder.method} {setting_text(setting)}")
         before = current().positions
         try:
             result = ladder.run(setting)
@@ -152,7 +152,7 @@ def _judged(ladder: Ladder, quantity: str, outcome: Rung) -> tuple[float | None,
     return error, outcome.status
 
 
-def told(setting: Setting) -> str:
+def setting_text(setting: Setting) -> str:
     """Return a setting as a person writes it."""
     if isinstance(setting, str | int):
         return str(setting)

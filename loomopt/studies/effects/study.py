@@ -50,10 +50,10 @@ def known(scene: Scene) -> dict[Effect, Table]:
 def without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
     """Return the job's other effects, each with what it takes to study it: nothing is invented."""
     there = {effect.path[0] for effect in given}
-    return {name: _asked(effect) for name, effect in scene.schema.effects.items() if name not in there}
+    return {name: _checked_request(effect) for name, effect in scene.schema.effects.items() if name not in there}
 
 
-def _asked(effect: Effect) -> str:
+def _checked_request(effect: Effect) -> str:
     own = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
     keys = [f"{own}.{key}" for key, info in effect.own.model_fields.items() if info.is_required()]
     return f"no values: set {', '.join(keys)}" if keys else f"it has no values to set: --with {effect.name}"

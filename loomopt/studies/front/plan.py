@@ -230,7 +230,7 @@ def crossing(left: Spot, right: Spot) -> float | None:
     return found if left.b < found < right.b else None
 
 
-def told(front: Sequence[Spot], scale: FrontScale) -> tuple[list[Change], list[tuple[float, float]]]:
+def changes_and_gaps(front: Sequence[Spot], scale: FrontScale) -> tuple[list[Change], list[tuple[float, float]]]:
     """Return what changes along the front, and the stretches of b where nothing is better, SI, in the order of b."""
     changes, gaps = list[Change](), list[tuple[float, float]]()
     for left, right in itertools.pairwise(front):

@@ -388,7 +388,7 @@ def _certified(
         **vars(here),
         target=terms.target or "",
         status=found.status,
-        message=reason if found.reason else f"{_asked(words, terms, asking)} {report.stops(prices)}",
+        message=reason if found.reason else f"{_sought(words, terms, asking)} {report.stops(prices)}",
         binding=prices,
         certificate=certificate,
         solver={"accuracy": solver.accuracy},
@@ -416,7 +416,7 @@ def _explicit(terms: FrontTerms, certificate: Certificate) -> Iterator[Binding]:
         yield replace(each, limit=replace(limit, name=name), side=limit.sign, worth=worth)
 
 
-def _asked(words: Words, terms: FrontTerms, asking: Asking) -> str:
+def _sought(words: Words, terms: FrontTerms, asking: Asking) -> str:
     """Return what was sought as a sentence."""
     sought, other = terms.traded[asking.first], terms.traded[1 - asking.first]
     held = [

@@ -97,7 +97,7 @@ class Trade:
         """Nobody knows beforehand how many points it takes."""
 
     @property
-    def asked(self) -> dict[str, object]:
+    def conditions(self) -> dict[str, object]:
         """What is asked of every row, for people."""
         words, sought = Words(self.scene), zip(self.senses, self.labels, strict=True)
         found: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
@@ -210,9 +210,9 @@ class Trade:
         known, name = row.warm.get("axes", row.place), self.axes[axis]
         return {self.labels[axis]: known[name]} if name in known else {}
 
-    def told(self, row: Row) -> dict[str, object]:
+    def row_json(self, row: Row) -> dict[str, object]:
         """Return what `--json` prints of a row: both axes too."""
-        return {**row.told(), "axes": {**self.place(row), **self.sought(row)}}
+        return {**row.row_json(), "axes": {**self.place(row), **self.sought(row)}}
 
     def read(self, rows: Sequence[Row]) -> Findings:
         """Return the points of the front in the order of the second axis, then those without a design."""
@@ -335,7 +335,7 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
         said = f"{first} and {second} do not conflict: one design is best in both."
         return Findings((by_point[ENDS[0]],), said + _apart(study, rows))
     spots, _ = plan.spots(rows, scale)
-    changes, gaps = plan.told(spots, scale)
+    changes, gaps = plan.changes_and_gaps(spots, scale)
     best = tuple(by_point[spot.point] for spot in spots)
     message = f"{len(best)} designs between the {study.senses[1]} {second} and the {study.senses[0]} {first}."
     message += _apart(study, rows)

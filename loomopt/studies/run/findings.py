@@ -66,7 +66,7 @@ class SceneStudy(Study, Protocol):
         """Figures and multipliers that it is about."""
 
     @property
-    def asked(self) -> Mapping[str, object]:
+    def conditions(self) -> Mapping[str, object]:
         """What is asked of every row, for people."""
 
     @property
@@ -83,7 +83,7 @@ class SceneStudy(Study, Protocol):
     def sought(self, row: Row) -> Mapping[str, float]:
         """Return what it seeks beside its target at a row, SI."""
 
-    def told(self, row: Row) -> dict[str, object]:
+    def row_json(self, row: Row) -> dict[str, object]:
         """Return what `--json` prints of a row."""
 
     def read(self, rows: Sequence[Row]) -> Findings:

@@ -85,7 +85,7 @@ class Row:
         """Return the row that JSON data say."""
         return cls(**{**data, "multipliers": {Multiplier.read(each): v for each, v in data["multipliers"].items()}})
 
-    def told(self) -> dict[str, Any]:
+    def row_json(self) -> dict[str, Any]:
         """Return what `--json` prints of it: all but what only a neighbour needs."""
         return {name: value for name, value in self.as_dict().items() if name != "warm"}
 

@@ -7,7 +7,7 @@ import pytest
 from twisting_shafts import CENTRES, HALF, J4, OMEGA, PLAIN, read, sampler, shaft, twist
 
 import loomopt as lo
-from loomopt.base.quantities import exact
+from loomopt.base.quantities import shortest_text
 from loomopt.interface import tables
 from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
@@ -178,8 +178,8 @@ def test_equations_are_the_effect_s_own_and_the_product_obeys_them():
 def test_an_inch_machine_at_350_rpm_is_told_in_its_own_units():
     metric = shaft(2e6, 45.0).set("operation.speed", "350 rpm")
     changes = {
-        "effects.shaft_torsion.stiffness": exact(2e6, "lbf*ft/deg", "rotary stiffness"),
-        "effects.shaft_torsion.damping": exact(45.0, "lbf*ft*s/rad", "rotary damping"),
+        "effects.shaft_torsion.stiffness": shortest_text(2e6, "lbf*ft/deg", "rotary stiffness"),
+        "effects.shaft_torsion.damping": shortest_text(45.0, "lbf*ft*s/rad", "rotary damping"),
         "display.torque": "lbf*ft",
     }
     inches = metric.update(changes)

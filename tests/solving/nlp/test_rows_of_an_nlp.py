@@ -69,7 +69,7 @@ def test_a_built_nlp_has_the_rows_that_are_foretold(task, elastic):
     assert row_map(task, 0, elastic).sized(len(values)).size == len(values)
     limits = [task.limits[k] for k in nlp.rows.limits]
     _, extra = nlp.rows.parted(arguments["x0"])
-    ways = nlp.structure.ways
+    ways = nlp.structure.excess_places
     given = [extra[list(ways.get(k, ()))] for k in nlp.rows.limits]
     expected = [
         limit.excess(sampler) - (way[0] - way[1:].sum() if len(way) else 0.0)

@@ -142,5 +142,5 @@ def test_what_may_give_way_has_an_excess_and_a_row_of_its_own():
     sampler = Sampler(task.model, {"x": 1.0, "y": 0.5})
     plain, elastic = structure(task, sampler, 6), structure(task, sampler, 6, elastic=True)
     assert (plain.rows.extras, elastic.rows.extras) == (1, 3)
-    assert (plain.ways, elastic.ways) == ({}, {0: (0,), 1: (1,), 2: (2,)})
+    assert (plain.excess_places, elastic.excess_places) == ({}, {0: (0,), 1: (1,), 2: (2,)})
     assert plain.rows.limits == elastic.rows.limits == (0, 1)

@@ -43,7 +43,7 @@ def computed(answer, points=40):
 
 
 def told(rows):
-    return plan.told(plan.spots(rows, SCALE)[0], SCALE)
+    return plan.changes_and_gaps(plan.spots(rows, SCALE)[0], SCALE)
 
 
 def test_the_first_round_is_spread_evenly_over_one_gap():

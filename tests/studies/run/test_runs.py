@@ -128,7 +128,7 @@ def test_a_row_is_the_same_through_json():
     prices = {Multiplier("f", Side("l", "min")): -0.0}
     row = Row(3, {"a": 0.1}, 1, "failed", "why", {"l": 1e-300}, {"f": None, "g": 5e-324}, prices, {"f": True})
     assert Row.from_dict(json.loads(json.dumps(row.as_dict()))) == row
-    assert "warm" not in row.told()
+    assert "warm" not in row.row_json()
     with pytest.raises(TypeError):
         row.as_dict()["figures"]["f"] = 1.0
 

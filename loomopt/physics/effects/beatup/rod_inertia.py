@@ -23,7 +23,9 @@ class Own(Table):
     m2: PositiveMass = Field(description="mass of the connecting rod BC")
     s2: Length = Field(description="centre of mass of the rod from the crank pin B")
     JS2: PositiveInertia | None = Field(None, description="inertia of the rod about its centre of mass; exact only")
-    model: Literal["lumped", "exact"] = Field("lumped", description="two point masses, or the rigid rod itself")
+    model: Literal["lumped", "rigid_body_torque"] = Field(
+        "lumped", description="two point masses, or the rigid rod itself"
+    )
 
     @field_validator("model")
     @classmethod
@@ -43,7 +45,7 @@ def lumped(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     return torque + (own["m2"] - at_rocker) * given["l1"] ** 2 * pose.omega_dot
 
 
-def exact(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
+def rigid_body_torque(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     """Return the torque of the rod as a rigid body, N·m."""
     rod = pose.joints
     s2 = own["s2"] * given["l2"] / given["today.l2"]
@@ -59,7 +61,7 @@ def exact(maths: Maths, pose: ReedPose, given: Values, own: Values) -> Number:
     return torque + inertia * pose.omega_dot
 
 
-MODELS: dict[str, Callable[[Maths, ReedPose, Values, Values], Number]] = {"lumped": lumped, "exact": exact}
+MODELS: dict[str, Callable[[Maths, ReedPose, Values, Values], Number]] = {"lumped": lumped, "exact": rigid_body_torque}
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
