@@ -90,7 +90,7 @@ def solve(
     return results.solved(found, own)
 
 
-def evaluate(scene: Given, design: Design | solution.Evaluation | None = None, target: str | None = None) -> Evaluation:
+def evaluate(scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
 
     design: a mapping, or an answer, of which the design alone is taken: `answer.evaluate()` takes its scene and target
@@ -101,7 +101,7 @@ def evaluate(scene: Given, design: Design | solution.Evaluation | None = None, t
 
 
 def prove(
-    scene: Given, design: Design | solution.Evaluation | None = None, target: str | None = None, *, slack: float = SLACK
+    scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None, *, slack: float = SLACK
 ) -> "Proofs":
     """Return proofs that a design's limits (SI; today's without one) hold at every crank angle, or where they fail.
 
@@ -117,7 +117,7 @@ def prove(
 
 def simulate(
     scene: Given,
-    design: Design | solution.Evaluation | None = None,
+    design: Design | solution.Evaluated | None = None,
     target: str | None = None,
     *,
     accuracy: float | None = None,
@@ -227,9 +227,9 @@ def _scene(given: Given) -> Scene:
     return given if isinstance(given, Scene) else load(given)
 
 
-def _design(given: Design | solution.Evaluation | None, scene: Scene) -> dict[str, float]:
+def _design(given: Design | solution.Evaluated | None, scene: Scene) -> dict[str, float]:
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
-    if isinstance(given, solution.Evaluation):
+    if isinstance(given, solution.Evaluated):
         if given.scene:
             from loomopt.scenes import designs
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Evaluation(solution.Evaluation, records.Shown):
+class Evaluation(solution.Evaluated, records.Shown):
     """A given design in its scene: its figures and limits, SI and rad; nothing was optimised.
 
     target: whose limits it was judged by.
@@ -169,9 +169,9 @@ def solved(found: solution.Solution, scene: Scene) -> Answer:
     return Answer(**_fields(found) | {"scene": scene})
 
 
-def _judged(found: solution.Evaluation, scene: Scene, target: str) -> Evaluation:
+def _judged(found: solution.Evaluated, scene: Scene, target: str) -> Evaluation:
     return Evaluation(**_fields(found) | {"scene": scene, "target": target})
 
 
-def _fields(found: solution.Evaluation) -> dict[str, Any]:
+def _fields(found: solution.Evaluated) -> dict[str, Any]:
     return {entry.name: getattr(found, entry.name) for entry in dataclasses.fields(found)}

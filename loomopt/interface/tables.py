@@ -14,7 +14,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes import designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluation, Solution
+from loomopt.solving.answer.solution import Evaluated, Solution
 from loomopt.solving.answer.words import Words
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 REACHED = {None: "", True: "yes", False: "no"}
 
 
-def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
+def answer(solution: Evaluated, scene: Scene) -> "pd.DataFrame":
     """Return one row per design variable and figure: today, design, limits and unit, in the scene's display units.
 
     Where no design is admissible, the nearest one's column is "relaxed". binds: the side, min or max, on which a solved
@@ -46,7 +46,7 @@ def answer(solution: Evaluation, scene: Scene) -> "pd.DataFrame":
     return frame.rename(columns={"design": "relaxed"} if relaxed else {}).set_index("name")
 
 
-def rows(solution: Evaluation, scene: Scene, before: Evaluation | None = None) -> list[dict[str, Any]]:
+def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> list[dict[str, Any]]:
     """Return the rows of `answer` as plain data, what is only rounding as 0; before: today's.
 
     A figure the scene cannot have is left out.
@@ -110,7 +110,7 @@ def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def row(solution: Evaluation, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
+def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
     """Return design and figures as one row, units in the column names; si: in SI, else in the scene's own units.
 
     A figure the scene cannot have is left out; part of a design that is a list is a tuple in its cell, SI.

@@ -12,7 +12,7 @@ from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_req
 if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
-    from loomopt.solving.answer.solution import Evaluation
+    from loomopt.solving.answer.solution import Evaluated
 
 Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
 Set = Annotated[
@@ -38,7 +38,7 @@ def remarked(scene: "Scene", design: "DesignGiven") -> None:
         remark(f"Remark: {text}.")
 
 
-def printed(found: "Evaluation") -> None:
+def printed(found: "Evaluated") -> None:
     """Print one JSON object."""
     from loomopt.interface.files import outputs
 

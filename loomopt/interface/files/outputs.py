@@ -18,7 +18,7 @@ from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluation, Solution
+from loomopt.solving.answer.solution import Evaluated, Solution
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +53,7 @@ class DrawnSubject(NamedTuple):
         return f"{self.name}; limits not held: {', '.join(self.broken)}" if self.broken else self.name
 
 
-def document(found: Evaluation) -> str:
+def document(found: Evaluated) -> str:
     """Return an evaluation or an answer as one JSON object; what is undefined is null."""
     return json_text({"loomopt": __version__, **found.as_dict()})
 
@@ -162,7 +162,7 @@ def curves(
         atomically(path, functools.partial(figure.save, drawn))
 
 
-def plot(found: Evaluation, scene: Scene, target: str, path: Path | None) -> "Figure":
+def plot(found: Evaluated, scene: Scene, target: str, path: Path | None) -> "Figure":
     """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.interface.figures import figure
 
@@ -198,7 +198,7 @@ def plotted(
     return drawn
 
 
-def what(found: Evaluation, target: str | None = None, status: str | None = None) -> DrawnSubject:
+def what(found: Evaluated, target: str | None = None, status: str | None = None) -> DrawnSubject:
     """Say what the design of an evaluation or of an answer is.
 
     target, status: of the answer whose design was evaluated, where it was one's.

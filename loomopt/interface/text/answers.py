@@ -10,7 +10,7 @@ from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluation, Solution, remedies
+from loomopt.solving.answer.solution import Evaluated, Solution, remedies
 from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.verdict import GlobalBound
 
@@ -48,7 +48,7 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     return parts
 
 
-def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> list[str | Grid]:
+def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list[str | Grid]:
     """Return the parts of an evaluated design; before: today's machine, where the design is another."""
     broken = ", ".join(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     rounded = ", ".join(limit.name for limit in found.limits if limit.rounding)
@@ -59,7 +59,7 @@ def evaluation(found: Evaluation, scene: Scene, before: Evaluation | None) -> li
     return [f"{found.problem}: {held}", table, *lists(found, scene)]
 
 
-def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, heading: str) -> Grid:
+def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits; what binds and what is reached is marked."""
     table = rows(found, scene, before)
     marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
@@ -80,7 +80,7 @@ def comparison(found: Evaluation, scene: Scene, before: Evaluation | None, headi
     return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right=tuple(range(1, len(first) + 1)))
 
 
-def lists(found: Evaluation, scene: Scene) -> list[str]:
+def lists(found: Evaluated, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
     told = registry.of(scene).views.lists
     return [
@@ -90,7 +90,7 @@ def lists(found: Evaluation, scene: Scene) -> list[str]:
     ]
 
 
-def retyped(found: Evaluation, scene: Scene) -> str:
+def retyped(found: Evaluated, scene: Scene) -> str:
     """Return a design to type again, with the digits it takes to be the same: a JSON object, text with units."""
     words, told = Words(scene), []
     for name, value in found.design.items():

@@ -12,7 +12,7 @@ from loomopt.jobs import registry
 from loomopt.picture.shapes import Drawing
 from loomopt.scenes.designs import Design
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluation, Proofs, Solution
+from loomopt.solving.answer.solution import Evaluated, Proofs, Solution
 
 PAGE = 720
 """Longer side of a drawing on a page of a notebook, pixels."""
@@ -58,7 +58,7 @@ def html(thing: object) -> str:
             return page(scenes.parts(thing), _drawn(thing, {}))
         case Solution(scene=Scene() as scene):
             return page(answers.solution(thing, scene), _drawn(scene, thing.design, outputs.what(thing)))
-        case Evaluation(scene=Scene() as scene):
+        case Evaluated(scene=Scene() as scene):
             return page(answers.evaluation(thing, scene, None), _drawn(scene, thing.design, outputs.what(thing)))
         case Proofs():
             return page(answers.proofs(thing))

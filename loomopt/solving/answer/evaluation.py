@@ -16,13 +16,13 @@ from loomopt.model.session import working
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluation, Finding
+from loomopt.solving.answer.solution import Evaluated, Finding
 from loomopt.solving.answer.words import Words
 from loomopt.solving.options import target_name
 
 
 @working()
-def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluation:
+def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: str | None = None) -> Evaluated:
     """Return figures and limits of a design (SI; today's without one), nothing optimised.
 
     target: whose limits, the job's default without one. A limit that is exceeded by less than the rounding of the
@@ -38,20 +38,20 @@ def evaluate(scene: Scene, design: Mapping[str, float] | None = None, target: st
 
 
 @working()
-def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluation:
+def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) -> Evaluated:
     """Return figures and limits of a design (full names, SI; what it does not name stays today's)."""
     return evaluation(scene, job, job.program(scene, target), {**job.today(scene), **design})
 
 
 @working()
-def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluation:
+def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluated:
     """Return a design's figures and limits, each limit judged from the figures alone."""
     figures = job.figures(scene, design)
     words = Words(scene)
     labels = numbers.labels(scene)
     named = {labels.get(name, name): value for name, value in design.items()}
     shown = designs.packed(named, scene.schema.lists)
-    return Evaluation(
+    return Evaluated(
         problem=scene.name,
         effects=tuple(scene.effects),
         design=shown,
@@ -102,10 +102,10 @@ of more are a computer's."""
 CONVERTED = 1e-15
 """Relative; what a float of few digits may be off after its unit was converted: a few roundings."""
 
-Evaluate = Callable[[Mapping[str, float]], Evaluation]
+Evaluate = Callable[[Mapping[str, float]], Evaluated]
 
 
-def _with_rounding(found: Evaluation, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluation:
+def _with_rounding(found: Evaluated, scene: Scene, design: Mapping[str, float], evaluate: Evaluate) -> Evaluated:
     """Return an evaluation that is not admissible with limits that say whether rounding alone exceeds them.
 
     design: all of it by full names, SI; evaluate(design): the same evaluation of another design.

@@ -9,13 +9,13 @@ from loomopt.jobs.base import Job
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.evaluation import evaluated, evaluation
-from loomopt.solving.answer.solution import ADVICE, Clash, Evaluation, Price, Relaxation, Solution, remedies
+from loomopt.solving.answer.solution import ADVICE, Clash, Evaluated, Price, Relaxation, Solution, remedies
 from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.verdict import Certificate, GlobalBound
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.search.search import Candidate, Search, compared
 
-Today = Callable[[], Evaluation]
+Today = Callable[[], Evaluated]
 """Evaluates today's machine."""
 NOT_SOLVED = {"status": "Not_Assembled", "iterations": 0}
 """What is said of the solver where no start assembles."""
@@ -108,7 +108,7 @@ def with_optimum(
     job: Job,
     scene: Scene,
     target: str,
-    here: Evaluation,
+    here: Evaluated,
     certificate: Certificate,
     solver: Mapping[str, Any],
     today: Today,
@@ -173,7 +173,7 @@ def _helps(relaxations: Sequence[Relaxation]) -> str:
 
 def without_optimum(
     target: str,
-    here: Evaluation,
+    here: Evaluated,
     found: Clash,
     solver: Mapping[str, Any],
     today: Today,

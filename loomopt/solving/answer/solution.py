@@ -174,7 +174,7 @@ class Terms(Protocol):
     def axes(self) -> Sequence[str]:
         """The figures that are sought."""
 
-    def evaluation(self, design: Mapping[str, float]) -> "Evaluation":
+    def evaluation(self, design: Mapping[str, float]) -> "Evaluated":
         """Return figures and limits of a design, SI."""
 
     def proofs(self, design: Mapping[str, float], slack: float) -> "Proofs":
@@ -182,7 +182,7 @@ class Terms(Protocol):
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Evaluated:
     """A given design: its figures and limits, SI and rad."""
 
     problem: str
@@ -221,7 +221,7 @@ class Evaluation:
 
 
 @dataclass(frozen=True)
-class Solution(Evaluation):
+class Solution(Evaluated):
     """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
 
     target: str = ""
@@ -242,7 +242,7 @@ class Solution(Evaluation):
     """What was proven at every crank angle, where that was asked for."""
     global_bound: GlobalBound | None = None
     """What is proven of all admissible designs, where that was asked for."""
-    today: Callable[[], Evaluation] | None = None
+    today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
     """Where the solver stood: what a neighbour's solve can start from."""
@@ -252,7 +252,7 @@ class Solution(Evaluation):
         freeze(self, "design", "figures", "units", "reached", "solver", "time")
 
     @lazy
-    def before(self) -> Evaluation | None:
+    def before(self) -> Evaluated | None:
         """Today's machine, evaluated when it is first read."""
         return self.today() if self.today else None
 

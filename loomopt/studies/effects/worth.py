@@ -13,7 +13,7 @@ from loomopt.model.program import Program
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import evaluation
-from loomopt.solving.answer.solution import Evaluation, Finding
+from loomopt.solving.answer.solution import Evaluated, Finding
 from loomopt.studies.run.rows import Row
 
 NEEDED, EVALUATED = "needed", "evaluated"
@@ -151,9 +151,7 @@ class Judge:
         nothing = dict.fromkeys(self.objectives)
         return Worth(name, nothing, nothing, None, False, NEEDED, why)
 
-    def _changes(
-        self, there: Evaluation, change: Callable[[Objective, float, float], float]
-    ) -> dict[str, float | None]:
+    def _changes(self, there: Evaluated, change: Callable[[Objective, float, float], float]) -> dict[str, float | None]:
         found: dict[str, float | None] = {}
         for figure, objective in self.objectives.items():
             now, then = self.here.figures.get(figure), there.figures.get(figure)
@@ -167,7 +165,7 @@ class Judge:
         most = objective.power < 0 or (axis is not None and axis.senses[0] == "most")
         return objective.worsening(now, then, most)
 
-    def _excess(self, there: Evaluation) -> float:
+    def _excess(self, there: Evaluated) -> float:
         """Return by how much a design exceeds the limit that it exceeds most, in its natural size."""
         sizes = _limit_sizes(self.program)
         return max((_exceeded(each) / sizes.get(each.name, 1.0) for each in there.limits), default=0.0)
@@ -217,7 +215,7 @@ def _scales(objectives: Mapping[str, Objective], given: Scene, target: str) -> d
     return {figure: float(own[figure].scale ** (1 / own[figure].power)) for figure in objectives}
 
 
-def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evaluation:
+def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evaluated:
     """Return a design, of which only the numbers count that a scene has. Raises BadInput."""
     numbers = registry.of(scene).numbers(scene)
     own = {

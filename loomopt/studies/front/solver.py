@@ -17,7 +17,7 @@ from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import evaluation, report
-from loomopt.solving.answer.solution import Clash, Evaluation, Finding, Solution
+from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution
 from loomopt.solving.answer.words import Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
@@ -278,12 +278,12 @@ class FrontTerms:
         """The scene's job."""
         return registry.of(self.scene)
 
-    def evaluation(self, design: Mapping[str, float]) -> Evaluation:
+    def evaluation(self, design: Mapping[str, float]) -> Evaluated:
         """Return a design's figures and limits; design: SI, what it does not name is today's."""
         named = {self.scene.full(name): value for name, value in design.items()}
         return self.whole({**self.job.today(self.scene), **named})
 
-    def whole(self, design: Mapping[str, float]) -> Evaluation:
+    def whole(self, design: Mapping[str, float]) -> Evaluated:
         """Return figures and limits of a design by full names, SI."""
         found = evaluation.evaluation(self.scene, self.job, self.base, design)
         limits = list(found.limits)
@@ -299,7 +299,7 @@ class FrontTerms:
         program = replace(self.program, limits=_named(self))
         return replace(whole_cycle.prove(self.scene, design, self.target, slack, program), target=self.said)
 
-    def _finding(self, cap: Cap, found: Evaluation, design: Mapping[str, float]) -> Finding:
+    def _finding(self, cap: Cap, found: Evaluated, design: Mapping[str, float]) -> Finding:
         """Return the limit on an axis beside its figure."""
         axis, most = cap
         values = {**self.program.parameters, **self.job.values(self.program, design)}
@@ -378,7 +378,7 @@ def clashing(solver: Solver, program: Program) -> Clash:
 
 
 def _certified(
-    solver: Solver, terms: FrontTerms, here: Evaluation, certificate: Certificate, found: Reached, asking: Asking
+    solver: Solver, terms: FrontTerms, here: Evaluated, certificate: Certificate, found: Reached, asking: Asking
 ) -> Solution:
     """Return the answer of a design that was reached."""
     words = Words(solver.scene)

@@ -16,7 +16,7 @@ import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.cli.app import run
 from loomopt.interface.files import outputs
-from loomopt.solving.answer.solution import Evaluation, Finding
+from loomopt.solving.answer.solution import Evaluated, Finding
 
 ezdxf: Any = importlib.import_module("ezdxf")
 
@@ -90,7 +90,7 @@ def test_evaluate_without_a_design_is_todays_machine(capsys):
 
 def test_an_undefined_number_is_null():
     limits = (Finding("r4", math.nan, None, 1.0, False),)
-    found = Evaluation("loom", (), {"l1": 0.03}, {"r4": None, "swing": math.inf}, {"l1": "m"}, limits)
+    found = Evaluated("loom", (), {"l1": 0.03}, {"r4": None, "swing": math.inf}, {"l1": "m"}, limits)
     data = json.loads(outputs.document(found), parse_constant=pytest.fail)
     assert data["figures"] == {"r4": None, "swing": None}
     assert data["limits"][0]["value"] is None

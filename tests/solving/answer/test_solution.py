@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from loomopt.solving.answer.solution import Evaluation, Finding, Relaxation, Solution, certificate_dict
+from loomopt.solving.answer.solution import Evaluated, Finding, Relaxation, Solution, certificate_dict
 from loomopt.solving.certificate.verdict import Certificate, Level
 
 HELD, BROKEN = Finding("p", 1.0, None, 2.0, True), Finding("q", 3.0, None, 2.0, False)
@@ -32,7 +32,7 @@ def test_what_helps_is_told_only_where_limits_clash():
 
 @pytest.mark.parametrize(("limits", "admissible"), [((), True), ((HELD,), True), ((HELD, BROKEN), False)])
 def test_a_design_is_admissible_where_every_limit_holds(limits, admissible):
-    assert Evaluation("toy", (), {}, {}, {}, limits).admissible == admissible
+    assert Evaluated("toy", (), {}, {}, {}, limits).admissible == admissible
 
 
 def test_a_solution_that_says_nothing_failed():
@@ -43,7 +43,7 @@ def test_a_solution_that_says_nothing_failed():
 
 def test_figures_that_are_no_number_are_none():
     figures = {"a": math.nan, "b": -math.inf, "c": None, "d": 0.5}
-    assert Evaluation("toy", (), {}, figures, {}, ()).as_dict()["figures"] == {
+    assert Evaluated("toy", (), {}, figures, {}, ()).as_dict()["figures"] == {
         "a": None,
         "b": None,
         "c": None,
