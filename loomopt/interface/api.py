@@ -229,10 +229,10 @@ def _scene(given: Given) -> Scene:
 
 def _design(given: Design | solution.Evaluated | None, scene: Scene) -> dict[str, float]:
     """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
+    from loomopt.scenes import designs
+
     if isinstance(given, solution.Evaluated):
         if given.scene:
-            from loomopt.scenes import designs
-
             designs.check_job(given.scene.job, scene, "<answer>")
         given = given.design
     return designs.checked(given, scene) if given else {}

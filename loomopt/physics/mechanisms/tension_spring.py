@@ -54,7 +54,8 @@ class Coil:
     @property
     def wahl(self) -> Number:
         """Wahl's factor K_W = (4C − 1)/(4C − 4) + 0.615/C: curvature and direct shear [Shigley, eq 10-4]."""
-        return (4 * self.index - 1) / (4 * self.index - 4) + 123 / (200 * self.index)
+        index = self.index
+        return (4 * index - 1) / (4 * index - 4) + 123 / (200 * self.index)
 
     @property
     def body_turns(self) -> Number:

@@ -10,7 +10,7 @@ from support import toy
 
 import loomopt as lo
 from loomopt.solving.nlp.point import Point, Settings
-from loomopt.solving.search import multistart
+from loomopt.solving.search import elastic
 from loomopt.solving.search.multistart import BETTER, MORE_STARTS, searched
 from loomopt.solving.search.screening import DESIGNS
 from loomopt.solving.search.search import Search
@@ -126,7 +126,7 @@ def test_where_limits_clash_no_more_starts_are_tried(certified, solved):
     points.append(Point(program.starts[0], "Infeasible_Problem_Detected", False))
     nearest = Point({"x": 1.0, "y": 0.0}, "Solve_Succeeded", True, relaxed={0: 1.0}, extra=np.ones(1))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(multistart, "least", lambda *_: nearest)
+        patch.setattr(elastic, "least", lambda *_: nearest)
         found = wide(program)
     assert len(calls) == 1
     assert found.clashes
@@ -140,7 +140,7 @@ def test_where_a_design_needs_no_relaxation_it_is_solved_from_there(certified, s
     points += [Point({"x": 2.0, "y": 0.0}, "Solve_Succeeded", True)] * 40
     nearest = Point({"x": 2.5, "y": 0.0}, "Solve_Succeeded", True, extra=np.zeros(1))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(multistart, "least", lambda *_: nearest)
+        patch.setattr(elastic, "least", lambda *_: nearest)
         found = wide(program)
     assert calls[1][0] == {"x": 2.5, "y": 0.0}
     assert found.passed

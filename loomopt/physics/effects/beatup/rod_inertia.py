@@ -23,9 +23,7 @@ class Own(Table):
     m2: PositiveMass = Field(description="mass of the connecting rod BC")
     s2: Length = Field(description="centre of mass of the rod from the crank pin B")
     JS2: PositiveInertia | None = Field(None, description="inertia of the rod about its centre of mass; exact only")
-    model: Literal["lumped", "rigid_body_torque"] = Field(
-        "lumped", description="two point masses, or the rigid rod itself"
-    )
+    model: Literal["lumped", "exact"] = Field("lumped", description="two point masses, or the rigid rod itself")
 
     @field_validator("model")
     @classmethod
