@@ -20,7 +20,6 @@ from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, Unit
 NARROWEST = 1e-10
 """rad: the least pulse, rise and return; a hundred times SAME_ANGLE."""
 
-
 NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 QUANTITY_PATTERN = "x-quantity"
 _UNIT_PATTERN = r"(?:1/)?[^\s0-9.,+-][^\s,]*"

@@ -13,16 +13,13 @@ CONE_STEPS = 30
 heuristic, for the problem is NP-hard: of 2800 random cones of 3 to 5 dimensions, of which under 2 % falls, none was
 missed; with one step some are (tests/maths/test_cone.py)."""
 
-
 CONE_OPEN, CONE_TIP = 1e-9, 1e-9
 """Slope up to which a unit direction does not leave a limit, and length below which a projection is the cone's tip:
 what non-negative least squares leaves of ROUNDING times the condition of a few dozen slopes."""
 
-
 NNLS_PULL, NNLS_GONE, NNLS_RANK, NNLS_EXCHANGES = 1e-13, 1e-15, 1e-14, 10
 """Non-negative least squares: pull of a column that enters, size of one that leaves, singular value that counts, each
 about a hundred roundings; exchanges allowed per column (Lawson and Hanson need about one)."""
-
 
 Floats = NDArray[np.float64]
 

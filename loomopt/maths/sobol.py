@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-
 BITS = 32
 POLYNOMIALS = (
     (1, 0, (1,)),

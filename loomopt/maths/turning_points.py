@@ -12,7 +12,6 @@ TURN_SAMPLES, CROSSING_STEPS, CROSSING_WIDTH = 720, 200, 4e-16
 """Samples between which a motion's turn is sought, as many as an extreme; secants and halvings of what brackets it (a
 third of them halve: 66 are past any float), and the share of an angle that two neighbouring floats are apart."""
 
-
 Floats = NDArray[np.float64]
 
 

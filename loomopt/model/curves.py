@@ -22,20 +22,16 @@ SPARSE_STEPS = ((1e-3, 90), (1e-6, 180), (0.0, 360))
 """Equal steps of one turn that curves of few rows begin with, by accuracy; no stretch between corners gets fewer than
 LEAST_SHARE of them. Half the samples that are enough: rows are added around what they show."""
 
-
 SPARSE_ROUNDS, SPARSE_MOST_ROWS = 40, 20_000
 """Rounds in which rows are added, each of which narrows a top's neighbourhood threefold (3^40 is past rounding), and
 rows beyond which a curve is as dense as any plot."""
-
 
 SPARSE_NEARLY, SPARSE_LEVEL = 0.8, 2e-13
 """Share of a column's largest magnitude above which another top may turn out higher: a top between 90 rows stands less
 than a fifth above them. Share by which rows on a level may differ: a thousand roundings of the terms they sum."""
 
-
 SAME_ROW = 1e-9
 """rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
-
 
 STEPS = 720
 ANGLE = "phi [rad]"
@@ -43,7 +39,6 @@ POWER = "motor_power [W]"
 ALIKE = 1e-12
 """Share of a quantity's largest magnitude by which two of its largest values are one: they mirror each other."""
 COLUMN = re.compile(r"(?P<name>.+) \[(?P<unit>.+)\]")
-
 
 Rows = tuple[Pieces, Floats, Floats]
 """Nodes (pieces, u), and their crank angles, rad."""

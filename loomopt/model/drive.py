@@ -18,7 +18,6 @@ FIGURES = (
     ),
 )
 
-
 SPEED, MOTOR = "omega", "motor_torque"
 KINDS = {SPEED: "angular speed", MOTOR: "torque"}
 """What is told over the cycle of a crank whose speed changes: its speed, and the motor's own torque."""

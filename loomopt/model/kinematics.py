@@ -20,11 +20,9 @@ from loomopt.physics.tolerances import ASSEMBLY_MARGIN
 NEARLY_SINGULAR = 5e-4
 """Share by which a dyad's triangle closes, below which peaks stand so close that even samples miss them."""
 
-
 SINGULAR_SAMPLES, WORTH_A_LOOK = 361, 10
 """Samples of one turn between which the closest position of a triangle is sought, and how many times NEARLY_SINGULAR
 its share may be there: between samples a degree apart a top stands at most 4e-5 of its curvature higher."""
-
 
 OfPhi = Callable[[Maths, Given, Number, Callable[[], Any]], Number]
 """formula(maths, given, phi, pose): pose is called where it is read."""

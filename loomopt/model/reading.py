@@ -22,10 +22,8 @@ GAUSS_NODES = 32
 right to 2e-10 with 8 of them and to rounding with 12 (benchmarks/measure/tolerances.py); the rest is for narrower
 peaks."""
 
-
 WORTH_IT = 64
 """Evaluations after which a formula is recorded: that takes 1 to 3 ms, and saves some 30 us of each."""
-
 
 AtNode = Callable[[Node], tuple[Number, ...]]
 

@@ -23,11 +23,9 @@ LEAST_NODES = 8
 """Nodes that the narrowest of many pieces gets at least: more than 16 pieces share twice the samples. A piece of a free
 cam law is one cubic, which the five points that refine an extreme hold exactly."""
 
-
 CLOSER = 1 / 8
 """Step, in samples, of the five points that refine a sampled extreme: their quartic errs by the step's 6th power, 4e-6
 of what the samples' own would, and values a step apart still differ by far more than rounding."""
-
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""

@@ -6,7 +6,6 @@ Those of one file alone stand in it, a job's own in the job's.
 ASSEMBLY_MARGIN = 1.001
 """Factor to spare by which every dyad's triangle must close at both ends (assembly margins of all jobs)."""
 
-
 NO_MASS = 1e-9
 """Share of the largest counterweight below which there is none: IPOPT stops this far inside its bounds (beatup)."""
 
@@ -19,10 +18,8 @@ SAMPLES, LEAST_SHARE = 720, 8
 """Samples of one turn from which extremes are refined at the usual accuracy, and the part of them that the narrowest
 piece gets. `loomopt accuracy` (refined points) is exact from 180 on today's machines; fourfold for sharper peaks."""
 
-
 SAME_ANGLE = 1e-12
 """rad: a piece that ends this close before an angle ends at it, a thousand roundings."""
-
 
 START_ROOM = 0.01
 """Share of a bound's width that a start keeps from its ends: IPOPT would push it there."""
@@ -34,7 +31,6 @@ START_ROOM = 0.01
 # (counts: half and double). What is not said below changes no objective there by 4e-11, nor IPOPT's iterations by a
 # tenth.
 
-
 NEAR, ROUNDING = 1e-8, 1e-12
 """Largest excess between nodes that ends the exchange whatever the accuracy: Newton's method must start near. And the
 smallest that is asked: a sum of rounded terms cannot be told closer."""
@@ -43,11 +39,9 @@ BINDING = 1e-6
 """Multiplier above which a row binds where a solve ends: IPOPT leaves TOLERANCE/distance, so what is farther than 1e-5
 from its bound is below it. A row wrongly held is told by the certificate."""
 
-
 FEW_CHOICES = 8
 """Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
 slopes and curvatures dense. Named cam laws have five pieces at most."""
-
 
 TOUCHING, SETTLED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
@@ -59,7 +53,6 @@ what just binds, IPOPT_TOLERANCE/BINDING; the singular value below which rows de
 
 POLISH_MET, POLISH_DONE = 1e-12, 1e-13
 """Excess of a polished row that is rounding of its terms, and the step after which there is none left to take."""
-
 
 SAME_NODE = 1e-3
 """Nodes of one piece this close in u stand for one extreme: less than a sample apart, they are no two maxima."""
@@ -73,13 +66,11 @@ SAME_NODE = 1e-3
 ACCURACY, TIGHTEST, COARSEST = 1e-8, 1e-11, 0.1
 """Relative accuracy of whole-cycle values: usual, tightest (a sampled extreme is right to 1e-12), coarsest allowed."""
 
-
 FEASIBLE = 1e-9
 """What a limit may be exceeded by and still hold. Two decades above IPOPT's constr_viol_tol; certificate, findings."""
 
 STATIONARY = 1e-6
 """Slope that KKT multipliers may leave: an objective that curves by 1 is then within 1e-12 of its least."""
-
 
 ACTIVE = 1e-7
 """Distance from its bound at which a row takes part in the KKT system: ten times what complementarity lets pass."""
@@ -97,17 +88,14 @@ resolve, where curvature of size 1 within the distance ACTIVE makes dependent sl
 FLAT = 1e-7
 """Curvature, and slope of a touching row, that counts as none: ACTIVE's effect on a slope, where curvature is 1."""
 
-
 JET_ERROR, DOUBT = 1e-10, 10.0
 """Error of jets, relative to the largest derivative of a row where that exceeds 1: a hundred times what is seen. 1500
 certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 6e-13 (see
 test_derivatives_jets.py). And the factor from its threshold within which a figure that decides is looked at again in
 40 digits."""
 
-
 CORRECTIONS, PRECISE = 4, 1e-9
 """Newton's steps after a solve, each of which doubles the digits (1e-6 needs two), and the residual that ends them."""
-
 
 THIRD_STEP, THIRD_STEPS = "1e-8", (4e-3, 2e-3, 1e-3)
 """Steps of third derivatives. At 40 digits central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-16. In floats by
@@ -116,23 +104,18 @@ differences of the curvatures, extrapolated: their rounding of 1e-16/1e-3 = 1e-1
 NEWTON_SHIFT = "1e-3"
 """How far, in u, one Newton step may move a sampled extreme: it is right to 1e-8, what moves farther is no extreme."""
 
-
 GIVES_WAY, MOVED = 1e-12, 1e-9
 """What a limit may give way to a silent level, and the least move of a variable that is told as a choice."""
 
-
 SAME_OBJECTIVE = 1e-7
 """Objectives that agree to this are one optimum: ten times the usual accuracy."""
-
 
 PRICED, NEEDED, CHEAP, SCREENED = 1e-6, 1e-9, 1e-9, 1e-5
 """Least relaxation: multiplier above which a limit belongs to the clash; excess that is none; cost of the excess of a
 limit that is tried alone, beside 1 of all others; their sum from which it does not suffice."""
 
-
 SLACK, LEAST_SLACK, MOST_SLACK = 1e-8, 1e-13, 0.1
 """What a proof leaves open, relative to a quantity's largest magnitude: usual, what balls resolve, most allowed."""
-
 
 ROUNDED = 1e-15
 """Nothing is known better, relative to its natural size: the least error an answer claims."""
@@ -140,7 +123,6 @@ ROUNDED = 1e-15
 # Pictures
 #
 # How closely a curve is drawn, and what is shown of a number.
-
 
 SHOWN_AS_ZERO = 1e-8
 """Share of the largest number of its kind below which one is shown as 0: the accuracy asked by default."""

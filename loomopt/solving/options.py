@@ -14,7 +14,6 @@ from loomopt.scenes.scene import Scene
 MOST_STARTS = 10_000
 """Starts that may be asked for: hours; more is a slip of the pen."""
 
-
 GAP, SECONDS = 1e-3, 60.0
 """What a proof that no design is better leaves open, relative to each objective, and how long it may take: usual."""
 OMITTED = 0.01

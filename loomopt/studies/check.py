@@ -26,7 +26,6 @@ REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 """Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
 which moves more than its objective does."""
 
-
 LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""
 LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}

@@ -43,7 +43,6 @@ CURVE_CLOSE, CURVE_NARROW, CURVE_PROMISED = 5e-7, 1e-8, 2.0
 """How far, m, a traced curve may lie from the true one, measured at nine points of each chord, or as a share of a huge
 machine; and the chord tolerance that is promised over what is measured."""
 
-
 WIDEST = math.radians(2.0)
 """rad; width of the first intervals."""
 INSIDE = np.linspace(0.0, 1.0, 9)

@@ -26,15 +26,12 @@ from loomopt.solving.nlp.point import Settings
 COMPLEMENTARY = 1e-8
 """Multiplier times distance of a limit: what the objective might still gain by meeting it. The usual accuracy."""
 
-
 LARGEST_PRICE = 1e6
 """Multiplier above which there is no KKT point: STATIONARY times it is a slope of 1. Hock-Schittkowski's degenerate
 problems end at 2e16, every packaged scene below 1e2."""
 
-
 LARGEST_VARIABLE = 1e8
 """Variable above which slopes cannot be trusted: floats then resolve no better than 1e-8 of a natural size."""
-
 
 SECOND_ORDER_OPEN = "second order open"
 """The reason of a certificate that neither curvature nor higher orders decide."""

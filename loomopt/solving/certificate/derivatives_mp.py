@@ -22,7 +22,6 @@ DIGITS, FIRST_STEP, SECOND_STEP = 40, "1e-20", "1e-12"
 """Digits of the number system, and the steps of its differences. First, one-sided: error 1e-20 of both kinds. Second,
 central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-24."""
 
-
 Vector = Sequence[Number] | Floats
 
 

@@ -140,10 +140,8 @@ def inverted(slopes: Floats) -> Floats:
 PROBES = 1e-2, 3e-3
 """Steps along a direction without curvature at which the Lagrangian is read: at both of them it must fall."""
 
-
 FALLEN, FALL_MARGIN = 1e-12, 10.0
 """Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
-
 
 FALL_GROWTH = 18.0
 """How many times a fall within the error of an earlier level's valley must grow from the second probe to the first

@@ -34,11 +34,9 @@ FAINT = 1e-4
 """Curvature up to which a direction is looked along at PROBES, for what higher orders do there: at a step of 1e-2 a
 cubic term of size 1 outweighs it (toys of tests/solving/certificate/test_certificate_adversary.py)."""
 
-
 NEWTON_CURVED, NEWTON_DONE = 1e-5, 1e-13
 """Curvature that Newton's step may follow: a slope of STATIONARY then moves a design by 0.1 at most. Slope and distance
 that leave nothing to correct: a hundred times rounding."""
-
 
 FOLLOWED = 3
 """Directions without curvature all of which are followed: of more, whose lines grow as their square, those that fall

@@ -26,11 +26,9 @@ MOST_BOXES, MEAN_BOXES = 20_000, 2048
 """Boxes of crank angle after which a bound is undecided (every packaged row takes under 2000), and over which a mean is
 enclosed: the cube of a width of 1/2048 is 1e-10."""
 
-
 NEAR_TOP = 1.5
 """Widths between a box's middle and a refined top within which the box is expanded at the top, or at its end toward it.
 Proofs of all packaged scenes take a tenth more readings with 0.5, tops inside a box alone; with 1 to 6 as many."""
-
 
 CycleRow = tuple[str, float, Where | None]
 """A whole-cycle quantity, its natural size, and the pieces where it counts."""

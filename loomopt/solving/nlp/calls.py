@@ -21,15 +21,12 @@ The experiment: two of them take IPOPT a third more iterations; eight, or room f
 in another local optimum.
 """
 
-
 BESIDE_STATIONS = 2, 1
 """The same where rows stand at corners from the first. None of 28 free cam laws of 16 and 64 intervals, with every
 effect, ends at a node beside its knots, and each that there is room for takes a twentieth of building."""
 
-
 FIRST_SHARE, FIRST_ROOM = 1.01, 0.01
 """Factor and room by which a first epigraph variable stands above its rows: inside, so that IPOPT need not move it."""
-
 
 ELASTIC_SHARE = 1e-3
 """Share of a positive lower bound below which no relaxation goes: lengths stay positive."""

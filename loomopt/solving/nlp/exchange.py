@@ -27,14 +27,11 @@ EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32
 """Rounds of the exchange, each with an NLP solve: half of them do in the experiment. Least relaxations are flat, and
 creep (tests/solving/search/test_infeasible.py)."""
 
-
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
 
-
 DRAWS = 200
 """Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
-
 
 Nodes = tuple[tuple[Extreme, ...], ...]
 """Nodes of each family."""

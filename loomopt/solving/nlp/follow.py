@@ -23,15 +23,12 @@ PIVOTS, PIVOT_NEWTON_STEPS, PIVOT_STEP = 20, 8, 1e-9
 """Limits exchanged before the solver must choose, Newton steps to where they meet, and the step that ends them: what
 is left is its square."""
 
-
 PIVOT_MET, PIVOT_STATIONARY = 1e-12, 1e-9
 """Excess and slope of a KKT point reached by pivots: IPOPT's own, met by Newton's method at once."""
-
 
 PIVOT_DEPENDENT, PIVOT_CURVED = 1e-7, 1e-6
 """Part of a slope outside the span of others below which it depends on them, and curvature below which a direction is
 flat: ten and a hundred times the error of an extreme's place, 1e-8, with which slopes and curvatures change."""
-
 
 PIVOT_SLOPE, PIVOT_RANK = 1e-9, 1e-10
 """Rise toward a limit along a way, and relative singular value, that are no more than rounding of slopes."""
@@ -280,11 +277,9 @@ The experiment: a tenth of the way doubles IPOPT's iterations, ten times saves a
 beyond a fifth of its size a design is another. Half the rounds do.
 """
 
-
 FOLLOW_PROGRESS, FOLLOW_PATIENCE = 0.9, 5
 """Share to which the extremes' moves must shrink, and the rounds in a row in which they may fail to: with two, one of
 the experiment's neighbours is left to IPOPT."""
-
 
 Nodes = Sequence[Sequence[Extreme]]
 """Nodes of each family."""

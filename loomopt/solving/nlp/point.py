@@ -17,17 +17,14 @@ from loomopt.solving.nlp.rows import Multipliers
 SAMPLED = ((1e-3, 180), (1e-6, 360))
 """Samples that are enough for a coarser accuracy: what refining misses at so many is far below it (same study)."""
 
-
 PENALTY = 1000.0
 """Weight of each earlier objective against the next, first try: more than a level's multiplier keeps it exactly [exact
 penalty: Nocedal and Wright, section 17.2]. A tenth of it does in the experiment; where it fails, the search raises it
 (STRONGER)."""
 
-
 CHECKED, MOST_CHECKED = 1.6384, 65536
 """Points of one turn on which refined values are checked again, times √accuracy: what is missed between points falls
 with their square. 16384 for the usual accuracy, where a curve that bends by its size over a radian errs by 2e-8."""
-
 
 SUCCESS = frozenset({"Solve_Succeeded", "Solved_To_Acceptable_Level"})
 

@@ -14,11 +14,9 @@ IPOPT_TOLERANCE, IPOPT_SLOPE, IPOPT_ITERATIONS = 1e-11, 1e-9, 300
 """Where IPOPT stops: rows and complementarity three decades below the usual accuracy, slopes three below STATIONARY;
 and where it gives up: no packaged target takes it a hundred iterations from its first start."""
 
-
 WARM_BARRIER, WARM_PUSH = 1e-8, 1e-10
 """Barrier that a warm start begins with, which keeps a row of multiplier 1 so far from its bound, and how far a start
 is pushed inside: less than what IPOPT itself left."""
-
 
 IPOPT = {
     "tol": IPOPT_TOLERANCE,
@@ -35,7 +33,6 @@ IPOPT = {
     "print_level": 0,
     "sb": "yes",
 }
-
 
 WARM = {
     "warm_start_init_point": "yes",

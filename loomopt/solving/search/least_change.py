@@ -28,7 +28,6 @@ CHANGE_WEIGHTS = 1e3, 1e4, 1e5, 1e6
 """Weights of a target's levels against least change from today, in turn, until all of them are held: linear ones are by
 the first. IPOPT fails at a large one from afar; from one to the next, pivots lead."""
 
-
 CHANGE = "change from today"
 """The level's row, and what a certificate calls it."""
 CHANGED = Value(CHANGE, CHANGE, 1.0)

@@ -22,15 +22,12 @@ MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'
 hardest target (tests/jobs/rapier/test_rapier_starts.py: more than half do)."""
 
-
 BETTER, FLIPS = 1e-8, 2
 """What another start must be able to fall below the best by, in natural sizes, to be followed to its end; rounds of
 flips."""
 
-
 ELSEWHERE = 1e-3
 """Natural sizes by which a design differs from another that is as good: solves of one optimum are 1e-5 apart."""
-
 
 RESOLVED = 5
 """Times a search begins again with what its best needs of a steady state: each doubles it, from the fewest to the most.

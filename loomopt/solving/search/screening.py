@@ -191,16 +191,13 @@ def _vertex(angles: Floats, values: Floats) -> Floats:
 MOST_NODES, FEWEST = 65536, 32
 """Nodes of all designs together, where a cycle has many of its own, and the fewest designs that are looked at."""
 
-
 APART, CLOSER_TOGETHER, FAR_END, LONGEST_STEP = 0.35, 0.6, 0.02, 0.3
 """Of the box of variables: distance of starts (rms), its factor until there are enough, what a flipped variable stays
 from its end, and the longest step of a projection."""
 
-
 LEVELS_APART, VIOLATION_WEIGHT, WORST, REGULAR = 100.0, 10.0, 10.0, 1e-6
 """A search's merit in natural sizes: factor between objectives, weight of the worst violation, and what stands for no
 value; share of a row's own size by which its projection is held regular."""
-
 
 Start = dict[str, float]
 

@@ -26,17 +26,13 @@ from loomopt.solving.search import tie_break
 MOST_ALIKE = 4
 """Points of one optimum that are put to the certificate where the first does not pass."""
 
-
 STRONGER, STRONGEST_PENALTY = 100.0, 1e7
 """Factor on the weight between levels where a level gave way; the largest weight that IPOPT still solves to 1e-9."""
-
 
 HELD_MARGIN = 2.0
 """A level's weight must exceed its multiplier [exact penalty: Nocedal and Wright, section 17.2], by this factor."""
 
-
 OnStart = Callable[[int, int], None]
-
 
 NOT_JUDGED = Certificate(False, ("it has not been judged",), (), math.inf, math.inf, False, False)
 

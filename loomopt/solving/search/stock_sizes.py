@@ -10,7 +10,6 @@ from loomopt.solving.answer.words import Words
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""
 
-
 Solve = Callable[[Scene], Solution]
 Tried = tuple[float, Solution]
 

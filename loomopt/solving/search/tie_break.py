@@ -15,14 +15,11 @@ from loomopt.physics.tolerances import ACTIVE, GIVES_WAY, MOVED
 UNCHANGED = 1e-10
 """Change of an objective along a move that costs nothing: a hundredth of the usual accuracy."""
 
-
 BEYOND = 1e-3
 """Share of a variable by which a flat move is tried beyond the design too: a bump at both ends of it would show."""
 
-
 BISECTIONS, NODES = 60, 64
 """Halvings of a move's way (to a float's last bit), and nodes of a turn on which a curve must not change."""
-
 
 Numbers = Mapping[str, float]
 

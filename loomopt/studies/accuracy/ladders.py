@@ -23,7 +23,6 @@ factor of the least error within which errors have stopped falling; factor of th
 one order; the least order that is convergence. Orders 1, 2 and 4 of made-up errors are told to 1 %
 (test_accuracy_ladders)."""
 
-
 Setting = float | int | str
 EPSILON = float(np.finfo(float).eps)
 BUDGET = 0.3

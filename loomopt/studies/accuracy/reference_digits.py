@@ -21,21 +21,17 @@ from loomopt.solving.nlp.rows import Epigraph, HeldStations, RowFamily, epigraph
 REFERENCE_DIGITS, CLOSED_DIGITS = 40, 60
 """Digits of references, and of those that readings in 40 digits are compared with: 20 more than any of them has."""
 
-
 REFERENCE_STEP, REFERENCE_SLOPE = 12, 20
 """Decimals of the step of central differences in u, whose second one then has 16 digits of 40, enough for Newton's
 method; and of one-sided slopes in the design, which are right to 20 digits."""
-
 
 EXTREME_STEPS, EXTREME_FAR, EXTREME_TIED = 4, 1e-3, 1e-9
 """Newton steps toward an extreme in many digits: from the 8 digits of u in float64 three are enough; the largest step
 that still leads there; share by which float64 may order two extremes wrongly."""
 
-
 MET_ROUNDS, MET = 6, 1e-28
 """Steps onto what binds with slopes in float64, each worth at least 8 digits, and where they have arrived: references
 must be 100 times tighter than errors of 1e-25 (tests/studies/accuracy/test_accuracy_references.py)."""
-
 
 OPEN_RANK, OPEN_TURNS, OPEN_FLAT = 1e-9, 3, 1e-7
 """Directions that what binds moves by less than this share are open; Newton steps along them; curvature below which

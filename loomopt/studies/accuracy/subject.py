@@ -29,7 +29,6 @@ from loomopt.studies.accuracy.reference_digits import CLOSED_DIGITS, REFERENCE_D
 REFERENCE_ACCURACY = 1e-11
 """Accuracy of the answers that references start from: the finest that can be asked."""
 
-
 POSITIONS = 24
 """Crank angles, evenly over the turn, at which closed forms are compared."""
 
