@@ -1,4 +1,4 @@
-"""All that the rest of the house knows of a job: one object. What few jobs need has a default here."""
+"""All that other packages know of a job: one object. What few jobs need has a default here."""
 
 import abc
 import functools

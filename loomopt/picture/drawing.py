@@ -1,4 +1,4 @@
-"""What drawings of mechanisms share: labels that keep clear of strokes, title and legend."""
+"""What drawings of mechanisms share: joints and links, signs, labels that keep clear of strokes, title and legend."""
 
 import math
 import textwrap

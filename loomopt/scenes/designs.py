@@ -1,4 +1,4 @@
-"""Designs from files: the JSON of a `design` object, or of a whole answer; numbers in SI, or text with units."""
+"""Designs read back: the JSON of a `design` object in SI or with units, or of a whole answer, which brings its scene."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""A scene's raw tables: read from a file, copied, looked into and changed without touching the original."""
+"""A scene's raw tables: read from a file, copied, looked into and changed; where the files lie that it names."""
 
 import functools
 import tomllib

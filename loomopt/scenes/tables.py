@@ -1,4 +1,4 @@
-"""The tables of a scene, each checked against what its job declares; the first fault is one BadInput."""
+"""What a scene of a job may hold, and its tables checked against that; the first fault is one BadInput."""
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Figures by matplotlib: a drawing, and what every figure has in common. No window, no global state."""
+"""Figures by matplotlib: a drawing, and what every figure and its head have in common. No window, no global state."""
 
 import functools
 import math

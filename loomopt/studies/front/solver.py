@@ -1,4 +1,4 @@
-"""One point of a front: the least of one axis with the other at most so much, then the least of the other."""
+"""One point of a front: least of one axis with the other at most so much, then least of the other; its whole answer."""
 
 import functools
 import math
