@@ -1,4 +1,4 @@
-"""Where a sampled curve is highest, beside a spike too, and where it turns: followed in any number system by Halley's step."""
+"""Where a sampled curve is highest, beside a spike too, and where it turns, followed in any number system."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""Designs read back: the JSON of a `design` object in SI or with units, or of a whole answer, which brings its scene."""
+"""Designs read back: the JSON of a `design`, in SI or with units, or of a whole answer, which brings its scene."""
 
 import math
 import re

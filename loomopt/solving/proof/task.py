@@ -1,4 +1,4 @@
-"""A program as branch and bound sees it: rows in intervals, variables with finite ends, and what stands for all others."""
+"""A program as branch and bound sees it: rows in intervals, variables with finite ends, what stands for others."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
