@@ -149,6 +149,34 @@ def test_an_answer_travels_between_processes(answer):
     assert pickle.loads(pickle.dumps(plain)).as_dict() == answer.as_dict()
 
 
+PUBLIC = {
+    *("Answer", "BadInput", "DesignStudy", "EffectsStudy", "Evaluation", "Proofs", "Scene"),
+    *("effects", "evaluate", "load", "pareto", "prove", "scene", "simulate", "solve", "sweep"),
+}
+"""What scripts rely on: a name more is an entry of the changelog, a name less one of "changes the interface"."""
+METHODS = {
+    "Answer": {
+        *("admissible", "as_dict", "before", "binding", "certificate", "clash", "curves", "design", "draw", "effects"),
+        *("evaluate", "explanation", "export", "figures", "global_bound", "limits", "message", "optima", "plot"),
+        *("point", "problem", "proofs", "prove", "reached", "relaxation", "scene", "simulate", "solver", "sought"),
+        *("status", "table", "target", "terms", "time", "to_frame", "today", "units"),
+    },
+    "Scene": {
+        *("active", "bounds", "change", "document", "effects", "filed_in", "free", "full", "given", "hash"),
+        *("job", "jobs", "limits", "mechanism", "name", "operation", "origin", "own", "paths", "schema", "set", "show"),
+        *("shown_in", "source", "table", "tables", "targets", "title", "unit_for", "units", "update", "with_effect"),
+        "without_effect",
+    },
+}
+
+
+def test_the_public_names_are_these():
+    assert set(lo.__all__) == PUBLIC
+    answer = lo.solve("beatup-light", starts=1)
+    for name, thing in (("Answer", answer), ("Scene", answer.scene)):
+        assert {each for each in dir(thing) if not each.startswith("_")} == METHODS[name]
+
+
 LISTED = "import sys, loomopt; print(*dir(loomopt)); print(*(n for n in sys.modules if n.startswith('loomopt.')))"
 
 
