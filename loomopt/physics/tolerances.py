@@ -39,10 +39,6 @@ BINDING = 1e-6
 """Multiplier above which a row binds where a solve ends: IPOPT leaves TOLERANCE/distance, so what is farther than 1e-5
 from its bound is below it. A row wrongly held is told by the certificate."""
 
-FEW_CHOICES = 8
-"""Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
-slopes and curvatures dense. Named cam laws have five pieces at most."""
-
 TOUCHING, SETTLED = 1e-8, 1e-8
 """Distance from its bound at which an extreme is polished onto it; move, in u or scaled, below which nothing moves:
 both the root of rounding, for a maximum's place is known no better."""

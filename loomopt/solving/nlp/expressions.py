@@ -14,9 +14,12 @@ from loomopt.model.reading import Rows
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
-from loomopt.physics.tolerances import FEW_CHOICES
 from loomopt.solving.nlp.rows import RowFamily, chain_values
 from loomopt.solving.nlp.structure import NodeParameters, Structure
+
+FEW_CHOICES = 8
+"""Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes
+slopes and curvatures dense. Named cam laws have five pieces at most."""
 
 
 class Lifted(NamedTuple):
