@@ -196,7 +196,7 @@ def test_the_first_level_is_never_traded_for_the_second(changes):
     machine = assert_right(scene, answer)
     size = max(machine.M0, abs(answer.figures["M3_fdc"]))
     ends = [
-        least(machine, lambda d: (machine.static(d)["M3_fdc"] / size) ** 2, s) for s in random_designs(machine, 4, 5)
+        least(machine, lambda d: (machine.static(d)["M3_fdc"] / size) ** 2, s) for s in random_designs(machine, 12, 5)
     ]
     theirs = min(abs(machine.static(end)["M3_fdc"]) for end in ends if end)
     assert abs(answer.figures["M3_fdc"]) <= theirs + 1e-7 * size

@@ -81,8 +81,10 @@ def test_retrofit_is_the_best_slsqp_finds(M0, weights):
     scene = scene_of(M0).update({f"targets.retrofit.weights.{name}": value for name, value in weights.items()})
     machine, ours = Machine(scene), lo.solve(scene, "retrofit", starts=1)
     squares, balanced = change(machine, weights), [lambda d: machine.static(d)["M3_fdc"] / 100]
-    ends = [least(machine, squares, start, equal=balanced) for start in random_designs(machine, STARTS, 3)]
-    theirs = best([squares(end) if end else None for end in ends])
+    ends = [least(machine, squares, start, equal=balanced) for start in random_designs(machine, 8 * STARTS, 3)]
+    # Where SLSQP ends beyond its limits, by as little as 1e-8, it is better than any machine by 1e-7.
+    kept = [end for end in ends if end and machine.excess(end) <= 1e-9 and abs(balanced[0](end)) <= 1e-9]
+    theirs = best([squares(end) for end in kept])
     assert ours.status == "optimal"
     assert abs(machine.static(ours.design)["M3_fdc"]) <= 1e-9 * M0
     assert squares(ours.design) == pytest.approx(theirs, rel=1e-5)
