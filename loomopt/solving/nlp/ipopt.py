@@ -48,7 +48,7 @@ def run(
         none = Multipliers(nlp.rows, np.zeros(len(arguments["x0"])), np.zeros(nlp.rows.size))
         return IpoptAnswer("Not_Enough_Degrees_Of_Freedom", dict(x), extra, none, 0)
     if warm:
-        arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.on(nlp.rows).lam_g}
+        arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.grown(nlp.rows)}
     solver = nlp.solver(bool(warm), calls.settings)
     said = solver(**arguments)
     stats = solver.stats()

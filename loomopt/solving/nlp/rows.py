@@ -390,6 +390,18 @@ class Multipliers:
         rows.at_nodes(lam_g)[:, :common] = before[:, :common]
         return Multipliers(rows, self.lam_x, lam_g)
 
+    def grown(self, rows: RowMap) -> Floats:
+        """Return those of rows in their places for an NLP that has grown, 0 behind them: what IPOPT starts warm from.
+
+        Of several families a node's multiplier may then stand with another's. Carried family by family (`on`) IPOPT
+        takes other ways, and the end of a rapier's front in another basin (results/rapier.peak_acceleration-against-
+        dwell.csv): a start is no more than that, and where it ends is judged apart.
+        """
+        lam_g = np.zeros(rows.size)
+        common = min(rows.size, self.rows.size)
+        lam_g[:common] = self.lam_g[:common]
+        return lam_g
+
     def binding(self, rows: RowMap, counts: Sequence[int]) -> BindingRows:
         """Return what binds with nodes of the same NLP in other slots: so many of each family, from the first on."""
         found = binding(self.lam_x, self.on(rows).lam_g)
