@@ -145,7 +145,7 @@ from loomopt.scenes.designs import Design
 from loomopt.scenes.scene import Scene
 
 
-def write(path: Path, scene: Scene, design: Design, said: outputs.Subject | None) -> None:
+def write(path: Path, scene: Scene, design: Design, said: outputs.DrawnSubject | None) -> None:
     """Write how many primitives a drawing has."""
     count = len(outputs.drawing(scene, design, said).primitives)
     atomically(path, lambda part: part.write_text(f"{count}\\n", encoding="utf-8"))
