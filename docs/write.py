@@ -21,7 +21,7 @@ from loomopt.interface.tables import rows
 from loomopt.interface.text import glossary
 from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 
 DOCS = Path(__file__).parent
 GLOSSARY = DOCS / "glossary.md"

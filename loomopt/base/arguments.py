@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any, TypeGuard
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 
 
 def number(given: object, key: str, allowed: str, remedy: str) -> float:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
 from loomopt.jobs.registry import load, scene

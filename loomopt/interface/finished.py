@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from loomopt.base import arguments
+from loomopt.base.errors import refusal
 from loomopt.base.records import lazy
-from loomopt.base.refusals import refusal
 from loomopt.interface import study_table
 from loomopt.interface.results import Answer, solved
 from loomopt.scenes.scene import Scene

@@ -12,7 +12,7 @@ from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import evaluation, solution
+from loomopt.solving.answer import report, solution
 from loomopt.solving.options import check_numbers, target_name
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class Evaluation(solution.Evaluated, records.Shown):
     def _told(self) -> str:
         """What a designer asks first: the figures that the target is about."""
         from loomopt.jobs import registry
-        from loomopt.solving.answer.words import Words
+        from loomopt.solving.answer.solution import Words
 
         if self.terms:
             asked = list(self.terms.axes)
@@ -161,7 +161,7 @@ records.show_by(_html)
 
 def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | None) -> Evaluation:
     """Return figures and limits of a design, checked, SI; today's without one. Raises BadInput."""
-    return _judged(evaluation.evaluate(scene, design, target), scene, target_name(scene, target))
+    return _judged(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
 def solved(found: solution.Solution, scene: Scene) -> Answer:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from loomopt.base.units import SI_UNIT, factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.words import Words, grouped
+from loomopt.solving.answer.solution import Words, grouped
 from loomopt.studies.run.findings import SceneStudy
 from loomopt.studies.run.rows import Multiplier, Row
 

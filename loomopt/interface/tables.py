@@ -5,7 +5,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.model.session import working
@@ -14,8 +14,7 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes import designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Evaluated, Solution, Words
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import unknown
+from loomopt.base.errors import BadInput, unknown
 from loomopt.jobs.base import Job
 from loomopt.physics.effects.kinds import Effect, ranked
 from loomopt.scenes import packaged

@@ -4,8 +4,7 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import unknown
+from loomopt.base.errors import BadInput, unknown
 from loomopt.maths.systems import Number
 from loomopt.model.limits import Limit
 from loomopt.model.model import DesignRow, Formula, Instant, JobModel

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model import drive

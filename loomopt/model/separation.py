@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.base.units import SI_UNIT
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Number

@@ -7,9 +7,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import plain_number
-from loomopt.base.refusals import refusal
 from loomopt.base.units import DISPLAY_UNIT, factor
 from loomopt.scenes.scene import Scene
 

@@ -6,9 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from loomopt.base.errors import BadInput, clean
+from loomopt.base.errors import BadInput, clean, misread, refusal, shown, unknown
 from loomopt.base.quantities import Quantity, described, quantity_of
-from loomopt.base.refusals import misread, refusal, shown, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.physics.effects.kinds import label
 from loomopt.scenes.document import Paths, looked_up

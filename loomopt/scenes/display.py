@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from loomopt.base.errors import misread, refusal, unknown
 from loomopt.base.quantities import misfit, quantity_of, unit_of
-from loomopt.base.refusals import misread, refusal, unknown
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import refusal, shown
+from loomopt.base.errors import BadInput, refusal, shown
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal, localcontext
 from typing import Any
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.quantities import Quantity, plain_number, quantity_of
-from loomopt.base.refusals import refusal, unknown
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.schema import Table
 from loomopt.scenes.scene import Scene

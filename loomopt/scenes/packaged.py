@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.base.errors import BadInput, clean
-from loomopt.base.refusals import shown
+from loomopt.base.errors import BadInput, clean, shown
 from loomopt.scenes.document import looked_up, read_document
 
 if TYPE_CHECKING:

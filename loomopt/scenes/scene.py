@@ -4,9 +4,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from loomopt.base.errors import clean
+from loomopt.base.errors import clean, refusal, shown, unknown
 from loomopt.base.records import Shown, freeze, lazy
-from loomopt.base.refusals import refusal, shown, unknown
 from loomopt.base.units import show
 from loomopt.physics.effects.kinds import Effect, label, owned
 from loomopt.physics.schema import Table

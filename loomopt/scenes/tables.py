@@ -7,9 +7,9 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from pydantic import ValidationError
 
+from loomopt.base.errors import invalid, misread, missing, refusal, shown, unknown
 from loomopt.base.quantities import Quantity, quantity_of, unit_of
 from loomopt.base.records import lazy
-from loomopt.base.refusals import invalid, misread, missing, refusal, shown, unknown
 from loomopt.base.units import QuantityError, ShowValue
 from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target

@@ -11,14 +11,12 @@ from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes.scene import Scene
 from loomopt.solving import options
 from loomopt.solving.answer import report
-from loomopt.solving.answer.solution import Clash, Solution
-from loomopt.solving.answer.words import Words
-from loomopt.solving.clock import Clock
+from loomopt.solving.answer.solution import Clash, Solution, Words
 from loomopt.solving.nlp.ipopt import IterationCallback
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.options import GlobalProof
 from loomopt.solving.search import multistart
-from loomopt.solving.search.search import Search
+from loomopt.solving.search.search import Clock, Search
 
 
 def solve(

@@ -5,8 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.physics.effects.kinds import EVALUATED
 from loomopt.physics.tolerances import COARSEST, TIGHTEST
 from loomopt.scenes.scene import Scene

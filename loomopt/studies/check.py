@@ -13,8 +13,7 @@ from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs, packaged, provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving import engine
-from loomopt.solving.answer.solution import Solution
-from loomopt.solving.answer.words import Words, grouped
+from loomopt.solving.answer.solution import Solution, Words, grouped
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Row, StudyTask

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import misread, refusal
+from loomopt.base.errors import BadInput, misread, refusal
 from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import ACCURACY

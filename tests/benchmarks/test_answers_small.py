@@ -10,7 +10,7 @@ from test_benchmarks_small import ATTEMPTS
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 

@@ -15,7 +15,7 @@ from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.scenes import curves, parts
 from loomopt.jobs import registry
 from loomopt.scenes import packaged
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 
 WISH = packaged.problems()["rapier"].parent / "rapier-wish.csv"
 TABLE = {"targets__match__table": str(WISH)}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from support import toy
 
-from loomopt.solving.answer import evaluation
+from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
@@ -141,7 +141,7 @@ def test_a_program_is_solved_without_its_scene():
 def test_todays_machine_is_evaluated_when_it_is_asked_for(monkeypatch):
     answer = toy.solve(toy.program("xy", BOWL))
     asked = []
-    monkeypatch.setattr(evaluation, "evaluation", lambda *_: asked.append(1))
+    monkeypatch.setattr(report, "evaluation", lambda *_: asked.append(1))
     assert asked == []
     assert answer.before is None
     assert answer.before is None

@@ -6,7 +6,7 @@ import pytest
 from support import toy
 
 from loomopt.jobs import registry
-from loomopt.solving.answer.evaluation import evaluate
+from loomopt.solving.answer.report import evaluate
 from loomopt.solving.answer.solution import Clash
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point

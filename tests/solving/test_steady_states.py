@@ -10,7 +10,7 @@ from loomopt.jobs import registry
 from loomopt.model import model
 from loomopt.model.sampling import sampled
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.nlp.point import Settings

@@ -77,8 +77,8 @@ def new(
     file: Annotated[Path, typer.Argument(help="The scene to write; it must not exist yet.")],
 ) -> None:
     """Write a commented scene to start from."""
+    from loomopt.base.errors import refusal
     from loomopt.base.files import atomically
-    from loomopt.base.refusals import refusal
     from loomopt.jobs import registry
 
     template = registry.template(job)

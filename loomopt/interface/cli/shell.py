@@ -79,7 +79,7 @@ def read_scene(
 
 def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
     """Return a scene with what the command line changes in it: numbers set, then effects on, then effects off."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     values: dict[str, object] = {}
     for item in sets or ():
@@ -142,7 +142,7 @@ def read_request(
 
 def only(option: str, given: list[Path] | None) -> Path | None:
     """Return the one path that an option gives; None without it. Raises BadInput where it is given more than once."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     if given and len(given) > 1:
         raise refusal("it is given more than once", key=option, origin="", remedy="Give it once")
@@ -151,7 +151,7 @@ def only(option: str, given: list[Path] | None) -> Path | None:
 
 def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
     """Return an option's number. Raises BadInput."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     try:
         if "_" in text or not text.isascii():  # which Python takes for digits and their separators

@@ -122,7 +122,7 @@ def pareto(
 
 def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
     """Return the axis that is sought and the one that pays for it. Raises BadInput."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     named = [*minimise, *maximise]
     twice = next((name for name in named if named.count(name) > 1), None)
@@ -138,7 +138,7 @@ def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, 
 
 def _parted(items: list[str], option: str, example: str, form: str) -> dict[str, str]:
     """Return key → what an option gives for it. Raises BadInput."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     found: dict[str, str] = {}
     for item in items:
@@ -198,7 +198,7 @@ def _write(found: "DesignStudy", how: Run, more: str = "") -> None:
 
 def _apart(how: Run) -> None:
     """Raise BadInput where a table or a figure would be written over the store."""
-    from loomopt.base.refusals import refusal
+    from loomopt.base.errors import refusal
 
     for path in (*(how.out or ()), *(how.figure or ())):
         if how.store and path.resolve() == how.store.resolve():
@@ -214,7 +214,7 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
         yield None
         return
     if count is not None:
-        from loomopt.base.refusals import refusal
+        from loomopt.base.errors import refusal
 
         raise refusal("there are a cluster and a number of workers", "", "--workers", count, remedy="Give one of them")
     from loomopt.studies.run import executors

@@ -10,8 +10,7 @@ from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import SLACK
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, remedies
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Evaluated, Solution, Words, remedies
 from loomopt.solving.certificate.verdict import GlobalBound
 
 if TYPE_CHECKING:

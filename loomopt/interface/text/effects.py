@@ -8,7 +8,7 @@ from loomopt.base.units import factor
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 from loomopt.studies.effects.found import Found
 from loomopt.studies.effects.worth import LIMITS, Worth
 

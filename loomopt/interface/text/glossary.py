@@ -18,7 +18,7 @@ from loomopt.physics.schema import Figure, Table
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 
 
 class Printed(NamedTuple):

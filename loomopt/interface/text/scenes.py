@@ -15,7 +15,7 @@ from loomopt.picture.job_views import Marks, Span
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import Scene, given
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 
 STEP = 15
 """Crank angle between printed rows, deg."""

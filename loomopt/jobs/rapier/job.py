@@ -3,8 +3,7 @@
 import math
 from typing import final
 
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.jobs import base
 from loomopt.jobs.base import Crossing, Figures, Job, Studied
 from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read

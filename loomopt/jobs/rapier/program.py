@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from typing import final
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.base.refusals import refusal
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import (
     AFTER,

@@ -4,8 +4,8 @@ import math
 
 from pydantic import Field
 
+from loomopt.base.errors import refusal
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
-from loomopt.base.refusals import refusal
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
 from loomopt.physics.effects import declared

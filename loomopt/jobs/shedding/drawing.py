@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.base.units import factor, show
 from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import FOLLOWER, follower, frame

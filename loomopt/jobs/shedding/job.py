@@ -9,9 +9,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, final
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import NARROWEST
-from loomopt.base.refusals import refusal
 from loomopt.jobs import base
 from loomopt.jobs.base import Figures, Job, LawFamily, Studied
 from loomopt.jobs.shedding.model import (

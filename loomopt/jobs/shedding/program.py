@@ -8,8 +8,8 @@ from typing import Any, final
 
 import numpy as np
 
+from loomopt.base.errors import refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.base.refusals import refusal
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, HealdFrame, LawTarget, chosen, dwelt

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import (
     NARROWEST,
     Angle,
@@ -19,7 +19,6 @@ from loomopt.base.quantities import (
     Speed,
     Stiffness,
 )
-from loomopt.base.refusals import refusal
 from loomopt.base.units import ShowValue, usual
 from loomopt.jobs.shedding.model import FOLLOWER
 from loomopt.model import drive

@@ -15,8 +15,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt, second_order
-from loomopt.solving.certificate.derivatives import Derivatives
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Derivatives, Forward
 from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, priced
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged

@@ -1,12 +1,22 @@
 """What a certificate asks of the rows at one design: slopes in all variables, and curvatures along a few directions."""
 
 import abc
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
+from loomopt.base.records import lazy
+from loomopt.maths import systems
+from loomopt.maths.jets import Jet, stacked, variables
+from loomopt.maths.systems import Number
+from loomopt.model.model import Integral
 from loomopt.model.program import Program
+from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.cycle import Floats
+from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
 from loomopt.solving.certificate.kkt import ActiveRow
 
 
@@ -54,3 +64,169 @@ class Derivatives(abc.ABC):
     def at_corner(self, node: Extreme) -> bool:
         """Say whether a node is the end of a piece; a cycle without corners has none."""
         return node.u in (0.0, 1.0) and bool(self.sampler.cycle.order)
+
+
+class JetReading(Reading):
+    """One design read in jets: at many nodes at once."""
+
+    @lazy
+    def _begins(self) -> Number:
+        return stacked(self.starts)
+
+    def along(self, name: str, pieces: Pieces, u: Number) -> Number:
+        """Return a whole-cycle quantity at nodes (pieces, u), each (nodes,), SI."""
+        begin, end = self._begins[pieces], self._begins[pieces + 1]
+        return self.quantity(name, begin + u * (end - begin), self.cycle.switch(pieces))
+
+    def mean(self, integral: Integral) -> Number:
+        """Return a mean by its rule, all nodes at once, SI."""
+        if integral.angles:
+            values = self.quantity(integral.quantity, np.array(integral.angles), {DATUM: np.array(integral.data)})
+            return _total(values, len(integral.angles)) / len(integral.angles)
+        pieces, u, weights = quadrature(self.cycle, integral)
+        widths = weights * (self._begins[pieces + 1] - self._begins[pieces])
+        return _total(widths * self.along(integral.quantity, pieces, u), len(u)) / _total(widths, len(u))
+
+
+def _total(values: Number, count: int) -> Number:
+    """Return the sum of values at nodes; a value that is one number stands at each of `count`."""
+    return count * values if np.ndim(values.v if isinstance(values, Jet) else values) == 0 else values.sum()
+
+
+class Forward(Derivatives):
+    """Derivatives by jets. Raises ArithmeticError where one of them is no number."""
+
+    by, error = "jets", JET_ERROR
+
+    def __init__(self, program: Program, x: Mapping[str, float], sampler: Sampler, rows: Sequence[ActiveRow]) -> None:
+        super().__init__(program, x, sampler, rows)
+        groups: dict[str, list[int]] = {}
+        for k, row in enumerate(self.rows):
+            if row.node:
+                groups.setdefault(row.reads, []).append(k)
+        self.groups = {name: np.array(places) for name, places in groups.items()}
+        nodes = {name: [row.node for k in places if (row := self.rows[k]).node] for name, places in self.groups.items()}
+        self.pieces = {name: np.array([node.piece for node in of]) for name, of in nodes.items()}
+        self.inner = {name: np.array([not self.at_corner(node) for node in of]) for name, of in nodes.items()}
+        with np.errstate(all="ignore"):
+            self.u = {name: self._settled(name, np.array([node.u for node in of])) for name, of in nodes.items()}
+
+    def gradients(self) -> Floats:
+        """Return (rows, variables): first derivatives; a row whose value is no number has none."""
+        directions = np.eye(len(self.names))
+        found = np.zeros((len(self.rows), len(self.names)))
+        with np.errstate(all="ignore"):
+            reading = self._reading(directions, curved=False)
+            for k, jet in self._static(reading, len(self.names)):
+                found[k] = jet.g + 0 * jet.v
+            for name, places in self.groups.items():
+                value = _jet(reading.along(name, self.pieces[name], self.u[name]), len(self.names))
+                found[places] = self._factors(places)[:, None] * (value.g + 0 * np.reshape(value.v, (-1, 1)))
+        return _finite(found)
+
+    def curvatures(self, basis: Floats) -> Floats:
+        """Return (rows, k, k): second derivatives along the columns of basis (variables, k); extremes move along."""
+        width = basis.shape[1]
+        bent = self._bent(self.x, self.u, basis)
+        mixed = bent[:, :width, width]
+        return _finite(
+            bent[:, :width, :width] - self._share(bent)[:, None, None] * mixed[:, :, None] * mixed[:, None, :]
+        )
+
+    def thirds(self, line: Floats, basis: Floats) -> tuple[Floats, Floats]:
+        """Return (rows, k, k), third derivatives, and their errors, (rows,): by differences of the curvatures."""
+        bent, width = self._bent(self.x, self.u, np.column_stack([basis, line])), basis.shape[1]
+        shifts = -self._share(bent)[:, None] * bent[:, :-1, -1]
+        ways = np.concatenate([np.tile(np.eye(width), (len(bent), 1, 1)), shifts[:, None, :-1]], axis=1)
+        sizes = dict(zip(self.names, self.sizes, strict=True))
+        slopes = []
+        for step in THIRD_STEPS:
+            ends = []
+            for sign in (step, -step):
+                x = {n: self.x[n] + sign * sizes[n] * float(by) for n, by in zip(self.names, line, strict=True)}
+                u = {name: self.u[name] + sign * shifts[places, -1] for name, places in self.groups.items()}
+                ends.append(ways.swapaxes(1, 2) @ self._bent(x, u, basis) @ ways)
+            slopes.append((ends[0] - ends[1]) / (2 * step))
+        # Each step is half the one before: h² and then h⁴ leave the differences.
+        first, second = ((4 * fine - coarse) / 3 for coarse, fine in itertools.pairwise(slopes))
+        found = (16 * second - first) / 15
+        rounding = ROUNDED / THIRD_STEPS[-1] * np.abs(bent).max(axis=(1, 2), initial=0.0)
+        return _finite(found), np.abs(second - first).max(axis=(1, 2), initial=0.0) + rounding
+
+    def _bent(self, x: Mapping[str, float], u: Mapping[str, Floats], basis: Floats) -> Floats:
+        """Return (rows, k + 1, k + 1): second derivatives along a basis (variables, k) and u, each for itself."""
+        width = basis.shape[1] + 1
+        directions = np.hstack([basis, np.zeros((len(basis), 1))])
+        found = np.zeros((len(self.rows), width, width))
+        with np.errstate(all="ignore"):
+            reading = self._reading(directions, curved=True, x=x)
+            for k, jet in self._static(reading, width):
+                found[k] = jet.curvature
+            for name, places in self.groups.items():
+                value = _jet(reading.along(name, self.pieces[name], _moving(u[name], width)), width)
+                found[places] = self._factors(places)[:, None, None] * value.curvature
+        return found
+
+    def _share(self, bent: Floats) -> Floats:
+        """Return (rows,): 1 over how a row bends along its extreme's own u; 0 where that does not move."""
+        inner = np.zeros(len(self.rows), dtype=bool)
+        for name, places in self.groups.items():
+            inner[places] = self.inner[name]
+        moves = inner & (bent[:, -1, -1] != 0.0)
+        return np.asarray(np.where(moves, 1.0, 0.0) / np.where(moves, bent[:, -1, -1], 1.0))
+
+    def _factors(self, places: Pieces) -> Floats:
+        return np.array([self.rows[k].sign / self.rows[k].scale for k in places])
+
+    def _reading(self, directions: Floats | None, curved: bool, x: Mapping[str, Number] | None = None) -> JetReading:
+        """Return a design, the own one without x, with jets along directions (variables, n) in the variables' scale.
+
+        In floats without directions.
+        """
+        x = self.x if x is None else x
+        if directions is not None:
+            moved = np.array(self.sizes)[:, None] * directions
+            x = dict(zip(self.names, variables(list(x.values()), moved, curved), strict=True))
+        given = self.program.model.given(systems.jets(), {**self.known, **x})
+        return JetReading(self.program.model, systems.jets(), given, self.sampler.cycle, self.sampler.stills)
+
+    def _static(self, reading: JetReading, width: int) -> list[tuple[int, Jet]]:
+        """Return the rows that are no node's, by place, along so many directions."""
+        found = []
+        for k, row in enumerate(self.rows):
+            if row.node is None:
+                value = row.limit.residual(reading) if row.limit else row.sign * reading.single(row.reads)
+                found.append((k, _jet(value / row.scale, width)))
+        return found
+
+    def _settled(self, name: str, u: Floats) -> Floats:
+        """Return u of a quantity's extremes after one Newton step; an extreme at a piece's end stays."""
+        value = self._sampled.along(name, self.pieces[name], _moving(u, 1))
+        if not isinstance(value, Jet):
+            return u
+        slope, bend = np.broadcast_to(value.g[..., 0], u.shape), np.broadcast_to(value.curvature[..., 0, 0], u.shape)
+        shift = np.where(bend != 0.0, -slope, 0.0) / np.where(bend != 0.0, bend, 1.0)
+        near = self.inner[name] & (np.abs(shift) < float(NEWTON_SHIFT))
+        return np.where(near, u + np.where(near, shift, 0.0), u)
+
+    @lazy
+    def _sampled(self) -> JetReading:
+        return self._reading(None, curved=True)
+
+
+def _jet(value: Number, width: int) -> Jet:
+    """Return a number as a jet along so many directions, none of which moves what is no jet."""
+    return value if isinstance(value, Jet) else Jet(value, np.zeros(width), np.zeros((width, width)))
+
+
+def _moving(u: Floats, width: int) -> Jet:
+    """Return u of nodes as the last of so many directions."""
+    slopes = np.zeros((len(u), width))
+    slopes[:, -1] = 1.0
+    return Jet(u, slopes, np.zeros((1, width, width)))
+
+
+def _finite(values: Floats) -> Floats:
+    if not np.all(np.isfinite(values)):
+        raise ArithmeticError("a derivative is no number in floats")
+    return values

@@ -14,8 +14,7 @@ from loomopt.model.reading import Rows
 from loomopt.physics.balance import Given, total
 from loomopt.physics.cycle import Floats, Node
 from loomopt.physics.schema import Values
-from loomopt.solving.nlp.rows import RowFamily, chain_values
-from loomopt.solving.nlp.structure import NodeParameters, Structure
+from loomopt.solving.nlp.rows import NodeParameters, RowFamily, Structure, chain_values
 
 FEW_CHOICES = 8
 """Numbers that a node may choose from by a switch before the chosen one becomes a variable: a row that reads more makes

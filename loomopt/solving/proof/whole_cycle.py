@@ -24,8 +24,7 @@ from loomopt.physics.cycle import Where
 from loomopt.physics.tolerances import LEAST_SLACK, MOST_SLACK, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Proof, Proofs, Solution
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Proof, Proofs, Solution, Words
 from loomopt.solving.certificate.taylor_bounds import Boxes
 from loomopt.solving.options import check_sought, target_name
 

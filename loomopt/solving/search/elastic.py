@@ -12,8 +12,7 @@ import numpy as np
 
 from loomopt.model.program import Program
 from loomopt.physics.tolerances import CHEAP, NEEDED, PRICED, SCREENED
-from loomopt.solving.answer.solution import Clash
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Clash, Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Elastic, Known, Point, Settings
 from loomopt.solving.nlp.rows import families

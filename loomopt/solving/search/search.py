@@ -1,9 +1,11 @@
 """The search for the best certified design: starts → exchange → tie-break → certificate, as steps on records."""
 
+import contextlib
 import functools
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from loomopt.jobs.base import Job
@@ -258,3 +260,31 @@ def _stepped(program: Program, x: Mapping[str, float], step: Mapping[str, float]
     """Return x moved by a step, both SI, within its bounds."""
     moved = {v.name: x[v.name] + step.get(v.name, 0.0) for v in program.variables}
     return {v.name: min(max(moved[v.name], v.lower), v.upper) for v in program.variables}
+
+
+class Clock:
+    """Runs from its making; what the search counts itself is added when all is told."""
+
+    def __init__(self) -> None:
+        self.began = time.perf_counter()
+        self._parts: defaultdict[str, float] = defaultdict(float)
+
+    @contextlib.contextmanager
+    def charged(self, part: str) -> Iterator[None]:
+        """Charge a part with what is done meanwhile."""
+        began = time.perf_counter()
+        yield
+        self._parts[part] += time.perf_counter() - began
+
+    def seconds(self, search: Search) -> dict[str, float]:
+        """Return the seconds of each part and of all; making NLPs counts as building, not as solving."""
+        parts = self._parts
+        return {
+            "import_s": parts["import"],
+            "build_s": parts["build"] + search.built,
+            "solve_s": parts["solve"] + search.solved - search.built,
+            "settle_s": search.tie_broken,
+            "certify_s": search.certified,
+            "report_s": parts["report"],
+            "total_s": time.perf_counter() - self.began,
+        }

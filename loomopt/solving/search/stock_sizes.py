@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Solution
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Solution, Words
 
 FARTHEST_SIZE, SAME_SIZE = 4, 1e-9
 """Sizes sold that are tried on either side, and the share by which two answers to them are equally good."""

@@ -11,7 +11,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.studies.accuracy import reference_digits
 from loomopt.studies.accuracy.ladders import Ladder, LadderReference, Rung, Setting

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from loomopt.base.errors import refusal
 from loomopt.base.records import freeze
-from loomopt.base.refusals import refusal
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 from loomopt.studies.effects.study import Effects, EffectsCourse, command
 from loomopt.studies.effects.worth import NEEDED, Worth
 from loomopt.studies.run.rows import Row

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.jobs import registry
 from loomopt.physics.effects.declared import Fault, faults
 from loomopt.physics.effects.kinds import Effect, Event, Speed, State

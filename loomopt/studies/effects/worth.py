@@ -12,7 +12,7 @@ from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import evaluation
+from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Evaluated, Finding
 from loomopt.studies.run.rows import Row
 
@@ -223,4 +223,4 @@ def _evaluated(scene: Scene, design: Mapping[str, float], target: str) -> Evalua
         for name, value in design.items()
         if scene.full(name) in numbers or designs.in_list(name, scene.schema.lists)
     }
-    return evaluation.evaluate(scene, own, target)
+    return report.evaluate(scene, own, target)

@@ -8,15 +8,14 @@ import math
 from collections.abc import Mapping, Sequence
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, misread, refusal
 from loomopt.base.quantities import read as read_quantity
-from loomopt.base.refusals import misread, refusal
 from loomopt.base.units import SI_UNIT, QuantityError
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import numbers
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 from loomopt.solving.options import check_numbers, check_sought, target_name
 from loomopt.studies.front.trade import POINTS, Trade
 

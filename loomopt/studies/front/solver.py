@@ -16,9 +16,8 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import FEASIBLE, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer import evaluation, report
-from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Clash, Evaluated, Finding, Solution, Words
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.verdict import Binding, Certificate
@@ -172,7 +171,7 @@ class Solver:
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = evaluation.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
@@ -285,7 +284,7 @@ class FrontTerms:
 
     def whole(self, design: Mapping[str, float]) -> Evaluated:
         """Return figures and limits of a design by full names, SI."""
-        found = evaluation.evaluation(self.scene, self.job, self.base, design)
+        found = report.evaluation(self.scene, self.job, self.base, design)
         limits = list(found.limits)
         for finding in (self._finding(cap, found, design) for cap in self.caps):
             same = next((k for k, limit in enumerate(limits) if limit.name == finding.name), len(limits))

@@ -20,8 +20,7 @@ from loomopt.scenes import designs
 from loomopt.scenes.numbers import files
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Solution
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Solution, Words
 from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver

@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from loomopt.base.refusals import refusal
+from loomopt.base.errors import refusal
 from loomopt.model.session import working
 from loomopt.studies.run.rows import Row, Study, StudyTask
 

@@ -14,7 +14,7 @@ from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.layout import Grid
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import declared
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 
 SCENE = load("beatup-light")
 EFFECTS = declared.of("loomopt.physics.effects.beatup")

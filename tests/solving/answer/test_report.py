@@ -7,7 +7,7 @@ from support import toy
 
 from loomopt.model.limits import BoundLimit, CycleLimit, RatioLimit
 from loomopt.model.objectives import Value
-from loomopt.solving.answer import evaluation, report
+from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Relaxation
 from loomopt.solving.certificate.verdict import Binding, Certificate
 
@@ -18,7 +18,7 @@ WAVES = {"w": lambda m, v, phi: v["x"] * m.cos(phi)}
 def evaluated(limits, x, **more):
     program = toy.program("xy", ROWS, WAVES, limits=limits, **more)
     job = toy.ToyJob(program)
-    return evaluation.evaluation(toy.scene_of(job), job, program, x)
+    return report.evaluation(toy.scene_of(job), job, program, x)
 
 
 def findings(limits, x, **more):
@@ -67,7 +67,7 @@ def test_a_limit_of_the_complement_is_told_as_what_is_asked():
     limits = tuple(replace(limit, complement=1.0) if limit.row == "w" else limit for limit in program.limits)
     assert limits[0].bound == 0.75
     job = toy.ToyJob(replace(program, limits=limits))
-    found = evaluation.evaluation(toy.scene_of(job), job, job.own, {"x": 0.7, "y": 0.0}).limits[0]
+    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": 0.7, "y": 0.0}).limits[0]
     assert (found.name, found.min, found.ok) == ("w", 0.25, True)
     assert found.value == pytest.approx(0.3)
 
@@ -79,7 +79,7 @@ def test_a_bound_is_held_to_its_own_size_and_hidden_limits_are_not_told():
     program = toy.program("xy", ROWS, limits=(("p", 1, 5.0),))
     hidden = replace(program, limits=tuple(replace(limit, hidden=True) for limit in program.limits))
     job = toy.ToyJob(hidden)
-    assert evaluation.evaluation(toy.scene_of(job), job, hidden, {"x": 2.0, "y": 9.0}).limits == ()
+    assert report.evaluation(toy.scene_of(job), job, hidden, {"x": 2.0, "y": 9.0}).limits == ()
 
 
 # Messages ---------------------------------------------------------------------------------------------------------
@@ -176,7 +176,7 @@ def named(kind, name, row, sign, value):
     program = toy.program("xy", ROWS, WAVES)
     limit = kind(name, sign, row, value, 1.0)
     job = toy.ToyJob(replace(program, limits=(limit,)))
-    found = evaluation.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
+    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": 2.0, "y": 3.0}).limits
     return [(each.name, each.value, each.ok) for each in found]
 
 
@@ -204,5 +204,5 @@ def test_a_limit_may_be_missed_by_just_a_billionth(sign):
 def test_a_weighed_limit_is_held_to_a_billionth_of_one(excess, ok):
     program = toy.program("xy", ROWS, WAVES)
     job = toy.ToyJob(replace(program, limits=(RatioLimit("p", 1, "p", 0.0, 50.0, "y"),)))
-    found = evaluation.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
+    found = report.evaluation(toy.scene_of(job), job, job.own, {"x": excess, "y": 0.0}).limits
     assert [each.ok for each in found] == [ok]

@@ -8,8 +8,8 @@ import loomopt as lo
 from loomopt.base.units import factor
 from loomopt.interface.text import layout
 from loomopt.interface.text.answers import evaluation
-from loomopt.solving.answer.evaluation import LEAST_DIGITS, digits, roundings
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.report import LEAST_DIGITS, digits, roundings
+from loomopt.solving.answer.solution import Words
 
 CASES = [("beatup", "retrofit"), ("beatup-heavy", "torque"), ("rapier", "stroke-dwell"), ("shedding", "speed")]
 LIGHT = lo.load("beatup-light")

@@ -7,8 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.model.limits import BoundLimit
 from loomopt.model.objectives import Magnitude, Peak, Value
-from loomopt.solving.answer.solution import Relaxation, remedies
-from loomopt.solving.answer.words import Words, outward
+from loomopt.solving.answer.solution import Relaxation, Words, outward, remedies
 from loomopt.solving.certificate.verdict import Binding
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from support import toy
 
 from loomopt.solving.certificate.certificate import certified, certify
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 
 ACCURACY = 1e-8

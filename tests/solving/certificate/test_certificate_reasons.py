@@ -18,7 +18,7 @@ from loomopt.solving.certificate.certificate import (
     certified,
     certify,
 )
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Curvature, Local

@@ -14,7 +14,7 @@ from loomopt.maths.jets import variables
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 

@@ -9,8 +9,8 @@ import loomopt as lo
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certify
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.feasible_curve import FeasibleCurve, Lagrangian
 from loomopt.solving.certificate.kkt import active_set
+from loomopt.solving.certificate.second_order import FeasibleCurve, Lagrangian
 
 ROUND = {"f": lambda v: -((v["x"] ** 2 + v["y"] ** 2) ** 2), "r": lambda v: v["x"] ** 2 + v["y"] ** 2}
 """On the circle r = 1 all is level; along its tangent f + 2 r falls by the fourth power of the step."""

@@ -3,7 +3,7 @@
 import pytest
 from support import toy
 
-from loomopt.solving.certificate.feasible_curve import Lagrangian
+from loomopt.solving.certificate.second_order import Lagrangian
 
 ROWS = {"f": lambda v: v["y"] - 10 * v["x"], "g": lambda v: v["x"], "h": lambda v: -4 * v["x"] + v["y"]}
 PROGRAM = toy.program(

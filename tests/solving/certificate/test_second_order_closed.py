@@ -6,7 +6,7 @@ from support import toy
 
 import loomopt as lo
 from loomopt.solving.certificate.certificate import certify, judged_levels
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import Local

@@ -7,11 +7,10 @@ from support import inch, toy
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
-from loomopt.solving.certificate.derivatives_jets import Forward
+from loomopt.solving.certificate.derivatives import Forward
 from loomopt.solving.certificate.derivatives_mp import Exact
-from loomopt.solving.certificate.feasible_curve import PROBES, FeasibleCurve, Lagrangian
 from loomopt.solving.certificate.kkt import active_set
-from loomopt.solving.certificate.second_order import Local
+from loomopt.solving.certificate.second_order import PROBES, FeasibleCurve, Lagrangian, Local
 from loomopt.studies.front import front
 from loomopt.studies.front.solver import Asking
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from loomopt.jobs import registry
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Elastic, Settings, sampler_at
 from loomopt.solving.nlp.rows import epigraphs, families
 from loomopt.solving.nlp.transcribe import transcribe

@@ -12,7 +12,7 @@ from loomopt.model.limits import BoundLimit
 from loomopt.model.objectives import Magnitude, Peak, Worst
 from loomopt.model.program import Variable
 from loomopt.model.sampling import Extreme
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Elastic, Known, Settings
 from loomopt.solving.nlp.rows import RowFamily
 

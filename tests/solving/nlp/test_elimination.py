@@ -8,10 +8,9 @@ import pytest
 from steps import COUNT, program
 
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.calls import Calls
-from loomopt.solving.nlp.elimination import Elimination, Entries
-from loomopt.solving.nlp.ipopt import IterationCallback
+from loomopt.solving.nlp.ipopt import Calls, IterationCallback
 from loomopt.solving.nlp.point import Elastic, Settings
+from loomopt.solving.nlp.transcribe import Elimination, Entries
 
 LIMITS = (("wave", 1, 1.5), ("swing", 1, 2.0), ("h3", 1, 1.2), ("h7", 0, 1.0))
 BENDS = (0.0, 0.05)

@@ -10,7 +10,7 @@ from waves import WAVES, model, objective, program
 
 from loomopt.maths import systems
 from loomopt.model.reading import Reading
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Elastic, Settings
 from loomopt.solving.nlp.rows import families
 

@@ -11,7 +11,7 @@ from waves import model, objective, program
 from loomopt.model.kinematics import Arcs
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.solving.nlp import exchange, follow
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point, Settings
 
 PEAK = (objective("circle", "peak", ("shifted",)),)

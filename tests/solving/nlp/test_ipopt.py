@@ -8,7 +8,7 @@ from waves import objective, program
 
 from loomopt.model.session import current
 from loomopt.solving.nlp import ipopt
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.nlp.rows import Multipliers
 

@@ -9,10 +9,10 @@ import pytest
 from steps import COUNT, HEIGHTS, NAMES, program
 
 from loomopt.model.program import Variable
-from loomopt.solving.nlp.calls import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
 from loomopt.solving.nlp.expressions import FEW_CHOICES, Lifts, Options, chosen, expressions, identity
+from loomopt.solving.nlp.ipopt import BESIDE_STATIONS, FIRST_SLOTS, LEADING, Calls
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.nlp.structure import structure
+from loomopt.solving.nlp.rows import structure
 
 
 def made(count=FEW_CHOICES + 1):

@@ -5,8 +5,8 @@ import pytest
 from waves import objective, program
 
 import loomopt as lo
-from loomopt.solving.nlp import exchange, polish
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp import exchange
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings
 from loomopt.solving.nlp.rows import binding
 
@@ -20,7 +20,7 @@ def solved(task):
 
 def polished(task, x, extra, point):
     calls = Calls(task, Settings())
-    return polish.polish(calls, x, extra, point.multipliers, calls.peaks(calls.sampler(x)))
+    return exchange.polish(calls, x, extra, point.multipliers, calls.peaks(calls.sampler(x)))
 
 
 def test_a_point_is_polished_onto_what_binds_and_no_farther():
@@ -43,11 +43,11 @@ def test_what_clashes_is_left_as_it_is():
         return np.array([x[0] - 1.0, x[0] - 1.0 - 1e-9]), np.ones((2, 1))
 
     bound = binding(np.zeros(1), np.ones(2))
-    assert polish.met(jacobian, arguments, np.array([1.0]), bound) is None
+    assert exchange.met(jacobian, arguments, np.array([1.0]), bound) is None
     alone = binding(np.zeros(1), np.array([1.0, 0.0]))
     free = arguments | {"lbg": np.array([0.0, -np.inf])}
-    assert polish.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
-    assert polish.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
+    assert exchange.met(jacobian, free, np.array([1.0 + 5e-7]), alone) == pytest.approx([1.0], abs=1e-15)
+    assert exchange.met(jacobian, free, np.array([1.0 + 5e-6]), alone) is None, "too far"
 
 
 def bare(lower=(-9.0, -9.0), upper=(9.0, 9.0)):
@@ -62,7 +62,7 @@ def row(value):
 
 
 def holds(nlp, arguments, x, lam_x=(0.0, 0.0), lam_g=(0.0,)):
-    return polish.met(nlp, arguments, np.array(x), binding(np.array(lam_x), np.array(lam_g)))
+    return exchange.met(nlp, arguments, np.array(x), binding(np.array(lam_x), np.array(lam_g)))
 
 
 def test_what_binds_at_its_bound_is_put_on_it():

@@ -9,7 +9,7 @@ import waves
 from support.worst import WorstPeak
 
 from loomopt.model.objectives import Magnitude, Worst
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Elastic, Settings
 from loomopt.solving.nlp.rows import Multipliers, RowMap, binding, row_map
 

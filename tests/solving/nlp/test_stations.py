@@ -8,10 +8,9 @@ from loomopt.jobs import registry
 from loomopt.model.sampling import Extreme
 from loomopt.physics.cycle import TURN
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings, sampler_at
-from loomopt.solving.nlp.rows import HeldStations, RowFamily, held, stations
-from loomopt.solving.nlp.structure import structure
+from loomopt.solving.nlp.rows import HeldStations, RowFamily, held, stations, structure
 
 
 @pytest.fixture(scope="module")

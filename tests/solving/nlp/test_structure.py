@@ -11,9 +11,9 @@ from loomopt.maths import systems
 from loomopt.model.model import CycleQuantity, DesignRow, Integral, JobModel
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import TURN, split
-from loomopt.solving.nlp.calls import Calls
+from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.nlp.structure import NodeParameters, means, structure
+from loomopt.solving.nlp.rows import NodeParameters, means, structure
 
 
 def test_a_node_on_a_corner_keeps_its_side():

@@ -6,7 +6,7 @@ from machines_in_boxes import designs, solved
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval
 from loomopt.model.sampling import Sampler
-from loomopt.solving.proof.nodes import layouts
+from loomopt.solving.proof.reading import layouts
 
 
 def own_layout(task, at):

@@ -7,8 +7,7 @@ from machines_in_boxes import solved
 from loomopt.maths import systems
 from loomopt.maths.intervals import Interval, interval
 from loomopt.model.sampling import Sampler
-from loomopt.solving.proof.nodes import layouts
-from loomopt.solving.proof.reading import Reader
+from loomopt.solving.proof.reading import Reader, layouts
 from loomopt.solving.proof.task import BoxRows, OpenError, _summed, strips
 
 

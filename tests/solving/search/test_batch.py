@@ -6,7 +6,7 @@ import pytest
 from loomopt.jobs import registry
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.search.screening import Batch
+from loomopt.solving.search.multistart import Batch
 
 TASKS = [
     ("beatup", "balance", ()),

@@ -7,7 +7,7 @@ import pytest
 from support import toy
 
 from loomopt.physics.tolerances import NEEDED
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic

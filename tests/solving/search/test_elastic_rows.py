@@ -7,7 +7,7 @@ from support import toy
 
 from loomopt.jobs import registry
 from loomopt.physics.tolerances import NEEDED, PRICED
-from loomopt.solving.answer.words import Words
+from loomopt.solving.answer.solution import Words
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.nlp.rows import Multipliers, families, row_map
 from loomopt.solving.search import elastic

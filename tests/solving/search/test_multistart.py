@@ -11,8 +11,7 @@ from support import toy
 import loomopt as lo
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.solving.search import elastic
-from loomopt.solving.search.multistart import BETTER, MORE_STARTS, searched
-from loomopt.solving.search.screening import DESIGNS
+from loomopt.solving.search.multistart import BETTER, DESIGNS, MORE_STARTS, searched
 from loomopt.solving.search.search import Search
 
 __all__ = ["certified", "solved"]
