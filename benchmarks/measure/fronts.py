@@ -17,8 +17,7 @@ from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.solver import Asking
 from loomopt.studies.front.trade import POINTS, read_front
 from loomopt.studies.run import run
-from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, StudyTask
+from loomopt.studies.run.rows import Findings, Row, StudyTask
 
 RPM, DEGREE, MM = math.pi / 30, math.pi / 180, 1e-3
 LARGEST_AREA, CORNER = 34.892414, (7.0, 97.0)

@@ -22,9 +22,8 @@ from benchmarks.measure.fronts import asked_at
 from benchmarks.peers.front_rivals import Rival, Spot, beatup, rapier, shedding
 from loomopt.studies.front import front, plan, trade
 from loomopt.studies.front.trade import read_front
-from loomopt.studies.run import executors, run
-from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, StudyTask
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Findings, Row, StudyTask
 
 LONGER = 10.0
 """Times the front's own that the peer gets."""
@@ -149,13 +148,13 @@ def shared(axes: tuple[str, str], target: str | None, repeats: int, fresh: bool)
 
     def timed(pool: Executor | None, solve: Callable[[Executor], object]) -> float:
         began = time.perf_counter()
-        own = pool or executors.workers(2)()
+        own = pool or run.workers(2)()
         solve(own)
         if not pool:
             own.shutdown()
         return time.perf_counter() - began
 
-    pool = None if fresh else executors.workers(2)()
+    pool = None if fresh else run.workers(2)()
     if pool:
         halves(pool)
         run.run(trade, pool)

@@ -13,12 +13,10 @@ from loomopt.base.records import lazy
 from loomopt.interface import study_table
 from loomopt.interface.results import Answer, solved
 from loomopt.scenes.scene import Scene
-from loomopt.studies.effects import found
-from loomopt.studies.effects.found import concluded
-from loomopt.studies.effects.study import Effects
-from loomopt.studies.run import executors, run
-from loomopt.studies.run.findings import Findings, SceneStudy, counted
-from loomopt.studies.run.rows import Row, digest
+from loomopt.studies.effects import study
+from loomopt.studies.effects.study import Effects, concluded
+from loomopt.studies.run import run
+from loomopt.studies.run.rows import Findings, Row, SceneStudy, counted, digest
 from loomopt.studies.run.store import Store
 
 if TYPE_CHECKING:
@@ -143,7 +141,7 @@ def who(executor: Executor | run.Making | None, count: int | None) -> Executor |
         raise refusal("there are an executor and a number of workers", key="workers", origin="", remedy=remedy)
     if not isinstance(executor, Executor | None):
         arguments.called(executor, "executor", EXECUTORS, "Give one of them, or workers=2")
-    return executors.workers(count) if count is not None else executor
+    return run.workers(count) if count is not None else executor
 
 
 def study_identity(study: SceneStudy) -> Mapping[str, object]:
@@ -153,7 +151,7 @@ def study_identity(study: SceneStudy) -> Mapping[str, object]:
     return {**study.settings, "name": study.scene.name, "document": copied(study.scene.document, study.scene.origin)}
 
 
-class EffectsStudy(found.Found):
+class EffectsStudy(study.Found):
     """What each effect of a scene is worth for a target; shares of natural sizes inside, units for a reader."""
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":

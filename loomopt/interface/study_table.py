@@ -9,8 +9,7 @@ from loomopt.base.units import SI_UNIT, factor
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words, grouped
-from loomopt.studies.run.findings import SceneStudy
-from loomopt.studies.run.rows import Multiplier, Row
+from loomopt.studies.run.rows import Multiplier, Row, SceneStudy
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -3,26 +3,349 @@
 import abc
 import functools
 import importlib
+import math
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from loomopt.base.errors import BadInput
-from loomopt.base.records import Frozen
+from loomopt.base.records import Frozen, lazy
 from loomopt.base.units import SI_UNIT
-from loomopt.jobs.task import Task
 from loomopt.maths.systems import Number
 from loomopt.model import drive, numbers
 from loomopt.model.curves import STEPS, Columns, curves, tops
+from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.program import Numbers, Program
+from loomopt.model.objectives import Objective, Value
+from loomopt.model.program import (
+    LEAST_CHANGE,
+    AxisMove,
+    Goal,
+    Move,
+    Numbers,
+    Preference,
+    Program,
+    ScaleMove,
+    Variable,
+    goals,
+    nothing_follows,
+)
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats
-from loomopt.physics.effects.kinds import Check, Event, label
+from loomopt.physics.effects.kinds import Check, Event, label, owned
+from loomopt.physics.tolerances import START_ROOM
 from loomopt.picture.job_views import JobViews
 from loomopt.scenes.scene import Scene
 from loomopt.scenes.tables import SceneSchema
+
+Ends = tuple[float, float]
+"""Lower and upper bound."""
+Asked = Mapping[str, Sequence[tuple[str, float]]]
+"""Variable → which limits ask how much of it at least."""
+
+
+class Task(abc.ABC):
+    """One scene and target on the way to a program: a step each, which a job overrides where it differs.
+
+    target: "" for none; traded: axes, which are sought in place of the target's objectives. What a target asks of an
+    axis falls away.
+    """
+
+    read_from: Mapping[str, Sequence[str]] = Frozen()
+    """Figures that are read from rows or quantities of other names."""
+    remedy = "Take the limit off, or add what {name} needs."
+    """What helps where nothing in the scene gives the figure of a limit."""
+    tops: Mapping[str, str] = Frozen()
+    """Variables that are the crank angles where a whole-cycle quantity is largest, with that quantity."""
+
+    def __init__(self, scene: Scene, target: str = "", traded: Collection[str] = ()) -> None:
+        self.scene, self.target, self.traded = scene, target, tuple(traded)
+
+    # What every job says.
+
+    @property
+    @abc.abstractmethod
+    def model(self) -> JobModel:
+        """The mechanism with the effects that the task reads."""
+
+    @abc.abstractmethod
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the target's levels in order."""
+
+    # What is known.
+
+    @lazy
+    def known(self) -> dict[str, float]:
+        """Every number of the scene by full name."""
+        return numbers.numbers(self.scene)
+
+    @lazy
+    def limited(self) -> dict[str, Ends]:
+        """Lower and upper bound of the design variables and of every bounded number, by full name."""
+        return numbers.bounds(self.scene, self.known)
+
+    @lazy
+    def labels(self) -> dict[str, str]:
+        """What a designer calls each number of the effects that are on, by its full name."""
+        return numbers.labels(self.scene)
+
+    @lazy
+    def sampler(self) -> Sampler:
+        """Today's machine, which natural sizes are read from."""
+        return sampled(self.model, self.known)
+
+    # The program, step by step.
+
+    def program(self) -> Program:
+        """Return the task as data. Raises BadInput."""
+        self.demand_figures()
+        return Program(
+            self.model,
+            self.variables,
+            self.parameters(),
+            tuple(self.limits()),
+            self.held() if self.traded else self.objectives(),
+            self.starts(),
+            tuple(self.moves()),
+            self.follow(),
+            self.tops,
+            self.today(),
+            self.single(),
+            self.goals(),
+        )
+
+    def demand_figures(self) -> None:
+        """Raise BadInput for a limit on a figure that nothing in the scene gives."""
+        for name in self.scene.limits:
+            rows = self.read_from.get(name, (name,))
+            if not all(self.model.has_row(row) or self.model.has_quantity(row) for row in rows):
+                raise BadInput(
+                    f"nothing in the scene gives the figure {name}",
+                    file=self.scene.origin,
+                    key=f"limits.{name}",
+                    allowed="figures whose numbers and effects the scene has",
+                    remedy=self.remedy.format(name=name),
+                )
+
+    @lazy
+    def bounded(self) -> tuple[Variable, ...]:
+        """The variables between the scene's bounds."""
+        return tuple(self.variable(name, ends) for name, ends in self.limited.items())
+
+    def variable(self, name: str, ends: Ends) -> Variable:
+        """Return a variable of natural size."""
+        return Variable(name, *ends, self.scale(name, ends), self.room(name, ends), self.labels.get(name, ""))
+
+    def scale(self, name: str, ends: Ends) -> float:
+        """Return the natural size of a variable: the largest it is or may be."""
+        return max(abs(self.known[name]), *map(abs, ends)) or 1.0
+
+    def room(self, name: str, ends: Ends) -> Ends:
+        """Return where random starts of a variable lie."""
+        return ends
+
+    @property
+    def asked(self) -> Asked:
+        """What limits on figures ask of variables that are these figures. Raises BadInput."""
+        return {}
+
+    @lazy
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables, no less than limits on their figures ask for. Raises BadInput.
+
+        One without room, or one that is not there yet, stands at the most that is asked.
+        """
+        found = {v.name: v for v in self.bounded}
+        for name, each in self.asked.items():
+            least, held = max(value for _, value in each), self._asked_of(name)
+            room = held.lower < held.upper
+            if room and least > held.upper:
+                remedy = f"Correct the limit, or the bounds of {held.called}."
+                raise BadInput(f"{held.called} cannot be as large", key=f"limits.{each[0][0]}.min", remedy=remedy)
+            upper, around = (held.upper, held.range) if room else (least, (least, least))
+            found[name] = replace(held, lower=max(least, held.lower) if room else least, upper=upper, range=around)
+        return tuple(found.values())
+
+    def _asked_of(self, name: str) -> Variable:
+        """Return a variable that limits ask something of; one that is not there yet stands at the most of it."""
+        least = max(value for _, value in self.asked[name])
+        return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
+
+    def parameters(self) -> dict[str, float]:
+        """Return every known number that is no variable."""
+        taken = {variable.name for variable in self.variables}
+        return {name: value for name, value in self.known.items() if name not in taken}
+
+    def limits(self) -> list[Limit]:
+        """Return all limits in order."""
+        return [*self.bounds(), *self.figures(), *self.demands(), *self.margins(), *self.wanted()]
+
+    def bounds(self) -> list[Limit]:
+        """Return the scene's bounds of variables as limits."""
+        return [each for v in self.bounded if v.called in self.scene.bounds for each in bound_limits(v)]
+
+    def floors(self) -> Iterator[Limit]:
+        """Yield what limits ask of variables, the most first; a row that stood twice would have no price."""
+        for name, each in self.asked.items():
+            held = self._asked_of(name)
+            binding = [(by, value) for by, value in each if held.lower == held.upper or value > held.lower]
+            told = set[str | float]()
+            for by, value in sorted(binding, key=lambda said: -said[1]):
+                if not told & {by, value}:
+                    yield BoundLimit(by, -1, name, value, held.scale)
+                told |= {by, value}
+
+    def figures(self) -> list[Limit]:
+        """Return the scene's limits on figures, row by row."""
+        return [each for name, limit in self.scene.limits.items() for each in self.figure(name, limit.min, limit.max)]
+
+    def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
+        """Return the limits on one figure; the least of several rows is limited in each of them."""
+        size, rows = self.figure_size(name), self.read_from.get(name, (name,))
+        return [self.row_limit(name, sign, row, value, size) for sign, value in ends(low, high) for row in rows]
+
+    def row_limit(self, name: str, sign: int, row: str, value: float, scale: float, relaxable: bool = True) -> Limit:
+        """Return a limit on a row of the model: on one of the design alone, or over the whole cycle."""
+        kind = CycleLimit if self.model.has_quantity(row) else DesignLimit
+        return kind(name, sign, row, value, scale, relaxable=relaxable)
+
+    def demands(self) -> list[Limit]:
+        """Return what checks demand of their rows and quantities while they are on.
+
+        What a table asks for may give way; what the nature of the thing demands may not.
+        """
+        found = []
+        for check in self.model.checks:
+            for each in check.demands:
+                value = each.value if isinstance(each.value, float) else self.known[owned(check, each.value)]
+                firm = each.row in self.scene.schema.margins or not isinstance(each.value, str)
+                size = self.margin_size(each.row) or abs(value) or 1.0
+                found.append(self.row_limit(each.row, each.sign, each.row, value, size, not firm))
+        return found
+
+    def margin_size(self, row: str) -> float:
+        """Return what a row of a check is measured by; 0 where the mechanism does not say: by what is demanded."""
+        return 0.0
+
+    def margins(self) -> list[Limit]:
+        """Return the margins by which the links close, which nobody can give up."""
+        rows = [row for group in self.model.kinematics.groups.values() for row in group.margins]
+        return [DesignLimit(row, -1, row, 0.0, self.length, relaxable=False) for row in rows]
+
+    @property
+    def length(self) -> float:
+        """What a margin of length is measured by: the longest length of today's design."""
+        return max(self.known[name] for name, kind in self.scene.schema.variables.items() if kind == "length")
+
+    def wanted(self) -> list[Limit]:
+        """Return what the target itself asks of figures, and may find out of reach."""
+        return []
+
+    def goals(self) -> tuple[Goal, ...]:
+        """Return the same as goals of the figures."""
+        return goals(self.wanted())
+
+    def held(self) -> tuple[Objective, ...]:
+        """Return what of the target's levels is held before the axes."""
+        return ()
+
+    def least(self) -> tuple[Objective, ...]:
+        """Return the levels after a target's own: rows that the checks would have least."""
+        rows = [check.least for check in self.sampler.model.checks if check.least]
+        return tuple(Value(row, row, abs(self.sampler.static[row]) or 1.0) for row in rows)
+
+    def starts(self) -> tuple[dict[str, float], ...]:
+        """Return the job's own starts: today's machine."""
+        return (self.inside(self.known),)
+
+    def inside(self, values: Numbers) -> dict[str, float]:
+        """Return a start: values, or lower bounds, moved just inside the bounds of the variables."""
+        start = {}
+        for v in self.variables:
+            room = START_ROOM * (v.upper - v.lower) if math.isfinite(v.upper - v.lower) else 0.0
+            start[v.name] = min(max(values.get(v.name, v.lower), v.lower + room), v.upper - room)
+        return start
+
+    def moves(self) -> list[Move]:
+        """Return the directions that may leave everything unchanged, in order: numbers of checks."""
+        return self.axis_moves()
+
+    def axis_moves(self) -> list[Move]:
+        """Return the moves along numbers of checks that may change nothing."""
+        axes = [(check, axis) for check in self.scene.active if isinstance(check, Check) for axis in check.axes]
+        named = [(axis.name, owned(check, axis.key)) for check, axis in axes]
+        return [
+            self.move(axis, name)
+            for axis, name in named
+            if name in self.limited and self.limited[name][0] < self.limited[name][1]
+        ]
+
+    def move(self, name: str, along: str, wishes: Sequence[Preference] = (Preference("today", LEAST_CHANGE),)) -> Move:
+        """Return the move along one number; it would stay nearest to today's where no other wish is told."""
+        return AxisMove(name, (along,), tuple(wishes), {along: self.known[along]}, {along: self.limited[along]})
+
+    def scale_move(self, name: str, along: tuple[str, ...]) -> Move:
+        """Return the move that scales lengths in common, and would stay nearest to today's."""
+        today = {n: self.known[n] for n in along if n in self.known}
+        bounds = {n: self.limited[n] for n in along if n in self.limited}
+        return ScaleMove(name, along, (Preference("today", LEAST_CHANGE),), today, bounds)
+
+    def follow(self) -> Callable[[JobModel, Numbers], Numbers]:
+        """Return what gives the variables that follow from the others."""
+        return nothing_follows
+
+    def today(self) -> Numbers:
+        """Return today's values of variables that are no numbers of the scene."""
+        return {}
+
+    def single(self) -> str:
+        """Return why every local optimum is the best there is; "" where that is not so."""
+        return ""
+
+    # Natural sizes.
+
+    def figure_size(self, name: str) -> float:
+        """Return the natural size of a figure: today's value of it, or of the first row that it is read from."""
+        return size_read(self.sampler, self.read_from.get(name, (name,))[0])
+
+    def size(self, axis: str) -> float:
+        """Return the natural size of what of an axis is sought the least of."""
+        return next((v.scale for v in self.variables if axis in (v.name, v.called)), 0.0) or self.figure_size(axis)
+
+
+def size_read(today: Sampler, name: str) -> float:
+    """Return the size of a figure as today's machine has it; 1 for one that only its own speed tells."""
+    motor = drive.motor(today.model.effects)
+    if motor and name in motor.rows:
+        return 1.0
+    return abs(today.peak(name) if today.model.has_quantity(name) else today.single(name)) or 1.0
+
+
+def bound_limits(variable: Variable, relaxable_from: bool = True) -> list[Limit]:
+    """Return the bounds of a variable as limits; a least value of 0 may not give way unless `relaxable_from`."""
+    name, v = variable.called, variable
+    if v.lower == v.upper:
+        return [BoundLimit(name, 0, v.name, v.lower, v.scale)]
+    ends = [(sign, value) for sign, value in ((-1, v.lower), (1, v.upper)) if math.isfinite(value)]
+    return [
+        BoundLimit(name, sign, v.name, value, v.scale, relaxable=relaxable_from or sign > 0 or value > 0.0)
+        for sign, value in ends
+    ]
+
+
+def ends(low: float | None, high: float | None) -> list[tuple[int, float]]:
+    """Return the sides of a limit that are given: (0, value) where both are one."""
+    if low is not None and low == high:
+        return [(0, low)]
+    return [(sign, value) for sign, value in ((-1, low), (1, high)) if value is not None]
+
+
+def distinct(starts: Sequence[dict[str, float]]) -> tuple[dict[str, float], ...]:
+    """Return starts without repeats."""
+    return tuple(start for place, start in enumerate(starts) if start not in starts[:place])
+
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from loomopt.base.units import factor
-from loomopt.picture import placing, shapes
+from loomopt.picture import shapes
 from loomopt.picture.shapes import (
     CHARACTER,
     METRIC,
@@ -56,15 +56,15 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
     """Return each label where it meets no stroke and no earlier label, close to its point; far ones with a leader."""
     sizes = [shapes.text_box(Text(label.layer, Point(0.0, 0.0), label.text), height) for label in labels]
     wishes = [
-        placing.LabelWish((label.near, *label.also), label.side, size.right - size.left, size.top - size.bottom)
+        shapes.LabelWish((label.near, *label.also), label.side, size.right - size.left, size.top - size.bottom)
         for label, size in zip(labels, sizes, strict=True)
     ]
     drawn = np.concatenate([shapes.marks(stroke, height) for stroke in strokes])
-    spots = placing.place(wishes, drawn, height, LEADER)
+    spots = shapes.place(wishes, drawn, height, LEADER)
     return [part for label, spot in zip(labels, spots, strict=True) for part in _written(label, spot, height)]
 
 
-def _written(label: Label, spot: placing.LabelSpot, h: float) -> list[Text | Line]:
+def _written(label: Label, spot: shapes.LabelSpot, h: float) -> list[Text | Line]:
     """Return a label in its spot, and the leader from its point where it stands far off; h: text height, m."""
     box, near = spot.box, Point(spot.x, spot.y)
     text = Text(label.layer, Point((box.left + box.right) / 2, (box.bottom + box.top) / 2), label.text)

@@ -214,7 +214,7 @@ def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Eff
 
 def _combined(active: Mapping[Effect, Table], origin: str) -> None:
     """Raise BadInput where effects cannot be on together."""
-    from loomopt.physics.effects.declared import faults
+    from loomopt.physics.effects.kinds import faults
 
     for fault in faults(active):
         remedy = f"Add [effects.{fault.other}], or take {fault.effect.name} off"

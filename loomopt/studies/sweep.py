@@ -22,9 +22,8 @@ from loomopt.solving import engine
 from loomopt.solving.answer.solution import Solution
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.options import check_numbers, check_sought, target_name
-from loomopt.studies.run import warm
-from loomopt.studies.run.findings import Change, Findings
-from loomopt.studies.run.rows import Multiplier, Row, Side, StudyTask
+from loomopt.studies.run import rows
+from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, Side, StudyTask
 
 COARSE = 8
 """Steps of each axis between two points that are searched from scratch; a power of two."""
@@ -196,13 +195,13 @@ class Sweep:
         scene = self.scene_at(task.point)
         program = registry.of(scene).program(scene, self.target)
         starts = [parent.warm if parent else {}, *task.ask["beyond"]]
-        near: list[Point] = [point for data in starts if (point := warm.read(data, program))]
+        near: list[Point] = [point for data in starts if (point := rows.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
     def _warm(self, task: StudyTask, answer: Solution) -> dict[str, object]:
         """Return what a neighbour can start from."""
         scene = self.scene_at(task.point)
-        return warm.written(answer.point, registry.of(scene).program(scene, self.target))
+        return rows.written(answer.point, registry.of(scene).program(scene, self.target))
 
     def place(self, row: Row) -> Mapping[str, float]:
         """Return the numbers that are swept, SI, at a row."""

@@ -10,7 +10,7 @@ import pytest
 import loomopt
 from loomopt.base.units import SI_UNIT
 from loomopt.jobs import registry
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 
 PACKAGE = Path(loomopt.__file__).parent
 JOBS = registry.own_names()
@@ -148,9 +148,7 @@ def test_a_job_is_named_in_its_own_files_only(job):
 
 @pytest.mark.parametrize("job", JOBS)
 def test_an_effect_is_named_in_its_own_file_only_and_where_a_target_needs_it(job):
-    for name in set(declared.of(f"loomopt.physics.effects.{job}")) - set(
-        SI_UNIT
-    ):  # "inertia" is a kind of quantity too
+    for name in set(kinds.of(f"loomopt.physics.effects.{job}")) - set(SI_UNIT):  # "inertia" is a kind of quantity too
         word = re.compile(rf"[\"']{name}[\"']")
         strangers = [n for n, path in modules().items() if word.search(path.read_text("utf-8"))]
         assert set(strangers) <= {
@@ -186,12 +184,12 @@ def test_only_maths_and_the_solver_rooms_use_casadi():
 
 def test_every_effect_is_in_a_file_of_its_name():
     files = {job: {p.stem for p in (PACKAGE / "physics" / "effects" / job).glob("*.py")} - {"__init__"} for job in JOBS}
-    assert files == {job: set(declared.of(f"loomopt.physics.effects.{job}")) for job in JOBS}
+    assert files == {job: set(kinds.of(f"loomopt.physics.effects.{job}")) for job in JOBS}
 
 
 def test_ranks_of_a_jobs_effects_differ():
     for job in JOBS:
-        ranks = [effect.rank for effect in declared.of(f"loomopt.physics.effects.{job}").values()]
+        ranks = [effect.rank for effect in kinds.of(f"loomopt.physics.effects.{job}").values()]
         assert len(set(ranks)) == len(ranks), job
 
 

@@ -18,7 +18,7 @@ from loomopt.interface.cli import shell
 from loomopt.interface.cli.app import run
 from loomopt.jobs import registry
 from loomopt.jobs.registry import load
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.scenes.packaged import problems
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.search import search
@@ -59,7 +59,7 @@ def check_contract(data):
     """Check keys, types and units of an answer."""
     assert list(data)[: len(KEYS)] == KEYS
     assert all(isinstance(data[key], str) for key in KEYS[:5])
-    assert all(name in declared.of("loomopt.physics.effects.beatup") for name in data["effects"])
+    assert all(name in kinds.of("loomopt.physics.effects.beatup") for name in data["effects"])
     assert list(data["design"]) == ["l1", "l2", "l3", "l4", "m4e", "r4e"]
     assert all(is_number(value) for value in data["design"].values())
     assert set(FIGURES) <= set(data["figures"])

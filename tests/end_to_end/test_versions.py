@@ -9,7 +9,7 @@ import casadi
 import pytest
 
 import loomopt as lo
-from loomopt.interface.cli import app, versions
+from loomopt.interface.cli import app
 
 
 def test_the_line_names_the_casadi_and_the_ipopt_that_run(capfd):
@@ -24,15 +24,15 @@ def test_the_line_names_the_casadi_and_the_ipopt_that_run(capfd):
 
 @pytest.mark.parametrize("content", [None, "nothing of it\n"])
 def test_an_ipopt_that_does_not_tell_is_not_made_up(content, tmp_path, monkeypatch):
-    header = tmp_path / versions.HEADER
+    header = tmp_path / app.HEADER
     header.parent.mkdir(parents=True)
     if content:
         header.write_text(content)
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
-    assert versions.ipopt() == versions.UNTOLD
+    assert app.ipopt() == app.UNTOLD
     header.write_text('#define IPOPT_VERSION "3.14.1"\n')
-    assert versions.ipopt() == "3.14.1"
+    assert app.ipopt() == "3.14.1"
 
 
 def test_no_completion_is_offered_that_is_not_there(capsys):

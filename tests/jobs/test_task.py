@@ -5,7 +5,7 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
 from loomopt.jobs import registry
-from loomopt.jobs.task import Task
+from loomopt.jobs.base import Task
 
 SCENE = registry.load("beatup").update({"bounds.m4e.min": "0.5 kg", "limits.swing.min": "20 deg"})
 JOB = registry.of(SCENE)

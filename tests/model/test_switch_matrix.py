@@ -17,8 +17,7 @@ from loomopt.maths import systems
 from loomopt.model.crank_motion import PIECE
 from loomopt.model.reading import DATUM
 from loomopt.physics.cycle import TURN, Node
-from loomopt.physics.effects.declared import faults
-from loomopt.physics.effects.kinds import Check, Event, Load, Speed, State
+from loomopt.physics.effects.kinds import Check, Event, Load, Speed, State, faults
 
 DESIGNS = {
     "beatup": {"l1": 0.0305, "l2": 0.083, "l3": 0.15, "l4": 0.166, "m4e": 3.0, "r4e": 0.07},

@@ -19,11 +19,11 @@ from loomopt.jobs.beatup.model import ReedMotion
 from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths import systems
 from loomopt.physics import balance
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import crank_rocker
 
-BEATUP = declared.of("loomopt.physics.effects.beatup")
+BEATUP = kinds.of("loomopt.physics.effects.beatup")
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=30)
 MP = mpmath.MPContext()
 MP.dps = 60

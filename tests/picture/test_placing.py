@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support import clear
 
-from loomopt.picture import placing, shapes
+from loomopt.picture import shapes
 from loomopt.picture.drawing import LEADER, Label, along, around, dimension, ground, mass, place, spring
 from loomopt.picture.shapes import Circle, Drawing, Line, Point, Text
 
@@ -53,7 +53,7 @@ def test_any_number_of_labels_of_one_point_find_room():
 def test_strokes_are_sampled_so_closely_that_no_label_slips_between():
     for stroke in (POST, Circle("paths", Point(1.0, 2.0), 7.0), Line("paths", (*POST.points, Point(9.0, 9.0)), True)):
         points = shapes.marks(stroke, 1.0)
-        assert np.hypot(*np.diff(points, axis=0).T).max() < 2 * placing.CLEAR
+        assert np.hypot(*np.diff(points, axis=0).T).max() < 2 * shapes.CLEAR
 
 
 def test_an_arcs_label_stands_outside_it():

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from loomopt.base import units
-from loomopt.picture.placing import STEP
 from loomopt.picture.shapes import (
     LAYERS,
     METRIC,
     POSITIONS,
+    STEP,
     Arc,
     Circle,
     Drawing,

@@ -1,7 +1,6 @@
 """Effects that go together: of two that clash, what changes the motion itself yields."""
 
-from loomopt.physics.effects.declared import faults
-from loomopt.physics.effects.kinds import Check, Load
+from loomopt.physics.effects.kinds import Check, Load, faults
 
 
 def combined(effects):

@@ -8,8 +8,7 @@ import numpy as np
 
 from loomopt.interface.files import svg
 from loomopt.picture.drawing import sheet
-from loomopt.picture.placing import Box
-from loomopt.picture.shapes import Drawing, Line, Text, text_box
+from loomopt.picture.shapes import Box, Drawing, Line, Text, text_box
 
 FINE = 500
 """Straight parts of a circle, each of which is exact to 5e-6 of its radius."""

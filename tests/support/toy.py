@@ -17,9 +17,8 @@ from loomopt.model.curves import Columns
 from loomopt.model.kinematics import Arcs, Group
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit
 from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
-from loomopt.model.moves import Move
 from loomopt.model.objectives import Objective
-from loomopt.model.program import Program, Variable
+from loomopt.model.program import Move, Program, Variable
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node

@@ -3,11 +3,43 @@
 import atexit
 import contextlib
 import gc
+import importlib.metadata
+import importlib.util
 import os
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
+
+import typer
+
+from loomopt.base import __version__, interrupts
+from loomopt.base.errors import BadInput
+from loomopt.interface.cli import commands, studies
+from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without, printed, remarked
+from loomopt.interface.cli.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
+
+HEADER = Path("include", "coin-or", "IpoptConfig.h")
+"""Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
+UNTOLD = "of a version that it does not tell"
+_TOLD = re.compile(r'^#define IPOPT_VERSION "(.+)"', re.MULTILINE)
+
+
+def line() -> str:
+    """Return the line that `loomopt --version` prints."""
+    return f"loomopt {__version__} (CasADi {importlib.metadata.version('casadi')}, IPOPT {ipopt()})"
+
+
+def ipopt() -> str:
+    """Return the version of IPOPT, by the header that it was built with."""
+    spec = importlib.util.find_spec("casadi")
+    folders = [*(spec.submodule_search_locations or () if spec else ()), sys.prefix]
+    for header in (Path(folder) / HEADER for folder in folders):
+        if header.is_file() and (found := _TOLD.search(header.read_text(encoding="utf-8", errors="replace"))):
+            return found[1]
+    return UNTOLD
+
 
 # One short-lived process: collecting garbage, and searching all installed packages for pydantic plugins, would cost
 # a third of the time from the shell to the answer.
@@ -18,13 +50,6 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
-import typer
-
-from loomopt.base import interrupts
-from loomopt.base.errors import BadInput
-from loomopt.interface.cli import commands, studies
-from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without, printed, remarked
-from loomopt.interface.cli.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
 
 UNPROVEN = 4
 EXIT = {"optimal": 0, "infeasible": 3, "uncertified": 4, "failed": 4, "interrupted": interrupts.INTERRUPTED}
@@ -40,9 +65,7 @@ def start(
 ) -> None:
     """Show the version, or what there is to do."""
     if version:
-        from loomopt.interface.cli import versions
-
-        print(versions.line())
+        print(line())
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from loomopt.interface.finished import DesignStudy
-    from loomopt.studies.run.findings import SceneStudy
-    from loomopt.studies.run.rows import Row
+    from loomopt.studies.run.rows import Row, SceneStudy
 
 Target = Annotated[str | None, typer.Option(help="What to optimise; the job's default without it.")]
 Workers = Annotated[str | None, typer.Option(metavar="N", help="So many processes on this machine.")]
@@ -154,7 +153,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
     from loomopt.interface.finished import DesignStudy, conducted
     from loomopt.interface.text import studies
-    from loomopt.studies.run.findings import counted
+    from loomopt.studies.run.rows import counted
 
     for path in how.out or ():
         studies.check_table(path)
@@ -217,9 +216,9 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
         from loomopt.base.errors import refusal
 
         raise refusal("there are a cluster and a number of workers", "", "--workers", count, remedy="Give one of them")
-    from loomopt.studies.run import executors
+    from loomopt.studies.run import run
 
-    with executors.dask(dask) as executor:
+    with run.dask(dask) as executor:
         yield executor
 
 

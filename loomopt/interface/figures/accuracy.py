@@ -13,8 +13,8 @@ from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes import provenance
 from loomopt.studies.accuracy.accuracy import AccuracyStudy, in_time
-from loomopt.studies.accuracy.ladders import LadderRow, grouped, setting_text
 from loomopt.studies.accuracy.readings import NUMBERS
+from loomopt.studies.accuracy.subject import LadderRow, grouped, setting_text
 
 FORMATS = (".png", ".svg", ".pdf", ".csv")
 LEAST = 1e-17

@@ -12,7 +12,7 @@ from loomopt.interface.figures.figure import COLOURS, Entry, blank, head, own_st
 from loomopt.interface.files import outputs
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain
-from loomopt.studies.effects.found import Found
+from loomopt.studies.effects.study import Found
 
 WIDTH, BAR, ROOM = 7.0, 0.34, 1.25
 """Inches: of the page, of an effect's bars, beside those of a panel."""

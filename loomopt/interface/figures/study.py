@@ -20,10 +20,9 @@ from loomopt.interface.study_table import Column
 from loomopt.interface.text import studies
 from loomopt.interface.text.layout import spaced
 from loomopt.jobs import registry
-from loomopt.picture import placing
+from loomopt.picture import shapes
 from loomopt.picture.shapes import Drawing, Text, extent, plain
-from loomopt.studies.run.findings import Change, Findings, SceneStudy
-from loomopt.studies.run.rows import Row
+from loomopt.studies.run.rows import Change, Findings, Row, SceneStudy
 
 ROOM = 0.16
 """Share of the curve's height that is left above it for the numbers."""
@@ -122,13 +121,13 @@ def lettered(figure: Any, axes: Any, points: Sequence[tuple[str, float, float]])
     """Name points of a curve by letters beside them, clear of what is drawn in the axes."""
     figure.draw_without_rendering()
     unit = LETTER * figure.dpi / PIXELS
-    step = placing.STEP * unit
+    step = shapes.STEP * unit
     ways = [_drawn_mark(line) for line in axes.lines]
     ways += [_corners(each.get_window_extent()) for each in (axes, *axes.texts)]
     strokes = np.concatenate([_followed(way, step) for way in ways])
     at = axes.transData.transform([(x, y) for _, x, y in points])
-    wishes = [placing.LabelWish([(float(x), float(y))], np.pi / 4, 0.9 * unit, unit) for x, y in at]
-    for (letter, x, y), spot in zip(points, placing.place(wishes, strokes, unit), strict=True):
+    wishes = [shapes.LabelWish([(float(x), float(y))], np.pi / 4, 0.9 * unit, unit) for x, y in at]
+    for (letter, x, y), spot in zip(points, shapes.place(wishes, strokes, unit), strict=True):
         axes.plot(x, y, "o", color="#111827", markersize=5, fillstyle="none")
         middle = ((spot.box.left + spot.box.right) / 2, (spot.box.bottom + spot.box.top) / 2)
         place = axes.transAxes.inverted().transform(middle)

@@ -9,7 +9,7 @@ from loomopt.interface.text.layout import Grid, joined
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
-from loomopt.studies.effects.found import Found
+from loomopt.studies.effects.study import Found
 from loomopt.studies.effects.worth import LIMITS, Worth
 
 if TYPE_CHECKING:

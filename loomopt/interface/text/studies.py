@@ -12,8 +12,7 @@ from loomopt.interface.files import outputs
 from loomopt.interface.study_table import Column
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes.provenance import csv
-from loomopt.studies.run.findings import Change, SceneStudy, counted
-from loomopt.studies.run.rows import Row
+from loomopt.studies.run.rows import Change, Row, SceneStudy, counted
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,17 +6,16 @@ from typing import final
 
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
+from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import LENGTHS
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
-from loomopt.jobs.task import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
-from loomopt.model.moves import Move, Preference
 from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Goal, Numbers, Variable, goals
+from loomopt.model.program import Goal, Move, Numbers, Preference, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
 from loomopt.physics.tolerances import NO_MASS

@@ -8,7 +8,7 @@ from loomopt.base.quantities import Length, Mass, PositiveLength, PositiveMass, 
 from loomopt.base.units import ShowValue, usual
 from loomopt.jobs.beatup.model import CrankRocker
 from loomopt.model import drive
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import crank_rocker
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
 from loomopt.scenes.tables import SceneSchema
@@ -100,7 +100,7 @@ SCHEMA = SceneSchema(
     title="four-bar crank-rocker beat-up: balance the reed torque within the space",
     operation=Operation,
     mechanism=Mechanism,
-    effects=declared.of("loomopt.physics.effects.beatup"),
+    effects=kinds.of("loomopt.physics.effects.beatup"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,

@@ -6,6 +6,7 @@ from typing import final
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen, lazy
+from loomopt.jobs.base import Asked, Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import (
     AFTER,
@@ -21,14 +22,12 @@ from loomopt.jobs.rapier.model import (
     read,
 )
 from loomopt.jobs.rapier.scene import FIGURES, STROKE, match_table
-from loomopt.jobs.task import Asked, Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.maths.systems import FLOAT
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.moves import Move
 from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Objective, Peak, Value
-from loomopt.model.program import Numbers, Variable
+from loomopt.model.program import Move, Numbers, Variable
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.mechanisms import rapier_drive

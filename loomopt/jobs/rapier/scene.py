@@ -8,7 +8,7 @@ from loomopt.base.errors import refusal
 from loomopt.base.quantities import Angle, Coordinate, DwellAngle, PositiveLength, PositiveNumber, Speed
 from loomopt.jobs.rapier.model import CLOSES, SLEY, SLEY_MARGINS
 from loomopt.model import drive
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.schema import Axis, Conflict, Figure, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
@@ -130,7 +130,7 @@ SCHEMA = SceneSchema(
     title="rapier drive on the sley: stroke and dwells with the least head acceleration",
     operation=Operation,
     mechanism=Mechanism,
-    effects=declared.of("loomopt.physics.effects.rapier"),
+    effects=kinds.of("loomopt.physics.effects.rapier"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,

@@ -5,10 +5,88 @@ from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
 from loomopt.jobs.rapier.model import read
+from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
+from loomopt.model.model import JobModel
+from loomopt.physics import balance
 from loomopt.physics.cycle import TURN
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.picture import effect_equations
+from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
 from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.scenes.scene import Scene
+
+
+def equations(model: JobModel) -> tuple[Equation, ...]:
+    """Return the equations of a rapier scene: dead centres, both loops, travel, each term, balance, crank torque.
+
+    An effect that is not in the scene leaves no symbol and no term.
+    """
+    d = Dimensions(*(symbol(name) for name in Dimensions.__dataclass_fields__))
+    return (*_sley(d), *_five_bar(d), *_travel(d), *_forces(model))
+
+
+def _sley(d: Dimensions) -> list[Equation]:
+    """Run the sley's own closed forms on symbols, and close the loop A0 A B1 B0; phi7: direction of A0→B0 from x."""
+    sp, sley = sympy(), Sley(systems.sympy(), d)
+    phi1, beta, beta_r, phi7, phi2, phi3 = (symbol(name) for name in ("phi1", "beta", "beta_r", "phi7", "phi2", "phi3"))
+    crank = phi1 + beta + phi7
+    sides = (
+        (d.l1 * sp.cos(crank) + d.l2 * sp.cos(phi2), d.l71 * sp.cos(phi7) + d.l3 * sp.cos(phi3)),
+        (d.l1 * sp.sin(crank) + d.l2 * sp.sin(phi2), d.l71 * sp.sin(phi7) + d.l3 * sp.sin(phi3)),
+    )
+    return [
+        equation("front dead centre", beta, sley.stand.beta),
+        equation("rear dead centre", beta_r, sley.centres.beta_r),
+        equation("rear dead centre", symbol("phi1_rear"), sp.pi + beta_r - beta),
+        equation("direction of A0 B0", phi7, sley.stand.frame_angle),
+        *loop(sides, phi1, (moving("phi2"), moving("phi3")), kind="sley: "),
+    ]
+
+
+def _five_bar(d: Dimensions) -> list[Equation]:
+    """Close the loop C0 C D B2 B0; the second crank turns twice as fast, against the first."""
+    sp, phi1 = sympy(), symbol("phi1")
+    phi4, sley = Angle("phi4", sp.Integer(-2), sp.Integer(0)), moving("phi3")
+    phi5, phi6 = moving("phi5"), moving("phi6")
+    carrier = sley.symbol + d.alpha
+    sides = tuple(
+        (
+            pivot + d.l4 * part(phi4.symbol) + d.l5 * part(phi5.symbol),
+            d.l3p * part(carrier) + d.l6 * part(phi6.symbol),
+        )
+        for pivot, part in ((d.C0x, sp.cos), (d.C0y, sp.sin))
+    )
+    return [
+        equation("second crank", phi4.symbol, d.phi40 - 2 * phi1),
+        *loop(sides, phi1, (phi5, phi6), (sley, phi4), kind="five-bar: "),
+    ]
+
+
+def _travel(d: Dimensions) -> list[Equation]:
+    """Write the rapier's travel S and its derivatives [Hong17, eq 1]."""
+    phi60, angle = symbol("phi60"), moving("phi63")
+    phi3, phi6 = moving("phi3"), moving("phi6")
+    return [
+        equation("at front dead centre", phi60, sympy().Function("phi6")(0)),
+        equation("driving link on the sley", angle.symbol, phi6.symbol - phi3.symbol - phi60 + d.phi30),
+        equation("travel", symbol("S"), d.travel * angle.symbol),
+        equation("travel", symbol("S'"), d.travel * (phi6.rate - phi3.rate)),
+        equation("travel", symbol("S''"), d.travel * (phi6.second - phi3.second)),
+    ]
+
+
+def _pose() -> balance.Pose:
+    """Return a pose of symbols: the output is the rapier's travel."""
+    return balance.Pose(symbol("phi1"), symbol("omega"), symbol("S"), symbol("S'"), symbol("S''"))
+
+
+def _forces(model: JobModel) -> list[Equation]:
+    """Write each term that is on, their balance and the crank torque, and the checks."""
+    return effect_equations.forces(
+        model, _pose(), effect_equations.given(model, Symbols(speed=symbol("omega"))), "Q", "Q"
+    )
+
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
@@ -37,9 +115,8 @@ class RapierViews(JobViews):
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
-        from loomopt.jobs.rapier import equations
 
-        return equations.equations(registry.of(scene).model(scene))
+        return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
         """Return the sley's dead centres, rad, the hand-over and the dwell."""

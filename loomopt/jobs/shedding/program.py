@@ -10,19 +10,18 @@ import numpy as np
 
 from loomopt.base.errors import refusal
 from loomopt.base.records import Frozen, lazy
+from loomopt.jobs.base import Asked, Ends, Task, bound_limits, ends, size_read
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, HealdFrame, LawTarget, chosen, dwelt
-from loomopt.jobs.task import Asked, Ends, Task, bound_limits, ends, size_read
 from loomopt.maths import systems
 from loomopt.maths.systems import numpy
 from loomopt.model import drive
 from loomopt.model.limits import BoundLimit, Limit
 from loomopt.model.model import JobModel
-from loomopt.model.moves import Move
 from loomopt.model.numbers import numbers, words
 from loomopt.model.objectives import Objective, Peak, Value
-from loomopt.model.program import Goal, Numbers, Variable, goals, nothing_follows
+from loomopt.model.program import Goal, Move, Numbers, Variable, goals, nothing_follows
 from loomopt.model.reading import Quantities
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Floats, Node

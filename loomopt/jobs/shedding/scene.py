@@ -24,7 +24,7 @@ from loomopt.jobs.shedding.model import FOLLOWER
 from loomopt.model import drive
 from loomopt.model.numbers import words
 from loomopt.physics.cycle import Where
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.mechanisms import cam_follower, cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, knots
@@ -235,7 +235,7 @@ SCHEMA = SceneSchema(
     title="cam shedding with spring return: the least spring that keeps the roller on the cam",
     operation=Operation,
     mechanism=Mechanism,
-    effects=declared.of("loomopt.physics.effects.shedding"),
+    effects=kinds.of("loomopt.physics.effects.shedding"),
     variables=VARIABLES,
     own_figures=FIGURES,
     targets=TARGETS,

@@ -1,19 +1,317 @@
 """Shedding's own views: the cam, its profile, the cam force, and what a designer should know beside the numbers."""
 
+import dataclasses
+import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, get_args
 
 from loomopt.jobs import registry
-from loomopt.jobs.shedding.model import LAW, RETURN, RISE, SEGMENT
-from loomopt.maths.systems import FLOAT, Number
+from loomopt.jobs.shedding.model import (
+    FAR_DWELL,
+    FOLLOWER,
+    LAW,
+    LEAST,
+    MOST,
+    NEAR_DWELL,
+    RETURN,
+    RISE,
+    SEGMENT,
+    CamFrame,
+    FrameMotion,
+    frame,
+)
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT, Maths, Number
 from loomopt.model.curves import POWER
+from loomopt.model.model import JobModel
 from loomopt.model.sampling import Sampler, near_zero
+from loomopt.physics.balance import Acting, Given
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Load, Motion
+from loomopt.physics.mechanisms import cam_spline
+from loomopt.physics.mechanisms.cam_follower import Contact, Follower
+from loomopt.physics.mechanisms.cam_laws import LawDerivatives
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
+from loomopt.physics.schema import Values
+from loomopt.picture import effect_equations
+from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
 from loomopt.picture.job_views import JobViews, Marks, Span
 from loomopt.picture.panels import BY_EFFECT, Curve, Panel
 from loomopt.scenes.scene import Scene
+
+PRIMES = ("s", "s'", "s''")
+
+
+@dataclass(frozen=True)
+class Unwritten:
+    """A cam law of which nothing is known but its name: s(u) and its derivatives are symbols."""
+
+    law: CamLaw
+
+    @property
+    def key(self) -> Hashable:
+        """The law's own."""
+        return self.law.key
+
+    @property
+    def breaks(self) -> tuple[Fraction, ...]:
+        """The law's own."""
+        return self.law.breaks
+
+    @property
+    def symmetric(self) -> bool:
+        """The law's own."""
+        return self.law.symmetric
+
+    def prepared(self, maths: Maths, values: Values) -> dict[str, Number]:
+        """Return nothing."""
+        return {}
+
+    def at(self, maths: Maths, values: Values, u: Number, piece: Number) -> LawDerivatives:
+        """Return symbols."""
+        return LawDerivatives(*(symbol(name) for name in (*PRIMES, "s'''")))
+
+
+def law(found: CamLaw) -> list[Equation]:
+    """Return s(u) and its first two derivatives as the law has them: by pieces of u, or what it is made of."""
+    if isinstance(found, Spline):
+        return _spline(found)
+    if isinstance(found, Tabulated):
+        return _table(found.table)
+    assert isinstance(found, Named)
+    u, ends = symbol("u"), [Fraction(0), *found.breaks, Fraction(1)]
+    pieces = [found.at(systems.sympy(), {}, u, k) for k in range(len(ends) - 1)]
+    sp = sympy()
+    bounds = list(itertools.pairwise(sp.Rational(end.numerator, end.denominator) for end in ends))
+    written = []
+    for order, name in enumerate(PRIMES):
+        formulas = [
+            (expanded(piece[order], u), (low, u, high)) for piece, (low, high) in zip(pieces, bounds, strict=True)
+        ]
+        written.append(cases(f"cam law {found.name}", symbol(name), formulas))
+    return written
+
+
+def expanded(formula: Expression, u: Expression) -> Expression:
+    """Return a law's formula as a sum of powers of u and plain sine waves."""
+    from sympy.simplify.fu import TR8
+
+    sp = sympy()
+    rest = sp.sin(sp.pi * (1 - u) / 2)
+    found = sp.expand(TR8(sp.expand(sp.sympify(formula).subs(rest, sp.cos(sp.pi * u / 2)))))
+    waves = found.atoms(sp.sin, sp.cos)
+    if waves and not sp.Poly(found, *waves).is_linear:
+        found = sp.expand(sp.expand(found.rewrite(sp.exp)).rewrite(sp.cos))
+    return sp.collect(found, [*sorted(found.atoms(sp.sin, sp.cos), key=str), u], sp.factor)
+
+
+def _knots(letter: str, count: int) -> tuple[Expression, ...]:
+    """Return what stands at a knot k and the next, padded to so many knots."""
+    return symbol(f"{letter}_k"), *[symbol(f"{letter}_(k+1)")] * (count - 1)
+
+
+def _spline(found: Spline) -> list[Equation]:
+    """Write the spline on the interval between knots k and k + 1, t counted from knot k."""
+    n = found.intervals
+    made = cam_spline.SplineData(*(_knots(letter, n + 1) for letter in "sva"))
+    t, u = symbol("t"), symbol("u")
+    at = made.at(systems.sympy(), t, 0)
+    kind = f"cam law spline, k = 0 ... {n - 1}"
+    ends = [("s_0", 0), ("v_0", 0), (f"s_{n}", 1), (f"v_{n}", 0)]
+    return [
+        equation(kind, t, u - symbol("k") / n),
+        *(equation(kind, symbol(name), at[order]) for order, name in enumerate(PRIMES)),
+        *(equation("cam law, at rest at both ends", symbol(name), sympy().Integer(value)) for name, value in ends),
+    ]
+
+
+def _table(found: cam_spline.LawTable) -> list[Equation]:
+    """Say what the law through a table is: a cubic between each point and the next."""
+    points = len(found.u)
+    said = f"the C2 cubic through the table's {points} points (u, s), s' = 0 at both ends"
+    u, k = symbol("u"), symbol("u_k")
+    t, jerk = symbol("t"), symbol("j_k")
+    s, v, a = (symbol(f"{letter}_k") for letter in "sva")
+    kind = f"cam law table, k = 0 ... {points - 2}"
+    return [
+        Equation("cam law table", f"s(u): {said}", rf"s(u):\ \text{{{said}}}"),
+        equation(kind, t, u - k),
+        equation(kind, symbol("s"), s + v * t + a * t**2 / 2 + jerk * t**3 / 6),
+    ]
+
+
+SPEED = "omega"
+SEGMENTS = {
+    RISE: "in the rise",
+    FAR_DWELL: "in the far dwell",
+    RETURN: "in the return",
+    NEAR_DWELL: "in the near dwell",
+}
+
+
+@dataclass(frozen=True)
+class FrameSymbols(Motion):
+    """The frame at one instant, as loads read it: X, X', X'' are symbols; segment, worst: data."""
+
+    phi: Number
+    segment: int
+    worst: int
+    q: Number
+    q1: Number
+    q2: Number
+    lowered: Number
+    u: Number
+    omega: Number
+    omega_dot: Number = None
+
+    @property
+    def direction(self) -> Number:
+        """Sign of X', `worst` in the dwells."""
+        return {RISE: 1, RETURN: -1}.get(self.segment, self.worst)
+
+
+def equations(model: JobModel) -> tuple[Equation, ...]:
+    """Return the equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
+
+    An effect that is not in the scene leaves no symbol and no term. phi0: the arm's angle at the beginning of the
+    rise; omega: speed of the cam shaft; w: |d(x, y)/d theta|.
+    """
+    known, cam = _given(model), frame(model)
+    found = [*law(cam.law), *motion(cam, known), *_forces(model, known)]
+    if model.has_quantity("curvature"):
+        found += follower()
+    pose = _pose(model, cam.segments[0], LEAST)
+    return (*found, *(each for check in model.checks for each in effect_equations.check_equations(check, pose, known)))
+
+
+def _given(model: JobModel) -> Given:
+    """Return the scene's numbers as symbols, with the words that choose formulas."""
+    knots = {name for name in model.known if name.startswith("law_")}
+    values = {name: symbol(name) for name in model.known - knots - set(model.labels)}
+    values |= {"speed": symbol(SPEED)} if "speed" in values else {}
+    far = values["rise"]
+    turning = far + values["far_dwell"]
+    values |= {"begin.far": far, "begin.return": turning, "begin.near": turning + values["return"]}
+    return effect_equations.given(model, values)
+
+
+def _pose(model: JobModel, segment: int, worst: int) -> FrameSymbols:
+    X, X1, X2 = (symbol(name) for name in ("X", "X'", "X''"))
+    lowered, u = X / symbol("travel"), symbol("u")
+    pose = FrameSymbols(symbol("theta"), segment, worst, X, X1, X2, lowered, u, symbol(SPEED))
+    return effect_equations.turning(pose, model)
+
+
+def _forces(model: JobModel, known: Given) -> list[Equation]:
+    """Write each term, their balance, the torque on the cam, and contact."""
+    segments = frame(model).segments
+    found = [_term(model, segments, load, known) for load in model.loads]
+    pose = _pose(model, segments[0], LEAST)
+    found += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
+    found += effect_equations.crank_motion(model, pose, known, "cam_torque")
+    judged = [SEGMENTS[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
+    where = " and ".join(judged) if judged else "for every theta"
+    found.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
+    moves = _pose(model, RISE, LEAST), _pose(model, RETURN, LEAST)
+    return found + effect_equations.event_equations(model, moves, known, "N")
+
+
+def _term(model: JobModel, segments: Sequence[int], load: Acting, known: Given) -> Equation:
+    """Write a load's term by its own formula: by segments where that differs, else as any load's."""
+
+    def force(segment: int, worst: int = LEAST) -> Expression:
+        return effect_equations.force(load, _pose(model, segment, worst), known, 0)
+
+    if len({force(segment) for segment in segments}) > 1:
+        rows = [_in_segment(model, load, segment, force) for segment in segments]
+        return cases(load.name, symbol(f"N_{load.name}"), rows)
+    return effect_equations.term(load, _pose(model, segments[0], LEAST), known, "N")
+
+
+def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[..., Expression]) -> Case:
+    """Return a term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
+    known_in = load.known_in(model.words_of(load.name)) if isinstance(load, Load) else ()
+    if known_in and (SEGMENT, float(segment)) not in known_in:
+        return "not known", SEGMENTS[segment]
+    least, most = force(segment), force(segment, MOST)
+    if least != most:
+        return f"any value of {text(least)} ... {text(most)} ({text(least)} for contact)", SEGMENTS[segment]
+    return least, SEGMENTS[segment]
+
+
+def motion(cam: CamFrame, given: Given) -> list[Equation]:
+    """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
+    theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
+    ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
+    spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in cam.segments]
+    poses = {SEGMENTS[k]: pose(cam, given, k) for k in cam.segments}
+    named = (("argument of the law", "u"), ("travel", "X"), ("travel", "X'"), ("travel", "X''"))
+    read: tuple[Callable[[FrameMotion], Number], ...] = (
+        lambda at: at.u,
+        lambda at: at.q,
+        lambda at: at.q1,
+        lambda at: at.q2,
+    )
+    return [
+        cases("segments", symbol("segment"), spans),
+        *(
+            cases(kind, symbol(name), [(of(at), where) for where, at in poses.items()])
+            for (kind, name), of in zip(named, read, strict=True)
+        ),
+    ]
+
+
+def pose(cam: CamFrame, given: Given, segment: int) -> FrameMotion:
+    """Return the frame's pose on symbols in a segment; the law's s, s', s'' are symbols."""
+    unwritten = dataclasses.replace(cam, law=Unwritten(cam.law))
+    return unwritten.pose(systems.sympy(), given, Node(symbol("theta"), {SEGMENT: segment, LAW: 0}))
+
+
+class _Started(Follower):
+    """A follower whose angle φ0 is a symbol."""
+
+    def start_angle(self, maths: Maths) -> Number:
+        """Return φ0."""
+        return symbol("phi0")
+
+
+def follower() -> list[Equation]:
+    """Return the follower's equations: swing, roller centre, pressure angle, curvature, profile."""
+    system, theta = systems.sympy(), symbol("theta")
+    numbers = [symbol(name) for name in FOLLOWER]
+    at = Contact(system, _Started(*numbers), symbol("phi"), symbol("phi'"), symbol("phi''"))
+    speed = sympy().Symbol("w", positive=True)
+    swing = symbol("arm_swing") / symbol("travel")
+
+    def short(value: Expression) -> Expression:
+        return sympy().sympify(value).subs(at.speed**2, speed**2)
+
+    centre, profile = at.centre(theta), at.profile(theta)
+    return [
+        equation("follower", symbol("phi0"), Follower(*numbers).start_angle(system)),
+        *(equation("follower", symbol(f"phi{p}"), swing * symbol(f"X{p}")) for p in ("", "'", "''")),
+        equation("roller centre", symbol("x"), centre.x),
+        equation("roller centre", symbol("y"), centre.y),
+        equation("roller centre", speed, at.speed),
+        equation("pressure angle", symbol("pressure_angle"), at.pressure_angle),
+        equation("curvature of the roller centre's curve", symbol("curvature"), short(at.curvature)),
+        equation("profile", symbol("x_p"), symbol("x") + short(profile.x - centre.x)),
+        equation("profile", symbol("y_p"), symbol("y") + short(profile.y - centre.y)),
+        equation("profile", symbol("profile_curvature"), _profile_curvature(numbers)),
+    ]
+
+
+def _profile_curvature(numbers: Sequence[Expression]) -> Expression:
+    """Run the profile's curvature on that of the roller centre's curve."""
+
+    class Bent(Contact):
+        curvature = symbol("curvature")
+
+    return Bent(systems.sympy(), Follower(*numbers), 0, 0, 0).profile_curvature
+
 
 if TYPE_CHECKING:
     from loomopt.model.separation import Parted
@@ -53,9 +351,8 @@ class SheddingViews(JobViews):
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
-        from loomopt.jobs.shedding import equations
 
-        return equations.equations(registry.of(scene).model(scene))
+        return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
         """Return the dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
@@ -73,7 +370,7 @@ class SheddingViews(JobViews):
         if parted is None:
             return found
 
-        from loomopt.picture.parted import marks
+        from loomopt.picture.job_views import marks
 
         return marks(parted, found)
 
@@ -110,7 +407,7 @@ class SheddingViews(JobViews):
         shown = [panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown]
         if "X_cam [m]" not in columns:
             return tuple(shown)
-        from loomopt.picture.parted import together
+        from loomopt.picture.job_views import together
 
         return together(shown, ("X [m]", "X_cam [m]"), "travel of frame and cam")
 
@@ -126,7 +423,7 @@ class SheddingViews(JobViews):
 def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
     """Say where the roller leaves the cam, where an effect says what then becomes of the frame."""
     if parted:
-        from loomopt.picture.parted import remarks
+        from loomopt.picture.job_views import remarks
 
         yield from remarks(scene, parted)
 

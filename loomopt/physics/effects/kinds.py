@@ -4,7 +4,9 @@ An effect that is absent from a scene is absent from its equations.
 """
 
 import functools
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import importlib
+import pkgutil
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
@@ -418,3 +420,42 @@ def owned(effect: Effect, key: str) -> str:
 def label(effect: Effect, key: str) -> str:
     """Return what a designer calls a number of an effect's table; of an instance the label names that too."""
     return f"{effect.instance}.{key}" if effect.instance else key
+
+
+@functools.cache
+def of(package: str) -> Mapping[str, Effect]:
+    """Return the effects that the modules of a package declare as EFFECT, by name, the lowest rank first."""
+    folder = importlib.import_module(package)
+    names = [found.name for found in pkgutil.iter_modules(folder.__path__)]
+    modules = [importlib.import_module(f"{package}.{name}") for name in names]
+    return ranked(module.EFFECT for module in modules if hasattr(module, "EFFECT"))
+
+
+class Fault(NamedTuple):
+    """An effect that cannot be on: the other effect that is missing or in its way, and the problem in words."""
+
+    effect: Effect
+    other: str
+    missing: bool
+    problem: str
+
+
+def faults(active: Mapping[Effect, Table]) -> Iterator[Fault]:
+    """Yield what keeps effects from being on together; active: effects with their tables, in the order of the job."""
+    tables = {effect.name: own for effect, own in active.items()}
+    for effect in active:
+        for name in effect.beside:
+            if name not in tables:
+                yield Fault(effect, name, True, f"effect {effect.name} needs the effect {name}")
+        carried = effect.carries if isinstance(effect, State) else ()
+        for load in active:
+            if isinstance(load, Load) and load.name in carried and load.corners and not load.response:
+                problem = f"effect {effect.name} carries {load.name}, which has corners: its answer has no closed form"
+                yield Fault(effect, load.name, False, problem)
+        for clash in effect.clashes:
+            if clash.effect in tables:
+                word = str(getattr(tables[clash.effect], clash.key)) if clash.key else ""
+                if not clash.words or word in clash.words:
+                    kind = f" with {clash.key} {word}" if word else ""
+                    problem = f"effects {effect.name} and {clash.effect}{kind} cannot be on together: {clash.why}"
+                    yield Fault(effect, clash.effect, False, problem)

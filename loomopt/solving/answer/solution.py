@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from loomopt.base.quantities import quantity_of
 from loomopt.base.records import Shown, freeze, lazy
@@ -14,9 +14,6 @@ from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
 from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound
-
-if TYPE_CHECKING:
-    from loomopt.scenes.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from loomopt.maths.systems import Maths, Number
 from loomopt.maths.systems import boxes as box_system
 from loomopt.model.limits import Limit
 from loomopt.model.model import Integral, JobModel, Stills
-from loomopt.model.moves import Move
-from loomopt.model.program import Program, Variable
+from loomopt.model.program import Move, Program, Variable
 from loomopt.model.reading import DATUM, Quantities, Rows
 from loomopt.model.sampling import Sampler
 from loomopt.physics.balance import Given, total

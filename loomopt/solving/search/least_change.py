@@ -14,9 +14,8 @@ import numpy as np
 
 from loomopt.maths.systems import Number
 from loomopt.model.model import DesignRow, Instant, JobModel
-from loomopt.model.moves import LEAST_CHANGE
 from loomopt.model.objectives import Value
-from loomopt.model.program import Program, Variable
+from loomopt.model.program import LEAST_CHANGE, Program, Variable
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import CORRECTIONS, FEASIBLE, MOVED, PRECISE, RANK, ROUNDING
 from loomopt.solving.certificate.certificate import certify

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -312,9 +312,6 @@ def _least_change(judged: Judged, count: int) -> Floats:
 def _slopes(residual: Jet | Floats, designs: int, count: int) -> Floats:
     return residual.g if isinstance(residual, Jet) else np.zeros((designs, count))
 
-
-if TYPE_CHECKING:
-    pass
 
 MORE_STARTS = 8
 """Starts tried before a target is called infeasible or uncertified: one in eight reaches the optimum of the scenes'

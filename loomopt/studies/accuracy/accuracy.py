@@ -15,18 +15,18 @@ from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.options import check_sought
 from loomopt.studies.accuracy import optima, readings
-from loomopt.studies.accuracy.ladders import (
+from loomopt.studies.accuracy.subject import (
     EPSILON,
     Ladder,
     LadderRow,
     Setting,
+    Subject,
     climbed,
     grouped,
     knee,
     order,
     setting_text,
 )
-from loomopt.studies.accuracy.subject import Subject
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,8 +14,7 @@ from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Point, Settings
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.ladders import Ladder, LadderReference, Rung, Setting
-from loomopt.studies.accuracy.subject import StudiedTarget, Subject
+from loomopt.studies.accuracy.subject import Ladder, LadderReference, Rung, Setting, StudiedTarget, Subject
 
 EXCHANGE, UNIFORM, TOLERANCE, HESSIAN = "exchange", "uniform points", "IPOPT tolerance", "Hessian"
 CLAIM = "claimed peak"

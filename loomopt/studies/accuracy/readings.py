@@ -14,9 +14,8 @@ from loomopt.physics.cycle import TURN, Floats, Node
 from loomopt.physics.tolerances import SAME_ANGLE
 from loomopt.solving.nlp import expressions
 from loomopt.studies.accuracy import reference_digits
-from loomopt.studies.accuracy.ladders import Ladder, LadderReference, Rung
 from loomopt.studies.accuracy.reference_digits import EXTREME_STEPS, REFERENCE_SLOPE
-from loomopt.studies.accuracy.subject import POSITIONS, Subject
+from loomopt.studies.accuracy.subject import POSITIONS, Ladder, LadderReference, Rung, Subject
 
 SAMPLED, REFINED = "sampled points", "refined points"
 CLOSED, AUTOMATIC, DIFFERENCES, NUMBERS = "closed form", "automatic differentiation", "finite differences", "numbers"

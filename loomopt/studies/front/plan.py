@@ -10,8 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from loomopt.physics.tolerances import ACCURACY
-from loomopt.studies.run.findings import Change
-from loomopt.studies.run.rows import PEAK, Multiplier, Row, Side
+from loomopt.studies.run.rows import PEAK, Change, Multiplier, Row, Side
 
 ENDS = 0, 1
 """Points where the first axis, and the second, is least."""

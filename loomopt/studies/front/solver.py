@@ -27,7 +27,7 @@ from loomopt.solving.search import elastic, least_change, multistart
 from loomopt.solving.search.multistart import searched, spread, tied
 from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import Touched, sloped
-from loomopt.studies.run import warm
+from loomopt.studies.run import rows
 from loomopt.studies.run.rows import PEAK, Multiplier, Side
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Solver:
         search = self._begun(asking)
         program = search.program
         for data in near:
-            point = warm.read(data["point"], program)
+            point = rows.read(data["point"], program)
             if point:
                 search = tried(search, point.x, point)
             elif start := exchange.started(program, data["point"]["x"]):
@@ -178,7 +178,7 @@ class Solver:
         status = "optimal" if certified else "uncertified"
         axes = {axis.axis.name: self._figure(axis, program, best.x) for axis in self.axes}
         told = {
-            "point": warm.written(replace(best.point, x=dict(best.x)), program),
+            "point": rows.written(replace(best.point, x=dict(best.x)), program),
             "active": self._active(program, best.x),
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
@@ -345,7 +345,7 @@ def whole_answer(solver: Solver, target: str | None, found: Reached, asking: Ask
     caps = tuple((axis, cap) for axis, cap in zip(solver.axes, asking.caps, strict=True) if cap is not None)
     programs = [solver.program(asking._replace(levels=levels)) for levels in (1, 2)]
     for program in programs:
-        point = warm.read(found.warm.get("point", {}), program)
+        point = rows.read(found.warm.get("point", {}), program)
         if point:
             terms = FrontTerms(solver.scene, target, solver.axes, solver.base, program, caps)
             here = terms.whole(solver.job.design(solver.base, point.x))

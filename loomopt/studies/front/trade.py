@@ -24,8 +24,7 @@ from loomopt.solving.answer.solution import Solution, Words
 from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver
-from loomopt.studies.run.findings import Findings
-from loomopt.studies.run.rows import Row, StudyTask
+from loomopt.studies.run.rows import Findings, Row, StudyTask
 
 PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""

@@ -1,10 +1,19 @@
 """The rows of a study: plain records that are the same numbers in memory, in a store and in a worker process."""
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from loomopt.base.records import freeze
+from loomopt.model.program import Program
+from loomopt.model.sampling import Extreme
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Solution
+from loomopt.solving.nlp.point import Point
+from loomopt.solving.nlp.rows import Multipliers, row_map
 
 UNTIMED = "seconds"
 """The one part of a row that is not the same each time."""
@@ -127,3 +136,138 @@ class Study(Protocol):
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task, from its arguments and from nothing else."""
+
+
+class Change(NamedTuple):
+    """Between which two values of the number that varies, SI, other limits bind: those that come or go.
+
+    kind: "jump", "kink" or "active set"; at: where, as closely as is known; None where only the two values are.
+    """
+
+    between: tuple[float, float]
+    kind: str
+    limits: tuple[Side, ...]
+    at: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as JSON data."""
+        at = self.between if self.at is None else self.at
+        found: dict[str, object] = {"at": at, "kind": self.kind, "limits": tuple(side.text for side in self.limits)}
+        return found if self.at is None else {**found, "between": self.between}
+
+
+class Findings(NamedTuple):
+    """What rows come to: those that count, in the order they are read in.
+
+    message: in a sentence, "" for none; gaps: stretches of the number that varies, SI, without a design of their own.
+    """
+
+    rows: tuple[Row, ...]
+    message: str = ""
+    changes: tuple[Change, ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
+
+
+class SceneStudy(Study, Protocol):
+    """A study of one scene, as its table, its figure and its files read it."""
+
+    @property
+    def name(self) -> str:
+        """What it is called: a command of the same name makes it."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that it starts from."""
+
+    @property
+    def target(self) -> str | None:
+        """Whose demands hold; None for none."""
+
+    @property
+    def heading(self) -> str:
+        """Scene, target and what is asked beside them, in a few words."""
+
+    @property
+    def kinds(self) -> Mapping[str, str]:
+        """Numbers that its rows are placed by, and what it seeks beside its target → kind of quantity."""
+
+    @property
+    def shown(self) -> Sequence[str]:
+        """Figures and multipliers that it is about."""
+
+    @property
+    def conditions(self) -> Mapping[str, object]:
+        """What is asked of every row, for people."""
+
+    @property
+    def settings(self) -> Mapping[str, object]:
+        """What its rows depend on, as JSON data."""
+
+    @property
+    def size(self) -> int | None:
+        """How many points there are; None where that is not known beforehand."""
+
+    def place(self, row: Row) -> Mapping[str, float]:
+        """Return where a row stands, SI: what it is placed by."""
+
+    def sought(self, row: Row) -> Mapping[str, float]:
+        """Return what it seeks beside its target at a row, SI."""
+
+    def row_json(self, row: Row) -> dict[str, object]:
+        """Return what `--json` prints of a row."""
+
+    def read(self, rows: Sequence[Row]) -> Findings:
+        """Return what finished rows come to."""
+
+    def scene_at(self, point: int) -> Scene:
+        """Return the scene that a point's design stands in."""
+
+    def solve(self, task: StudyTask, parent: Row | None) -> Solution:
+        """Return the whole answer of a task, the same digits as its row. Raises BadInput."""
+
+
+def counted(study: SceneStudy, count: int, of: str = "of") -> str:
+    """Return how many points there are, of how many where that is known."""
+    known = f"{count}" if study.size is None else f"{count} {of} {study.size}"
+    return f"{known} point{'' if (study.size or count) == 1 else 's'}"
+
+
+Nodes = tuple[tuple[Extreme, ...], ...]
+
+
+def written(point: Point, program: Program) -> dict[str, Any]:
+    """Return a point that a solve of a program ended in as JSON data."""
+    said = point.multipliers
+    raw = {"lam_x": said.lam_x, "lam_g": said.lam_g, "extra": point.extra} if said else {}
+    return {
+        "task": _task(program),
+        "x": dict(point.x),
+        "nodes": [[list(node) for node in family] for family in point.nodes],
+        "binding": [[list(node) for node in family] for family in point.binding],
+        "raw": {name: values.tolist() for name, values in raw.items()},
+    }
+
+
+def read(data: Mapping[str, Any], program: Program) -> Point | None:
+    """Return the point that data say, as a start for a program; None where they are of another structure, or none."""
+    if not data or data["task"] != _task(program):
+        return None
+    nodes, binding = _nodes(data["nodes"]), _nodes(data["binding"])
+    point = Point(dict(data["x"]), "Solve_Succeeded", True, nodes=nodes, binding=binding, structure=program.structure)
+    if not data["raw"]:
+        return point
+    lam_x, lam_g, extra = (np.array(data["raw"][name], dtype=np.float64) for name in ("lam_x", "lam_g", "extra"))
+    rows = row_map(program, 0).sized(len(lam_g))
+    return replace(point, extra=extra, multipliers=Multipliers(rows, lam_x, lam_g))
+
+
+def _nodes(families: list[list[list[Any]]]) -> Nodes:
+    return tuple(tuple(Extreme(*node) for node in family) for family in families)
+
+
+def _task(program: Program) -> str:
+    """Return what is alike in programs of one structure and in every process: names, no formulas."""
+    objectives = [each.structure for each in program.objectives]
+    limits = [limit.structure for limit in program.limits]
+    names = [variable.name for variable in program.variables], list(program.parameters)
+    return hashlib.sha256(repr((names, limits, objectives)).encode()).hexdigest()[:16]

@@ -13,11 +13,11 @@ from loomopt.interface import api
 from loomopt.interface.text import answers, layout, scenes
 from loomopt.interface.text.layout import Grid
 from loomopt.jobs.registry import load
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.solving.answer.solution import Words
 
 SCENE = load("beatup-light")
-EFFECTS = declared.of("loomopt.physics.effects.beatup")
+EFFECTS = kinds.of("loomopt.physics.effects.beatup")
 WORDS = st.text(st.characters(codec="ascii", exclude_categories=["C", "Z"]), min_size=1, max_size=9)
 CELLS = st.lists(WORDS, max_size=12).map(" ".join)
 GRID = Grid("", ("name", "", "what"), (("a", "12", "one two three four"), ("bb", "3", "five")), right=(1,))

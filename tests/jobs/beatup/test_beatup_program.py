@@ -7,9 +7,8 @@ import pytest
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
 from loomopt.model.limits import BoundLimit, DesignLimit, Limit, RatioLimit
-from loomopt.model.moves import AxisMove, Preference, ScaleMove
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Program, Variable
+from loomopt.model.program import AxisMove, Preference, Program, ScaleMove, Variable
 from loomopt.physics.tolerances import NO_MASS
 
 BEATUP = registry.load("beatup")

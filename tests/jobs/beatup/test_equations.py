@@ -6,15 +6,15 @@ import pytest
 import sympy as sp
 
 from loomopt.jobs import registry
-from loomopt.jobs.beatup import equations as beatup_equations
 from loomopt.jobs.beatup import model as beatup
+from loomopt.jobs.beatup import views as beatup_equations
 from loomopt.jobs.beatup.scene import RESISTED
 from loomopt.maths.systems import FLOAT
 from loomopt.physics import balance
 from loomopt.physics.cycle import Node
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 
-BEATUP = declared.of("loomopt.physics.effects.beatup")
+BEATUP = kinds.of("loomopt.physics.effects.beatup")
 SPEED = 62.83185307179586
 NUMBERS = {"l1": 0.031, "l2": 0.066, "l3": 0.155, "l4": 0.167, "today.l2": 0.065, "speed": SPEED, "M0": 745.0}
 NUMBERS |= {"m4e": 3.0, "r4e": 0.05, "m4": 56.8, "r4": 0.045}

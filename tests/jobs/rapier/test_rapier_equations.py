@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from loomopt.jobs.rapier import equations as rapier_equations
 from loomopt.jobs.rapier import model as rapier
+from loomopt.jobs.rapier import views as rapier_equations
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.effects.rapier import head_inertia, tape_friction

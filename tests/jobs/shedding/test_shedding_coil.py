@@ -12,7 +12,7 @@ import pytest
 from support.shedding_cases import plain, product
 
 import loomopt as lo
-from loomopt.physics.mechanisms.tension_spring import WIRES
+from loomopt.physics.effects.shedding.coil import WIRES
 from loomopt.solving.answer.report import evaluate
 from reference.coils import Contact, Steel, hook, length, lightest, mass, rate, shear, softest, surge, tensile, winding
 

@@ -8,7 +8,7 @@ import sympy as sp
 
 import loomopt as lo
 from loomopt.jobs import registry
-from loomopt.jobs.shedding import drawing, equations
+from loomopt.jobs.shedding import drawing, views
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
@@ -257,6 +257,6 @@ def test_an_expanded_formula_is_the_same_function():
     u = sp.Symbol("u", real=True)
     raw = LAWS["freudenstein_13"].formula(systems.sympy(), u, 0)
     for formula in raw[:3]:
-        short = equations.expanded(formula, u)
+        short = views.expanded(formula, u)
         assert len(str(short)) < len(str(formula))
         assert sp.N((short - formula).subs(u, sp.Rational(2, 7)), 30) == pytest.approx(0, abs=1e-25)

@@ -9,7 +9,7 @@ from loomopt.maths import systems
 from loomopt.model import numbers
 from loomopt.physics.effects.kinds import Check
 from loomopt.physics.effects.shedding import coil
-from loomopt.physics.mechanisms.tension_spring import WIRES
+from loomopt.physics.effects.shedding.coil import WIRES
 
 SCENE = registry.load("shedding").set("effects.coil", dict(coil.EFFECT.examples[0]))
 KNOWN = numbers.numbers(SCENE)

@@ -8,13 +8,13 @@ import pytest
 
 from loomopt.maths import systems
 from loomopt.physics.balance import Pose
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Check, Load, Speed
 from loomopt.physics.mechanisms import crank_rocker
 
 BEATUP = {
     name: effect
-    for name, effect in declared.of("loomopt.physics.effects.beatup").items()
+    for name, effect in kinds.of("loomopt.physics.effects.beatup").items()
     if isinstance(effect, Load | Check | Speed)
 }
 """Those with a formula of an instant; what a state passes on has tests of its own."""

@@ -79,7 +79,7 @@ def test_it_needs_what_it_carries():
 def test_a_load_with_corners_that_no_oscillator_answers_is_not_carried():
     from dataclasses import replace
 
-    from loomopt.physics.effects.declared import faults
+    from loomopt.physics.effects.kinds import faults
 
     known = PLAIN.schema.effects
     resistance = known["resistance"]

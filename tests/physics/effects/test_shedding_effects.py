@@ -15,14 +15,14 @@ from loomopt.jobs import registry
 from loomopt.jobs.shedding.model import spring_force
 from loomopt.maths import systems
 from loomopt.physics import balance
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.effects.shedding import damping as frame_damping
 from loomopt.physics.effects.shedding import dry_friction, warp_tension, weight
 from loomopt.physics.effects.shedding import inertia as frame_inertia
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=60)
-SHEDDING = declared.of("loomopt.physics.effects.shedding")
+SHEDDING = kinds.of("loomopt.physics.effects.shedding")
 MOVING = lo.load("shedding")
 JOB = registry.of(MOVING)
 FULL = MOVING.with_effect("damping").with_effect("dry_friction")

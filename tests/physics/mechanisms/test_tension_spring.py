@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
-from loomopt.physics.mechanisms.tension_spring import WIRES, Coil, strength
+from loomopt.physics.effects.shedding.coil import WIRES, Coil, strength
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.moves import AxisMove, Preference, ScaleMove
+from loomopt.model.program import AxisMove, Preference, ScaleMove
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.certificate import certify

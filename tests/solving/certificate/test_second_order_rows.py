@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import toy
 
-from loomopt.model.moves import AxisMove, Preference
+from loomopt.model.program import AxisMove, Preference
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order

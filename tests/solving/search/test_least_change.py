@@ -9,7 +9,7 @@ from support.rapiers import ROOM
 
 import loomopt as lo
 from loomopt.maths.systems import FLOAT
-from loomopt.model.moves import AxisMove, Preference
+from loomopt.model.program import AxisMove, Preference
 from loomopt.physics.mechanisms.cam_spline import spline
 from loomopt.solving.certificate import second_order
 from loomopt.solving.certificate.certificate import certify

@@ -5,7 +5,7 @@ import pytest
 from support import toy
 
 import loomopt as lo
-from loomopt.model.moves import AxisMove, Preference, ScaleMove
+from loomopt.model.program import AxisMove, Preference, ScaleMove
 from loomopt.solving.search.tie_break import moved, unchanging
 from reference.beatup import DESIGN, LENGTHS, Machine
 

@@ -12,7 +12,7 @@ import loomopt as lo
 from loomopt.interface.figures import accuracy as accuracy_figure
 from loomopt.jobs.shedding.job import JOB
 from loomopt.studies.accuracy import accuracy, optima
-from loomopt.studies.accuracy.ladders import NO_ORDER, grouped
+from loomopt.studies.accuracy.subject import NO_ORDER, grouped
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ import pytest
 
 import loomopt as lo
 from loomopt.studies.accuracy import accuracy, optima
-from loomopt.studies.accuracy.ladders import Ladder, LadderReference, LadderRow, Rung, climbed, knee, order
+from loomopt.studies.accuracy.subject import Ladder, LadderReference, LadderRow, Rung, climbed, knee, order
 
 pytestmark = pytest.mark.slow
 

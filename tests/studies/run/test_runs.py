@@ -10,7 +10,7 @@ import pytest
 from made_up_study import Chain
 
 from loomopt.base.errors import BadInput
-from loomopt.studies.run import executors, run
+from loomopt.studies.run import run
 from loomopt.studies.run.rows import Multiplier, Row, Side, digest
 from loomopt.studies.run.store import Store
 
@@ -41,7 +41,7 @@ def test_threads_and_processes_give_the_same_digest(chain):
     with ProcessPoolExecutor(2, get_context("spawn")) as processes:
         assert digest(run.run(chain, processes)) == expected
         assert processes.submit(int, 7).result() == 7, "a caller's executor goes on living"
-    assert digest(run.run(chain, executors.workers(2))) == expected
+    assert digest(run.run(chain, run.workers(2))) == expected
 
 
 def test_workers_begin_each_round_with_the_points_that_take_long(chain):
@@ -54,9 +54,9 @@ def test_workers_begin_each_round_with_the_points_that_take_long(chain):
 
 
 def test_a_worker_has_imported_what_solves_need_before_its_first_task():
-    pool = executors.workers(1)()
+    pool = run.workers(1)()
     try:
-        assert pool.submit(eval, f"set({executors.NEEDED}) <= set(__import__('sys').modules)").result()
+        assert pool.submit(eval, f"set({run.NEEDED}) <= set(__import__('sys').modules)").result()
     finally:
         pool.shutdown()
 
@@ -71,13 +71,13 @@ def test_a_point_that_fails_is_a_row_with_its_reason_and_the_others_go_on(chain)
 def test_a_worker_that_dies_costs_a_new_pool_and_no_row(chain):
     expected = digest(run.run(replace(chain, log=chain.log.with_name("other"))))
     dying = replace(chain, kills_once=(2, 13))
-    assert digest(run.run(dying, executors.workers(2))) == expected
+    assert digest(run.run(dying, run.workers(2))) == expected
     assert dying.solves().count(2) == dying.solves().count(13) == 2
 
 
 def test_a_point_that_kills_three_workers_is_a_failed_row(chain):
     lethal = replace(chain, kills=(5,))
-    rows = run.run(lethal, executors.workers(2))
+    rows = run.run(lethal, run.workers(2))
     assert lethal.solves().count(5) == 3
     assert (rows[5].status, rows[5].reason) == ("failed", run.DIED)
     assert {row.status for row in rows if row.point != 5} == {"optimal"}
@@ -152,4 +152,4 @@ def test_a_multiplier_s_text_is_read_as_it_was_written(multiplier, text):
 @pytest.mark.parametrize("count", [0, -1, 5000])
 def test_a_number_of_workers_that_cannot_be_is_refused(count):
     with pytest.raises(BadInput, match="1 to 1024"):
-        executors.workers(count)
+        run.workers(count)

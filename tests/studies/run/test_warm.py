@@ -7,7 +7,7 @@ import pytest
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving import engine
-from loomopt.studies.run import warm
+from loomopt.studies.run import rows
 
 SCENE = lo.load("beatup")
 NEXT = SCENE.set("operation.M0", "760 N*m")
@@ -23,8 +23,8 @@ def answer():
 
 
 def test_a_start_read_from_json_leads_to_the_same_bits(answer):
-    data = json.loads(json.dumps(warm.written(answer.point, program(SCENE))))
-    read, direct = engine.solve(NEXT, near=[warm.read(data, program(NEXT))]), engine.solve(NEXT, near=[answer.point])
+    data = json.loads(json.dumps(rows.written(answer.point, program(SCENE))))
+    read, direct = engine.solve(NEXT, near=[rows.read(data, program(NEXT))]), engine.solve(NEXT, near=[answer.point])
     assert read.design == direct.design
     assert read.figures == direct.figures
     assert read.message == direct.message
@@ -32,7 +32,7 @@ def test_a_start_read_from_json_leads_to_the_same_bits(answer):
 
 
 def test_a_start_of_another_task_is_none(answer):
-    data = warm.written(answer.point, program(SCENE))
-    assert warm.read(data, program(NEXT)) is not None
-    assert warm.read(data, program(SCENE, "torque")) is None
-    assert warm.read({}, program(SCENE)) is None
+    data = rows.written(answer.point, program(SCENE))
+    assert rows.read(data, program(NEXT)) is not None
+    assert rows.read(data, program(SCENE, "torque")) is None
+    assert rows.read({}, program(SCENE)) is None

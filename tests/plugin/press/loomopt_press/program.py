@@ -1,7 +1,7 @@
 """From a press scene to the program: crank, rod and every bounded number, the least peak torque."""
 
 from loomopt.base.records import lazy
-from loomopt.jobs.task import Task
+from loomopt.jobs.base import Task
 from loomopt.model.model import JobModel
 from loomopt.model.objectives import Objective, Peak
 from loomopt_press.model import model

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from loomopt.base.quantities import PositiveLength, Speed
 from loomopt.base.units import ShowValue
-from loomopt.physics.effects import declared
+from loomopt.physics.effects import kinds
 from loomopt.physics.schema import Figure, Table, Target
 from loomopt.scenes.tables import SceneSchema
 from loomopt_press.model import LONGER
@@ -43,7 +43,7 @@ SCHEMA = SceneSchema(
     title="slider-crank press: the least crank torque",
     operation=Operation,
     mechanism=Mechanism,
-    effects=declared.of("loomopt_press.effects"),
+    effects=kinds.of("loomopt_press.effects"),
     variables={"crank": "length", "rod": "length"},
     own_figures={figure.name: figure for figure in FIGURES},
     targets={"torque": Target("torque", "the least peak crank torque", Table, needs_effects=("forming",))},
