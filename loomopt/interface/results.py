@@ -115,7 +115,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         return "admissible" if self.admissible else "not admissible"
 
     @property
-    def _told(self) -> str:
+    def _summary(self) -> str:
         """What a designer asks first: the figures that the target is about."""
         from loomopt.jobs import registry
         from loomopt.solving.answer.solution import Words
@@ -129,7 +129,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         return ", ".join(f"{name} {words.shown(name, value)}" for name, value in known.items() if value is not None)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._told}>"
+        return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._summary}>"
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,8 +146,8 @@ class Answer(Evaluation, solution.Solution):
         return self.status
 
     @property
-    def _told(self) -> str:
-        return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._told
+    def _summary(self) -> str:
+        return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._summary
 
 
 def _html(thing: records.Shown) -> str:

@@ -1,1 +1,1 @@
-"""The loom jobs: a folder each, found by name (registry.py); what they share stands in base.py and task.py."""
+"""The loom jobs: a folder each, found by name (registry.py); what they share stands in base.py."""

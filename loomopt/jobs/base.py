@@ -42,7 +42,7 @@ from loomopt.scenes.tables import SceneSchema
 
 Ends = tuple[float, float]
 """Lower and upper bound."""
-Asked = Mapping[str, Sequence[tuple[str, float]]]
+Demanded = Mapping[str, Sequence[tuple[str, float]]]
 """Variable → which limits ask how much of it at least."""
 
 
@@ -147,7 +147,7 @@ class Task(abc.ABC):
         return ends
 
     @property
-    def asked(self) -> Asked:
+    def demanded(self) -> Demanded:
         """What limits on figures ask of variables that are these figures. Raises BadInput."""
         return {}
 
@@ -158,7 +158,7 @@ class Task(abc.ABC):
         One without room, or one that is not there yet, stands at the most that is asked.
         """
         found = {v.name: v for v in self.bounded}
-        for name, each in self.asked.items():
+        for name, each in self.demanded.items():
             least, held = max(value for _, value in each), self._asked_of(name)
             room = held.lower < held.upper
             if room and least > held.upper:
@@ -170,7 +170,7 @@ class Task(abc.ABC):
 
     def _asked_of(self, name: str) -> Variable:
         """Return a variable that limits ask something of; one that is not there yet stands at the most of it."""
-        least = max(value for _, value in self.asked[name])
+        least = max(value for _, value in self.demanded[name])
         return next((v for v in self.bounded if v.name == name), Variable(name, least, least, least, (least, least)))
 
     def parameters(self) -> dict[str, float]:
@@ -188,7 +188,7 @@ class Task(abc.ABC):
 
     def floors(self) -> Iterator[Limit]:
         """Yield what limits ask of variables, the most first; a row that stood twice would have no price."""
-        for name, each in self.asked.items():
+        for name, each in self.demanded.items():
             held = self._asked_of(name)
             binding = [(by, value) for by, value in each if held.lower == held.upper or value > held.lower]
             told = set[str | float]()

@@ -10,7 +10,7 @@ from test_benchmarks_small import ATTEMPTS
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.model.sampling import Sampler
-from loomopt.solving.certificate.derivatives import Forward
+from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 
@@ -37,9 +37,9 @@ def test_slopes_by_jets_take_a_fraction_of_those_in_40_digits():
     program, answer = registry.of(scene).program(scene, "law"), lo.solve(scene, "law")
     sampler = Sampler(program.model, {**program.parameters, **answer.point.x})
     rows = active_set(program, sampler).rows
-    spent = {Forward.by: math.inf, Exact.by: math.inf}
+    spent = {JetDerivatives.by: math.inf, Exact.by: math.inf}
     for _ in range(ATTEMPTS):
-        for kind in (Forward, Exact):
+        for kind in (JetDerivatives, Exact):
             began = time.process_time()
             kind(program, answer.point.x, sampler, rows).gradients()
             spent[kind.by] = min(spent[kind.by], time.process_time() - began)

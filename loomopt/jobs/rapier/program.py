@@ -6,7 +6,7 @@ from typing import final
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.jobs.base import Asked, Ends, Task, bound_limits, distinct, ends, size_read
+from loomopt.jobs.base import Demanded, Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.rapier import model as rapier
 from loomopt.jobs.rapier.model import (
     AFTER,
@@ -101,7 +101,7 @@ class RapierTask(Task):
         return [name for name in needs if name in self.known and name not in traded]
 
     @lazy
-    def asked(self) -> Asked:
+    def demanded(self) -> Demanded:
         """What is asked of each dwell, rad, by name: by the operation, then by limits. Raises BadInput."""
         limits = self.scene.limits
         least = {name: limit.min for name, limit in limits.items() if name in (DWELL, *SIDES) and limit.min}
@@ -119,7 +119,7 @@ class RapierTask(Task):
     @property
     def dwelt(self) -> Collection[str]:
         """Numbers that are known or asked for, dwells among them."""
-        return {*self.known, *self.asked}
+        return {*self.known, *self.demanded}
 
     @lazy
     def model(self) -> JobModel:
@@ -132,7 +132,7 @@ class RapierTask(Task):
     @lazy
     def sampler(self) -> Sampler:
         """Today's drive; of a dwell that is not there yet, any angle."""
-        return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.asked, 1.0), **self.known})
+        return sampled(self.model, {DWELL: 1.0, "phi_stroke": 0.0, **dict.fromkeys(self.demanded, 1.0), **self.known})
 
     @lazy
     def reading(self) -> TravelReading:
@@ -194,7 +194,7 @@ class RapierTask(Task):
     def limits(self) -> list[Limit]:
         """Return all limits: figures that a variable's bounds imply are not limited twice."""
         figures = [each for each in self.figures() if not self.implied(each)]
-        required = [each for each in self.required() if each.name not in self.asked]
+        required = [each for each in self.required() if each.name not in self.demanded]
         return [*self.bounds(), *required, *self.floors(), *self.meant(), *self.margins(), *figures, *self.demands()]
 
     def bounds(self) -> list[Limit]:
@@ -220,7 +220,7 @@ class RapierTask(Task):
 
     def meant(self) -> list[Limit]:
         """Return what stroke and dwells mean: the head at rest at its stroke, and within s_dwell on the arcs."""
-        reached = {*self.kept, *self.asked, *(name for name in self.sought if name in LOOSE)}
+        reached = {*self.kept, *self.demanded, *(name for name in self.sought if name in LOOSE)}
         size, rows = 1.0, {"head at rest at phi_stroke": "rest"}
         if "stroke" in reached:
             size, rows = self.known["stroke"], rows | {"stroke is reached": "stroke_short"}

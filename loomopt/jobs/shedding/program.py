@@ -10,7 +10,7 @@ import numpy as np
 
 from loomopt.base.errors import refusal
 from loomopt.base.records import Frozen, lazy
-from loomopt.jobs.base import Asked, Ends, Task, bound_limits, ends, size_read
+from loomopt.jobs.base import Demanded, Ends, Task, bound_limits, ends, size_read
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
 from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, HealdFrame, LawTarget, chosen, dwelt
@@ -217,7 +217,7 @@ class SheddingTask(Task):
         return CONTACT_SPEED in self.traded
 
     @lazy
-    def asked(self) -> Asked:
+    def demanded(self) -> Demanded:
         """What a limit asks of the speed up to which contact holds; the shaft's own where that is sought."""
         limit = self.scene.limits.get(CONTACT_SPEED)
         if limit is None or not limit.min:
@@ -227,12 +227,12 @@ class SheddingTask(Task):
     @lazy
     def raced(self) -> tuple[str, ...]:
         """Contact at rest, and at the speed up to which it must hold. Raises BadInput where none ends it."""
-        if self.asked:
+        if self.demanded:
             demand_moving(self.scene, f"take limits.{CONTACT_SPEED} out")
         if self.lasting:
             demand_moving(self.scene, "trade another axis")
             return AT_REST, FASTEST
-        if not self.asked:
+        if not self.demanded:
             return ()
         # At its own speed the frame is judged anyway: the same row twice would have no price.
         least = self.scene.limits[CONTACT_SPEED].min

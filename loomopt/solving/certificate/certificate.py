@@ -15,7 +15,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt, second_order
-from loomopt.solving.certificate.derivatives import Derivatives, Forward
+from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, priced
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
@@ -59,7 +59,7 @@ def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: in
     By jets; by 40 digits where floats leave a verdict in doubt. shown: of how many first levels it is known that none
     falls here to higher order, from the certificate of a program with those levels that holds nothing more than this.
     """
-    quick = certified(Forward, program, x, accuracy, shown)
+    quick = certified(JetDerivatives, program, x, accuracy, shown)
     if quick.clear:
         return quick
     from loomopt.solving.certificate.derivatives_mp import Exact

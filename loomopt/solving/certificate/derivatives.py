@@ -93,7 +93,7 @@ def _total(values: Number, count: int) -> Number:
     return count * values if np.ndim(values.v if isinstance(values, Jet) else values) == 0 else values.sum()
 
 
-class Forward(Derivatives):
+class JetDerivatives(Derivatives):
     """Derivatives by jets. Raises ArithmeticError where one of them is no number."""
 
     by, error = "jets", JET_ERROR

@@ -7,9 +7,9 @@ ones without a multiplier bound the cone.
 
 Where H is positive on the whole subspace of the equalities the verdict is proven to the tolerances. Two cases are
 decided by a heuristic: H indefinite there, where the least curvature over the cone is sought from eigenvectors
-(`cone.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
+(`nnls.least_on_cone`: a fall that is found is one, none found proves nothing); and H level along a direction, where the
 Lagrangian is read at a few steps along the line and at designs beside it that keep the binding rows
-(`feasible_curve`); of many such directions only what falls along a straight line is followed. A level that pulls along
+(`FeasibleCurve`); of many such directions only what falls along a straight line is followed. A level that pulls along
 what an earlier one closes by its curvature alone is read where that level stays least (`valley`); its curvature is then
 known to an error of its own, within which it counts as none.
 """
@@ -28,7 +28,7 @@ from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, FLAT, POLISH_DONE, POLISH_MET, RANK
-from loomopt.solving.certificate.derivatives import Derivatives, Forward
+from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, moved
 from loomopt.solving.nlp.point import sampler_at
 from loomopt.solving.search import tie_break
@@ -97,7 +97,7 @@ class Closed:
         if sampler is None or rows is None:
             return None
         try:
-            gradients = Forward(self.program, x, sampler, rows).gradients()
+            gradients = JetDerivatives(self.program, x, sampler, rows).gradients()
         except ArithmeticError:
             return None
         slope, jacobian = self.weights @ gradients, self.sums @ gradients

@@ -18,7 +18,7 @@ from loomopt.solving.certificate.certificate import (
     certified,
     certify,
 )
-from loomopt.solving.certificate.derivatives import Forward
+from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Curvature, Local
@@ -232,7 +232,7 @@ def test_what_floats_decide_is_judged_by_jets_and_the_rest_in_40_digits():
 def test_where_floats_have_no_slope_40_digits_have_one():
     """√x at 0: jets have no number there; a difference of 40 digits says that it can still rise, not fall."""
     root = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
-    quick, found = certified(Forward, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
+    quick, found = certified(JetDerivatives, root, {"x": 0.0}, 1e-8), certify(root, {"x": 0.0}, 1e-8)
     assert (quick.passed, quick.clear, quick.by) == (False, False, "jets")
     assert "no number" in quick.reasons[0]
     assert (found.passed, found.clear, found.by) == (False, True, "40 digits")

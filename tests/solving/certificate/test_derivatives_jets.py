@@ -14,7 +14,7 @@ from loomopt.maths.jets import variables
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
-from loomopt.solving.certificate.derivatives import Forward
+from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 
@@ -47,7 +47,7 @@ def both(program, x):
     """Return the derivatives of the active rows at x by jets and by 40 digits."""
     sampler = Sampler(program.model, {**program.parameters, **x})
     rows = active_set(program, sampler).rows
-    return Forward(program, x, sampler, rows), Exact(program, x, sampler, rows)
+    return JetDerivatives(program, x, sampler, rows), Exact(program, x, sampler, rows)
 
 
 def assert_alike(program, x):
@@ -112,14 +112,14 @@ def test_what_is_no_number_is_said_so(value):
     for program in (rows, wave(lambda m, phi, x: x + 0 * phi + value, "x")):
         sampler = Sampler(program.model, {"x": 1.0})
         with pytest.raises(ArithmeticError, match="no number"):
-            Forward(program, {"x": 1.0}, sampler, active_set(program, sampler).rows).gradients()
+            JetDerivatives(program, {"x": 1.0}, sampler, active_set(program, sampler).rows).gradients()
 
 
 def test_the_end_of_a_root_has_no_slope_in_floats():
     program = toy.program("x", formulas={"f": lambda m, v: m.sqrt(v["x"])})
     sampler = Sampler(program.model, {"x": 0.0})
     with pytest.raises(ArithmeticError):
-        Forward(program, {"x": 0.0}, sampler, active_set(program, sampler).rows).gradients()
+        JetDerivatives(program, {"x": 0.0}, sampler, active_set(program, sampler).rows).gradients()
 
 
 def test_a_batch_of_designs_is_judged_in_one_pass():

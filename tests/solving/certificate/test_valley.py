@@ -7,14 +7,14 @@ from support import inch, toy
 import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
-from loomopt.solving.certificate.derivatives import Forward
+from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.derivatives_mp import Exact
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import PROBES, FeasibleCurve, Lagrangian, Local
 from loomopt.studies.front import front
 from loomopt.studies.front.solver import Asking
 
-both = pytest.mark.parametrize("derivatives", [Forward, Exact])
+both = pytest.mark.parametrize("derivatives", [JetDerivatives, Exact])
 
 
 def local_by(derivatives, program, x):
@@ -64,7 +64,7 @@ def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(e
     job = registry.of(scene)
     program = job.program(scene, "balance")
     x = {v.name: value for v in program.variables for value in [program.starts[0][v.name]]}
-    quick, exact = (local_by(each, program, x).derivatives for each in (Forward, Exact))
+    quick, exact = (local_by(each, program, x).derivatives for each in (JetDerivatives, Exact))
     line, basis = np.eye(len(quick.names))[0], np.eye(len(quick.names))[:, 1:3]
     (one, error), (other, _) = quick.thirds(line, basis), exact.thirds(line, basis)
     assert np.abs(other).max() > 1.0
@@ -83,7 +83,7 @@ def valley(pull, own, fourth=0.0, bend=1.0, higher=0.0):
     return toy.program("ab", rows, objectives=("f", "g"))
 
 
-def second(program, derivatives=Forward, **x):
+def second(program, derivatives=JetDerivatives, **x):
     """Return what second order says of the second level."""
     return judged_levels(local_by(derivatives, program, x))[1].curvature
 
@@ -189,7 +189,7 @@ def test_an_error_that_reaches_the_threshold_is_no_saddle():
     assert found.error > 1e-5
     assert found.minimum
     assert second(program, Exact, a=0.0, b=0.0).minimum is False
-    assert not certified(Forward, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
+    assert not certified(JetDerivatives, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
 
 
 # Machines -----------------------------------------------------------------------------------------------------------
