@@ -141,7 +141,7 @@ def numpy() -> Maths:
 
 @functools.cache
 def jets() -> Maths:
-    """JetDerivatives derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
+    """Forward derivatives over floats or arrays of them: values that know their slopes, and curvatures if asked."""
     from loomopt.maths import jets
 
     functions = jets.sin, jets.cos, jets.sqrt, jets.atan2

@@ -62,9 +62,9 @@ def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: in
     quick = certified(JetDerivatives, program, x, accuracy, shown)
     if quick.clear:
         return quick
-    from loomopt.solving.certificate.derivatives_mp import Exact
+    from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 
-    return certified(Exact, program, x, accuracy, shown)
+    return certified(MpmathDerivatives, program, x, accuracy, shown)
 
 
 def certified(

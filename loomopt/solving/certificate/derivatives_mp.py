@@ -25,7 +25,7 @@ central: rounding 1e-40/1e-24 = 1e-16, truncation 1e-24."""
 Vector = Sequence[Number] | Floats
 
 
-class Exact(Derivatives):
+class MpmathDerivatives(Derivatives):
     """Derivatives by differences at 40 digits."""
 
     by, error, last = "40 digits", ROUNDED, True

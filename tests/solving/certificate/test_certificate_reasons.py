@@ -19,7 +19,7 @@ from loomopt.solving.certificate.certificate import (
     certify,
 )
 from loomopt.solving.certificate.derivatives import JetDerivatives
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.verdict import Level
@@ -86,7 +86,7 @@ def local(objectives=("f",), **x):
     x = {"x": 0.0, "y": 0.0, **x}
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
-    exact = Exact(program, x, sampler, active.rows)
+    exact = MpmathDerivatives(program, x, sampler, active.rows)
     return Local(program, x, sampler, active, exact, exact.gradients())
 
 

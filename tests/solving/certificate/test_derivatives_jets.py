@@ -15,7 +15,7 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
 from loomopt.solving.certificate.derivatives import JetDerivatives
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 
 OPTIMA = [
@@ -47,7 +47,7 @@ def both(program, x):
     """Return the derivatives of the active rows at x by jets and by 40 digits."""
     sampler = Sampler(program.model, {**program.parameters, **x})
     rows = active_set(program, sampler).rows
-    return JetDerivatives(program, x, sampler, rows), Exact(program, x, sampler, rows)
+    return JetDerivatives(program, x, sampler, rows), MpmathDerivatives(program, x, sampler, rows)
 
 
 def assert_alike(program, x):

@@ -8,7 +8,7 @@ import pytest
 from support import toy
 
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 
 
@@ -16,7 +16,7 @@ def exact_at(program, x):
     """Return a program's rows around x, and their places by name."""
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
-    return Exact(program, x, sampler, active.rows), {row.name: k for k, row in enumerate(active.rows)}
+    return MpmathDerivatives(program, x, sampler, active.rows), {row.name: k for k, row in enumerate(active.rows)}
 
 
 BENT = {

@@ -8,7 +8,7 @@ from support.rapiers import ROOM
 import loomopt as lo
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certify
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import FeasibleCurve, Lagrangian
 
@@ -54,7 +54,7 @@ def curve(rows, limits, sums, curved=(), waves=None, **x):
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
     sums = np.array([[*row, *[0.0] * (len(active.rows) - len(row))] for row in sums]).reshape(-1, len(active.rows))
-    jacobian = sums @ Exact(program, x, sampler, active.rows).gradients()
+    jacobian = sums @ MpmathDerivatives(program, x, sampler, active.rows).gradients()
     basis = np.linalg.svd(jacobian)[2][len(sums) :].T if len(sums) else np.eye(len(x))
     vectors = np.array(curved).reshape(-1, basis.shape[1]).T
     bends = np.full(vectors.shape[1], 2.0)

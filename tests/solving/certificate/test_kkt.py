@@ -7,7 +7,7 @@ from support import toy
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, replaceable, solved
 
 
@@ -15,7 +15,7 @@ def at(program, x):
     """Return the active set at x and its slopes."""
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
-    return active, Exact(program, x, sampler, active.rows).gradients()
+    return active, MpmathDerivatives(program, x, sampler, active.rows).gradients()
 
 
 def level(program, x, place=0, earlier=()):

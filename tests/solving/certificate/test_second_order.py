@@ -8,7 +8,7 @@ from loomopt.model.program import AxisMove, Preference, ScaleMove
 from loomopt.model.sampling import Sampler
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.certificate import certify
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import Local
 
@@ -16,7 +16,7 @@ from loomopt.solving.certificate.second_order import Local
 def local_at(program, **x):
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
-    exact = Exact(program, x, sampler, active.rows)
+    exact = MpmathDerivatives(program, x, sampler, active.rows)
     return Local(program, x, sampler, active, exact, exact.gradients())
 
 

@@ -7,7 +7,7 @@ from support import toy
 import loomopt as lo
 from loomopt.solving.certificate.certificate import certify, judged_levels
 from loomopt.solving.certificate.derivatives import JetDerivatives
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import Local
 
@@ -54,7 +54,7 @@ def test_the_closed_direction_may_be_any(turn):
 
 
 @pytest.mark.parametrize(("pull", "minimum"), [(0.9, True), (1.1, False), (-3.0, True)])
-@pytest.mark.parametrize("derivatives", [JetDerivatives, Exact])
+@pytest.mark.parametrize("derivatives", [JetDerivatives, MpmathDerivatives])
 def test_a_later_level_follows_the_valley_of_an_earlier_one(pull, minimum, derivatives):
     """On a = b², where f is least, g = b² − p a is (1 − p) b²: its own curvature along b says 2 whatever p."""
     valley = levels(lambda v: (v["a"] - v["b"] ** 2) ** 2, lambda v: v["b"] ** 2 - pull * v["a"])
@@ -97,7 +97,7 @@ def test_closed_directions_are_perpendicular_to_what_binds_and_to_each_other():
     x = {"a": 0.0, "b": 0.0, "c": 0.0, "d": 1.0}
     sampler = toy.Sampler(program.model, x)
     active = active_set(program, sampler)
-    exact = Exact(program, x, sampler, active.rows)
+    exact = MpmathDerivatives(program, x, sampler, active.rows)
     first, second = judged_levels(Local(program, x, sampler, active, exact, exact.gradients()))
     closed = first.curvature.closed
     assert closed.directions @ closed.directions.T == pytest.approx(np.eye(2), abs=1e-12)

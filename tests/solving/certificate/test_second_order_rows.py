@@ -10,7 +10,7 @@ from loomopt.model.program import AxisMove, Preference
 from loomopt.model.sampling import Sampler
 from loomopt.physics.tolerances import FLAT
 from loomopt.solving.certificate import kkt, second_order
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import LevelMultipliers, active_set
 from loomopt.solving.certificate.second_order import Critical, Local
 
@@ -18,7 +18,7 @@ from loomopt.solving.certificate.second_order import Critical, Local
 def local_at(program, **x):
     sampler = Sampler(program.model, x)
     active = active_set(program, sampler)
-    exact = Exact(program, x, sampler, active.rows)
+    exact = MpmathDerivatives(program, x, sampler, active.rows)
     return Local(program, x, sampler, active, exact, exact.gradients())
 
 

@@ -8,13 +8,13 @@ import loomopt as lo
 from loomopt.jobs import registry
 from loomopt.solving.certificate.certificate import SECOND_ORDER_OPEN, certified, certify, judged_levels
 from loomopt.solving.certificate.derivatives import JetDerivatives
-from loomopt.solving.certificate.derivatives_mp import Exact
+from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 from loomopt.solving.certificate.second_order import PROBES, FeasibleCurve, Lagrangian, Local
 from loomopt.studies.front import front
 from loomopt.studies.front.solver import Asking
 
-both = pytest.mark.parametrize("derivatives", [JetDerivatives, Exact])
+both = pytest.mark.parametrize("derivatives", [JetDerivatives, MpmathDerivatives])
 
 
 def local_by(derivatives, program, x):
@@ -64,7 +64,7 @@ def test_third_derivatives_in_floats_are_those_of_40_digits_to_their_own_error(e
     job = registry.of(scene)
     program = job.program(scene, "balance")
     x = {v.name: value for v in program.variables for value in [program.starts[0][v.name]]}
-    quick, exact = (local_by(each, program, x).derivatives for each in (JetDerivatives, Exact))
+    quick, exact = (local_by(each, program, x).derivatives for each in (JetDerivatives, MpmathDerivatives))
     line, basis = np.eye(len(quick.names))[0], np.eye(len(quick.names))[:, 1:3]
     (one, error), (other, _) = quick.thirds(line, basis), exact.thirds(line, basis)
     assert np.abs(other).max() > 1.0
@@ -185,10 +185,10 @@ def test_a_fall_within_a_valleys_error_is_doubted_only_if_it_grows_as_a_fall_doe
 def test_an_error_that_reaches_the_threshold_is_no_saddle():
     """Where f curves by 2e-6 only and the design is 1e-4 beside its least, nothing is known of g to 1e-7."""
     program = valley(3.0, 3.0 - 1e-5, bend=1e-6)
-    found = second(program, Exact, a=1e-4, b=0.0)
+    found = second(program, MpmathDerivatives, a=1e-4, b=0.0)
     assert found.error > 1e-5
     assert found.minimum
-    assert second(program, Exact, a=0.0, b=0.0).minimum is False
+    assert second(program, MpmathDerivatives, a=0.0, b=0.0).minimum is False
     assert not certified(JetDerivatives, program, {"a": 1e-4, "b": 0.0}, 1e-8).clear
 
 
