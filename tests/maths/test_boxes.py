@@ -184,3 +184,18 @@ def test_a_loom_machine_in_a_box_has_its_torques_in_40_digits_inside(effect):
         true["torque"] = model.quantity(MP, own, "peak_torque", Node(MP.number(phi) + own.values["beta"], switch))
         for name, value in true.items():
             assert holds(found[name].v, k, value), name
+
+
+def test_the_next_floats_of_many_are_those_of_one():
+    draw = np.random.default_rng(5)
+    sizes = np.concatenate([np.exp(draw.uniform(-690.0, 700.0, 4000)), 2.0 ** draw.integers(-900, 900, 1000)])
+    most, least = np.finfo(float).max, np.finfo(float).tiny
+    plain = np.concatenate([sizes, -sizes, [0.0, -0.0, most, -most, np.inf, -np.inf]])
+    for outward, end in ((intervals._down, -np.inf), (intervals._up, np.inf)):
+        with np.errstate(over="ignore"):
+            assert np.array_equal(outward(plain), np.nextafter(plain, end))
+        near = np.concatenate([np.linspace(0.2, 4.0, 500) * least, np.arange(300) * 5e-324])
+        found, one = outward(near), np.nextafter(near, end)
+        beyond = found if end > 0 else -found
+        assert np.all(beyond >= (one if end > 0 else -one))
+        assert np.all(np.abs(found - one) <= np.spacing(np.abs(one)))
