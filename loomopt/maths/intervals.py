@@ -132,8 +132,8 @@ class Interval:
 MANY = 256
 """Elements from which the next float comes by arithmetic: `np.nextafter` takes each by itself, ten times as long."""
 STEP, LEAST = 2.0**-53 * (1 + 2.0**-52), 5e-324
-"""x ± (STEP |x| + LEAST), rounded, is the next float, or beside the least normal ones the one after it [Rump, Zimmermann,
-Boldo and Melquiond, BIT 49 (2009), 419-431, Theorem 2.2]."""
+"""x ± (STEP |x| + LEAST), rounded, is the next float, or beside the least normal ones the one after it [Rump,
+Zimmermann, Boldo and Melquiond, BIT 49 (2009), 419-431, Theorem 2.2]."""
 
 
 def _down(x: Floats) -> Floats:

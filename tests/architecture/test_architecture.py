@@ -22,7 +22,7 @@ FACE = ("__init__", "__main__")
 FLOOR = {name: floor for floor, name in enumerate((*ROOMS, *FACE))}
 MOST_ENTRIES = 14
 """Files and folders that a reader finds in the package."""
-IN_A_JOB = {"__init__", "scene", "model", "program", "job", "views", "drawing", "equations"}
+IN_A_JOB = {"__init__", "scene", "model", "program", "job", "views", "drawing"}
 """The files that every job's folder has, beside template.toml."""
 WITHOUT_TYPES = {
     *("solving.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),

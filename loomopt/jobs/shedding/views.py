@@ -370,7 +370,7 @@ class SheddingViews(JobViews):
         if parted is None:
             return found
 
-        from loomopt.picture.job_views import marks
+        from loomopt.picture.parted import marks
 
         return marks(parted, found)
 
@@ -407,7 +407,7 @@ class SheddingViews(JobViews):
         shown = [panel._replace(levels={**panel.levels, **levels.get(panel.columns[0], {})}) for panel in shown]
         if "X_cam [m]" not in columns:
             return tuple(shown)
-        from loomopt.picture.job_views import together
+        from loomopt.picture.parted import together
 
         return together(shown, ("X [m]", "X_cam [m]"), "travel of frame and cam")
 
@@ -423,7 +423,7 @@ class SheddingViews(JobViews):
 def _parted(scene: Scene, parted: "Parted | None") -> Iterator[str]:
     """Say where the roller leaves the cam, where an effect says what then becomes of the frame."""
     if parted:
-        from loomopt.picture.job_views import remarks
+        from loomopt.picture.parted import remarks
 
         yield from remarks(scene, parted)
 

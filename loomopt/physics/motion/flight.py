@@ -1,7 +1,7 @@
 """A body that a cam pushes: where it leaves the cam, how it flies, where it lands. Every piece is in closed form.
 
 x: position, m, with the cam at x_c; the gap x − x_c is never negative. In flight the motion is linear piece by piece
-(`FreePiece`), so no equation is integrated step by step. Where pieces end, by a landing, at a corner of x or where
+(motion/free.py), so no equation is integrated step by step. Where pieces end, by a landing, at a corner of x or where
 the motion turns, is found by steps that no root can be inside of: a bound on the second derivative says how far. In
 contact the body is at x_c, and it leaves where the force that would hold it there falls below zero.
 """

@@ -4,13 +4,28 @@ import math
 from collections.abc import Mapping, Sequence
 
 from loomopt.jobs import registry
-from loomopt.picture.equations import Equation
+from loomopt.maths import systems
+from loomopt.model.model import JobModel
+from loomopt.physics import balance
+from loomopt.picture import effect_equations
+from loomopt.picture.equations import Equation, Symbols, equation, symbol
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.panels import Panel
 from loomopt.picture.shapes import Drawing, drawn_units
 from loomopt.scenes.scene import Scene
-from loomopt_press import drawing, equations
-from loomopt_press.model import BOTTOM, TOP
+from loomopt_press import drawing
+from loomopt_press.model import BOTTOM, TOP, SlidePose
+
+
+def equations(model: JobModel) -> tuple[Equation, ...]:
+    """Return travel with its derivatives, each term, balance and crank torque."""
+    names = "q", "q'", "q''"
+    slide = SlidePose(systems.sympy(), symbol("crank"), symbol("rod"), symbol("phi"), symbol("omega"))
+    travel = zip(names, (slide.q, slide.q1, slide.q2), strict=True)
+    pose = balance.Pose(slide.phi, slide.omega, *map(symbol, names))
+    known = effect_equations.given(model, Symbols())
+    written = [equation("travel", symbol(name), value) for name, value in travel]
+    return (*written, *effect_equations.forces(model, pose, known, "Q", "Q"))
 
 
 class PressViews(JobViews):
@@ -26,7 +41,7 @@ class PressViews(JobViews):
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations the scene really uses."""
-        return equations.equations(registry.of(scene).model(scene))
+        return equations(registry.of(scene).model(scene))
 
     def marks(self, scene: Scene, design: Mapping[str, float]) -> dict[str, float]:
         """Return both dead centres, rad."""
