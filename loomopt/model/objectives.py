@@ -7,7 +7,7 @@ cycle. What solves and proves asks for these alone: a new kind is a class of its
 import abc
 import functools
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Literal, NamedTuple
 
@@ -52,7 +52,7 @@ class Objective(abc.ABC):
     is_magnitude: ClassVar[bool] = False
     """Whether both signs of its row count."""
     least: ClassVar[float] = -math.inf
-    """What it is never less than."""
+    """What it is never less than, where no quantity that it reads is signed."""
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -96,6 +96,10 @@ class Objective(abc.ABC):
     def worsening(self, now: float, then: float, most: bool) -> float:
         """Return by how much the figure becomes worse from now to then, SI; most: whether the most of it is sought."""
         return now - then if most else then - now
+
+    def least_of(self, signed: Collection[str]) -> float:
+        """Return what it is never less than, SI; signed: the quantities of which the value counts, not the size."""
+        return -math.inf if any(name in signed for name in self.quantities) else self.least
 
     def least_within(self, lower: Mapping[str, float]) -> float:
         """Return what lower bounds of the variables alone leave it to be at least, SI."""

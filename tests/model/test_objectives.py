@@ -82,6 +82,10 @@ def test_what_keeps_an_objective_at_a_value_is_as_many_limits_as_it_has_rows():
 
 def test_what_an_objective_is_never_less_than():
     assert [each.least for each, _ in KINDS.values()] == [-math.inf, -math.inf, 0.0, 0.0, 0.0, 0.0]
+    of_sizes = [each.least_of(()) for each, _ in KINDS.values()]
+    of_values = [each.least_of({"wave"}) for each, _ in KINDS.values()]
+    assert of_sizes == [-math.inf, -math.inf, 0.0, 0.0, 0.0, 0.0]
+    assert of_values == [-math.inf, -math.inf, 0.0, -math.inf, 0.0, -math.inf], "a signed wave may lie below 0"
     bounds = {"p": -8.0, "q": -4.0, "wave": 2.0}
     assert [each.least_within(bounds) for each, _ in list(KINDS.values())[:4]] == [-8.0, -math.inf, 0.0, -math.inf]
     assert Value("q", "q", 1.0).least_within({}) == -math.inf

@@ -121,7 +121,8 @@ class _Level:
         reader = Reader(task, place + 1, at)
         weights = multipliers(reader, at, place)
         self.question = Question(reader, place, lowest, weights, held, self._better)
-        nothing_less = self.best <= self.objective.least + FEASIBLE
+        self.least = self.objective.least_of(task.program.model.signed)
+        nothing_less = self.best <= self.least + FEASIBLE
         self.tree = Tree.empty(len(task.names)) if nothing_less else Tree.whole(task.low, task.high)
 
     @property
@@ -163,7 +164,7 @@ class _Level:
         """Return what the tree shows."""
         objective = self.objective
         least = min(self.question.cut, self.tree.bound)
-        bound = _figure(objective, max(least, objective.least))
+        bound = _figure(objective, max(least, self.least))
         best = _figure(objective, self.best)
         gap = self.gap if self.proven and self.tree.boxes else abs(best - bound) / _size(objective, best)
         band = abs(_figure(objective, self.best + HELD) - best)

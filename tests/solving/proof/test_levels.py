@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from machines_in_boxes import quietly, solved
+from support import toy
 
 from loomopt.maths.intervals import Enclosure
 from loomopt.solving.proof.levels import HELD, Levels, _Level, loosening
@@ -171,3 +172,18 @@ def test_a_formula_that_intervals_do_not_know_is_told(monkeypatch):
     outcome = Levels(found.program, found.job, found.x, 1e-3).run(FOREVER, quietly)
     assert not outcome.proven
     assert outcome.why == "a formula of this scene does not run in intervals"
+
+
+@pytest.mark.parametrize("middle", [-5.0, -1.0, 0.5])
+def test_the_peak_of_a_signed_quantity_may_lie_below_0(middle):
+    """What is best is p = 0, where the wave's top is `middle` + 1: no other design is proven, and that one in boxes."""
+    wave = {"wave": lambda m, v, phi: v["p"] * v["p"] + middle + m.cos(phi)}
+    made = toy.program(("p",), waves=wave, objectives=("peak wave",), signed=True, bounds={"p": (-2.0, 2.0)})
+    worse = Levels(made, toy.ToyJob(made), {"p": 0.3}, 1e-3).run(FOREVER, quietly)
+    assert not worse.proven
+    assert worse.better is not None
+    best = Levels(made, toy.ToyJob(made), {"p": 0.0}, 1e-3).run(FOREVER, quietly)
+    assert best.proven, best.why
+    assert best.boxes > 0
+    assert best.levels[0].best == pytest.approx(middle + 1.0)
+    assert middle + 1.0 - 1.01e-3 * max(abs(middle + 1.0), 1e-3) <= best.levels[0].bound <= best.levels[0].best
