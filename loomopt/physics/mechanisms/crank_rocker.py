@@ -264,17 +264,27 @@ def transmission_angle_far(maths: Maths, lengths: Lengths) -> Number:
     return 2 * maths.atan2(closing, maths.sqrt((far + l2 - l3) * (far - l2 + l3)))
 
 
-def assembly_margins(lengths: Lengths) -> dict[str, Number]:
+class Inequality(NamedTuple):
+    """What a crank-rocker keeps: the links of one side, added up, are shorter than those of the other."""
+
+    shorter: tuple[str, ...]
+    longer: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return " < ".join(" + ".join(side) for side in self)
+
+
+def assembly_margins(lengths: Lengths) -> dict[Inequality, Number]:
     """Return by how much each inequality of a crank-rocker holds, in units of length; all positive ⇔ crank-rocker.
 
     The first keeps the dyad closed at φ = π, the next two at φ = 0, the last makes AB the shortest link.
     """
     l1, l2, l3, l4 = lengths.l1, lengths.l2, lengths.l3, lengths.l4
     return {
-        "l1 + l4 < l2 + l3": l2 + l3 - l1 - l4,
-        "l1 + l2 < l3 + l4": l3 + l4 - l1 - l2,
-        "l1 + l3 < l2 + l4": l2 + l4 - l1 - l3,
-        "l1 < l4": l4 - l1,
+        Inequality(("l1", "l4"), ("l2", "l3")): l2 + l3 - l1 - l4,
+        Inequality(("l1", "l2"), ("l3", "l4")): l3 + l4 - l1 - l2,
+        Inequality(("l1", "l3"), ("l2", "l4")): l2 + l4 - l1 - l3,
+        Inequality(("l1",), ("l4",)): l4 - l1,
     }
 
 
@@ -290,17 +300,12 @@ def fault(l1: float, l2: float, l3: float, l4: float, *, shown: ShowValue = usua
     if min(l1, l2, l3, l4) <= 0:
         return "every length must be greater than 0"
     least = TELLING * (l1 + l2 + l3 + l4)
-    failed = [text for text, margin in assembly_margins(Lengths(l1, l2, l3, l4)).items() if not margin > least]
-    if not failed:
+    lengths = Lengths(l1, l2, l3, l4)
+    failed = next((each for each, margin in assembly_margins(lengths).items() if not margin > least), None)
+    if failed is None:
         return ""
-    sides = {"l1": l1, "l2": l2, "l3": l3, "l4": l4}
-
-    def total(side: str) -> float:
-        return math.fsum(sides[name.strip()] for name in side.split("+"))
-
-    left, right = failed[0].split("<")
-    reason = f"{failed[0]} fails ({shown(total(left), 'length')} against {shown(total(right), 'length')})"
-    return f"{reason}; {_where_it_stops(l1, l2, l3, l4, shown)}"
+    shorter, longer = (shown(math.fsum(getattr(lengths, name) for name in side), "length") for side in failed)
+    return f"{failed} fails ({shorter} against {longer}); {_where_it_stops(l1, l2, l3, l4, shown)}"
 
 
 def _where_it_stops(l1: float, l2: float, l3: float, l4: float, shown: ShowValue) -> str:

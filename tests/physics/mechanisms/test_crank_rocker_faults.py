@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from loomopt.physics.mechanisms.crank_rocker import fault
+from loomopt.physics.mechanisms.crank_rocker import Lengths, assembly_margins, fault
 
 REPEATABLE = settings(derandomize=True, deadline=None, max_examples=300)
 lengths = st.floats(0.02, 1.0)
@@ -110,3 +110,12 @@ def test_a_linkage_that_folds_flat_is_no_crank_rocker(sides, end):
     message = fault(*sides)
     assert " fails (" in message
     assert message.endswith(f"it does not assemble {end}")
+
+
+@given(lengths, lengths, lengths, lengths)
+@REPEATABLE
+def test_each_margin_is_the_difference_of_the_links_it_is_filed_under(l1, l2, l3, l4):
+    sides = Lengths(l1, l2, l3, l4)
+    for (shorter, longer), margin in assembly_margins(sides).items():
+        ends = (math.fsum(getattr(sides, name) for name in names) for names in (longer, shorter))
+        assert margin == pytest.approx(next(ends) - next(ends), abs=1e-15)
