@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.model.curves import split
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs, packaged, provenance
 from loomopt.scenes.scene import Scene
@@ -25,9 +26,9 @@ REPRODUCED_OBJECTIVE, REPRODUCED_DESIGN = 1e-8, 1e-6
 """Differences that `check` allows, relative: the accuracy asked by default, and a hundred times that for a design,
 which moves more than its objective does."""
 
-LEAST = {"[rad]": 1.0, "[m]": 1e-3, "[kg]": 1.0, "[N*m]": 1.0}
+LEAST = {"rad": 1.0, "m": 1e-3, "kg": 1.0, "N*m": 1.0}
 """Sizes below which a difference is measured against the size instead, by unit, SI."""
-LARGEST = {"[N*m]": "peak_torque [N*m]", "[N]": "contact_max [N]"}
+LARGEST = {"N*m": "peak_torque [N*m]", "N": "contact_max [N]"}
 """Figures that another of the same unit, which may be zero, is measured against."""
 
 
@@ -52,8 +53,9 @@ def differing(now: "pd.DataFrame", then: "pd.DataFrame", objectives: Collection[
             if str(new) != str(old):
                 yield f"{name}: {new}, reference {old}"
             continue
-        allowed = REPRODUCED_OBJECTIVE if name.split(" [")[0] in objectives else REPRODUCED_DESIGN
-        size = max(abs(float(old)), least.get(name.rpartition(" ")[2], 1e-3))
+        figure, unit = split(name)
+        allowed = REPRODUCED_OBJECTIVE if figure in objectives else REPRODUCED_DESIGN
+        size = max(abs(float(old)), least.get(unit, 1e-3))
         if not abs(float(new) - float(old)) <= allowed * size:
             yield f"{name}: {float(new)!r}, reference {float(old)!r}"
 
@@ -154,7 +156,7 @@ def _front_between(values: list[float]) -> list[int]:
 def _front_start(study: trade.Trade, told: Mapping[str, str]) -> list[dict[str, dict[str, object]]]:
     """Return the design of a line as what a solve may start from; nothing where it does not assemble."""
     job, scene = study.solver.job, study.scene
-    cells = {name.split(" [")[0]: value for name, value in told.items()}
+    cells = {split(name)[0]: value for name, value in told.items()}
     design = {name: float(cells[scene.full(name)]) for name in job.today(scene)}
     try:
         return [{"point": {"task": "", "x": job.values(study.solver.base, design)}}]

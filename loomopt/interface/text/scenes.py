@@ -9,6 +9,7 @@ import numpy as np
 from loomopt.base.units import factor
 from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
+from loomopt.model.curves import split
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
 from loomopt.picture.job_views import Marks, Span
@@ -143,7 +144,7 @@ def _width(curve: tuple[str, list[str]]) -> int:
 
 def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     """Return a curve's heading and its cells in its display unit, four digits of the largest; empty where undefined."""
-    symbol, _, si = name.removesuffix("]").partition(" [")
+    symbol, si = split(name)
     unit = scene.unit_for(si)
     numbers = np.asarray(values, dtype=float) * (1.0 if unit == si else factor(si) / factor(unit))
     known = numbers[np.isfinite(numbers)]

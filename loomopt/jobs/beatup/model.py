@@ -25,6 +25,11 @@ FRONT, REAR = "front dead centre", "rear dead centre"
 LENGTHS = ("l1", "l2", "l3", "l4")
 
 
+def today(name: str) -> str:
+    """Return what today's value of a number is called among the numbers of a scene."""
+    return f"today.{name}"
+
+
 @dataclass(frozen=True)
 class ReedMotion(Motion):
     """The pose at crank angles φ, rad, any shape: q = −ψ; what no load reads is not computed."""
@@ -165,7 +170,7 @@ def _moved(effects: Iterable[Effect]) -> dict[str, Callable[[Values, Values], Nu
 def change(names: Collection[str], at: Instant) -> Number:
     """Return Σ weight ((x − x_today)/bound width)², the retrofit's norm."""
     v = at.values
-    return balance.total([v[f"weight.{x}"] * ((v[x] - v[f"today.{x}"]) / v[f"width.{x}"]) ** 2 for x in names])
+    return balance.total([v[f"weight.{x}"] * ((v[x] - v[today(x)]) / v[f"width.{x}"]) ** 2 for x in names])
 
 
 def _front(at: Instant) -> Motion:

@@ -8,7 +8,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
 from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.beatup import model as beatup
-from loomopt.jobs.beatup.model import LENGTHS
+from loomopt.jobs.beatup.model import LENGTHS, today
 from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
@@ -88,7 +88,7 @@ class BeatupTask(Task):
     @lazy
     def known(self) -> dict[str, float]:
         """Every number of the scene, today's lengths also as today.*."""
-        return numbers(self.scene) | {f"today.{name}": self.scene.mechanism[name] for name in LENGTHS}
+        return numbers(self.scene) | {today(name): self.scene.mechanism[name] for name in LENGTHS}
 
     @lazy
     def model(self) -> JobModel:
@@ -145,7 +145,7 @@ class BeatupTask(Task):
         weights = self.scene.table(RetrofitTarget).weights
         for name in VARIABLES:
             width = self.limited[name][1] - self.limited[name][0]
-            found |= {f"today.{name}": self.known[name], f"width.{name}": width or 1.0}
+            found |= {today(name): self.known[name], f"width.{name}": width or 1.0}
             found[f"weight.{name}"] = weights.get(name, 1.0) if width else 0.0
         return found
 

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
-from loomopt.jobs.beatup.model import FRONT, REAR
+from loomopt.jobs.beatup.model import FRONT, REAR, today
+from loomopt.jobs.beatup.scene import VARIABLES
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.model.curves import tops
@@ -63,13 +64,17 @@ def _dead_centres() -> list[Equation]:
     ]
 
 
+TODAY = {today(name): f"{name}_today" for name in VARIABLES}
+"""Today's numbers → their symbols."""
+
+
 class _Symbols(Symbols):
     """The beat-up's numbers: s = m4e r4e², and today's lengths under names of their own."""
 
     def __missing__(self, name: str) -> Expression:
         if name == "s":
             return self["m4e"] * self["r4e"] ** 2
-        return symbol(f"{name.removeprefix('today.')}_today" if name.startswith("today.") else name)
+        return symbol(TODAY.get(name, name))
 
 
 def _pose() -> balance.Pose:

@@ -34,7 +34,7 @@ from loomopt.physics.effects.kinds import Load, Motion
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
-from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated
+from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, of_knots
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
@@ -145,11 +145,12 @@ def _table(found: cam_spline.LawTable) -> list[Equation]:
 
 SPEED = "omega"
 SEGMENTS = {
-    RISE: "in the rise",
-    FAR_DWELL: "in the far dwell",
-    RETURN: "in the return",
-    NEAR_DWELL: "in the near dwell",
+    RISE: "rise",
+    FAR_DWELL: "far dwell",
+    RETURN: "return",
+    NEAR_DWELL: "near dwell",
 }
+WHERE = {segment: f"in the {name}" for segment, name in SEGMENTS.items()}
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
 
 def _given(model: JobModel) -> Given:
     """Return the scene's numbers as symbols, with the words that choose formulas."""
-    knots = {name for name in model.known if name.startswith("law_")}
+    knots = set(filter(of_knots, model.known))
     values = {name: symbol(name) for name in model.known - knots - set(model.labels)}
     values |= {"speed": symbol(SPEED)} if "speed" in values else {}
     far = values["rise"]
@@ -212,7 +213,7 @@ def _forces(model: JobModel, known: Given) -> list[Equation]:
     pose = _pose(model, segments[0], LEAST)
     found += sums(model.loads, pose, symbol("N"), "N", torque=("cam torque", "cam_torque"))
     found += effect_equations.crank_motion(model, pose, known, "cam_torque")
-    judged = [SEGMENTS[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
+    judged = [WHERE[s] for s in segments if (SEGMENT, float(s)) in model.known_in]
     where = " and ".join(judged) if judged else "for every theta"
     found.append(relation("contact", symbol("N"), ">=", symbol("N_min"), where))
     moves = _pose(model, RISE, LEAST), _pose(model, RETURN, LEAST)
@@ -235,19 +236,19 @@ def _in_segment(model: JobModel, load: Acting, segment: int, force: Callable[...
     """Return a term in one segment, with the segment; what a dwell leaves open, and what nobody knows, in words."""
     known_in = load.known_in(model.words_of(load.name)) if isinstance(load, Load) else ()
     if known_in and (SEGMENT, float(segment)) not in known_in:
-        return "not known", SEGMENTS[segment]
+        return "not known", WHERE[segment]
     least, most = force(segment), force(segment, MOST)
     if least != most:
-        return f"any value of {text(least)} ... {text(most)} ({text(least)} for contact)", SEGMENTS[segment]
-    return least, SEGMENTS[segment]
+        return f"any value of {text(least)} ... {text(most)} ({text(least)} for contact)", WHERE[segment]
+    return least, WHERE[segment]
 
 
 def motion(cam: CamFrame, given: Given) -> list[Equation]:
     """Return the segments, and u, X, X' and X'' in each, by the frame's own pose; given: the scene's numbers."""
     theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
     ends = (sympy().Integer(0), *(values[f"begin.{name}"] for name in ("far", "return", "near")), 2 * pi)
-    spans = [(SEGMENTS[k].removeprefix("in the "), (ends[k], theta, ends[k + 1])) for k in cam.segments]
-    poses = {SEGMENTS[k]: pose(cam, given, k) for k in cam.segments}
+    spans = [(SEGMENTS[k], (ends[k], theta, ends[k + 1])) for k in cam.segments]
+    poses = {WHERE[k]: pose(cam, given, k) for k in cam.segments}
     named = (("argument of the law", "u"), ("travel", "X"), ("travel", "X'"), ("travel", "X''"))
     read: tuple[Callable[[FrameMotion], Number], ...] = (
         lambda at: at.u,

@@ -204,6 +204,11 @@ def knots(values: Mapping[str, Number]) -> tuple[Number, ...]:
     return tuple(values[name] for name in names)
 
 
+def of_knots(name: str) -> bool:
+    """Say whether a number is one of a spline law's knots, by its name."""
+    return name.startswith(PREFIX)
+
+
 def named_knots(accelerations: Iterable[Number]) -> dict[str, Number]:
     """Return s'' at the knots of a spline law by name."""
     return {f"{PREFIX}{k}": value for k, value in enumerate(accelerations)}
