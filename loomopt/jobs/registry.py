@@ -19,7 +19,7 @@ from loomopt.physics.effects.kinds import Effect, ranked
 from loomopt.scenes import packaged
 from loomopt.scenes.document import Paths, read_document
 from loomopt.scenes.packaged import entry_points
-from loomopt.scenes.scene import Scene, build
+from loomopt.scenes.scene import Equation, Scene, build
 from loomopt.scenes.tables import SceneSchema
 
 if TYPE_CHECKING:
@@ -118,6 +118,10 @@ class _Registered:
     def check(self, scene: Scene) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
         of(scene).check(scene)
+
+    def equations(self, scene: Scene) -> tuple[Equation, ...]:
+        """Return the equations that a scene really uses; SymPy is imported for them."""
+        return of(scene).views.equations(scene)
 
 
 def _brought(schema: SceneSchema, name: str) -> Effect | None:

@@ -27,6 +27,9 @@ class Equation:
     text: str
     latex: str
 
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {self.latex}$"
+
 
 class Symbols(dict[str, Expression]):
     """A scene's numbers as symbols, each made when a formula first reads it."""

@@ -19,6 +19,25 @@ _Own = TypeVar("_Own", bound=Table)
 TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
 
 
+class Equation(Protocol):
+    """One equation of a scene: what it is of, and itself as plain text and in LaTeX."""
+
+    @property
+    def name(self) -> str:
+        """What it is of."""
+
+    @property
+    def text(self) -> str:
+        """It as plain text."""
+
+    @property
+    def latex(self) -> str:
+        """It in LaTeX."""
+
+    def _repr_latex_(self) -> str:
+        """Return how Jupyter shows it."""
+
+
 class Jobs(JobNames, Protocol):
     """Where a scene finds its job by name."""
 
@@ -27,6 +46,9 @@ class Jobs(JobNames, Protocol):
 
     def check(self, scene: "Scene", /) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
+
+    def equations(self, scene: "Scene", /) -> tuple[Equation, ...]:
+        """Return the equations that a scene really uses."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -196,6 +218,10 @@ class Scene(Shown):
                 remedy = "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
         return self.update({f"bounds.{name}.free": True for name in asked})
+
+    def equations(self) -> tuple[Equation, ...]:
+        """Return the equations the scene really uses: `name`, `text` and `latex` of each, which Jupyter shows."""
+        return self.jobs.equations(self)
 
     @property
     def hash(self) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import loomopt as lo
+from loomopt.interface.cli.app import run
 from loomopt.scenes.packaged import problems
 from loomopt.solving.answer import solution
 from loomopt.solving.certificate.certificate import certify
@@ -162,10 +163,10 @@ METHODS = {
         *("status", "table", "target", "terms", "time", "to_frame", "today", "units"),
     },
     "Scene": {
-        *("active", "bounds", "change", "document", "effects", "filed_in", "free", "full", "given", "hash"),
+        *("active", "bounds", "change", "document", "effects", "equations", "filed_in", "free", "full", "given"),
         *("job", "jobs", "limits", "mechanism", "name", "operation", "origin", "own", "paths", "schema", "set", "show"),
         *("shown_in", "source", "table", "tables", "targets", "title", "unit_for", "units", "update", "with_effect"),
-        "without_effect",
+        *("hash", "without_effect"),
     },
 }
 
@@ -299,3 +300,28 @@ def test_what_is_looked_for_where_nothing_is_admissible_is_told_one_by_one():
     assert places[0][0] == 1
     assert len({of for _, of in places}) == 1
     assert 1 < places[-1][0] <= places[-1][1]
+
+
+@pytest.mark.parametrize("name", ["beatup", "rapier", "shedding"])
+def test_a_scene_has_the_equations_that_show_prints(name, capsys):
+    assert run(["show", name, "--equations"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    found = lo.load(name).equations()
+    assert all(" ".join(each.text.split()) in printed and each.name in printed for each in found)
+    assert all(each.latex and each._repr_latex_() == rf"$\displaystyle {each.latex}$" for each in found)
+
+
+def test_an_effect_is_in_the_equations_while_it_is_on():
+    on = SCENE.with_effect("gravity")
+    off = on.without_effect("gravity")
+    assert any("M_gravity" in each.text and "M_{\\mathrm{gravity}}" in each.latex for each in on.equations())
+    assert not any("gravity" in each.text + each.latex + each.name for each in off.equations())
+    assert off.equations() == SCENE.equations()
+
+
+EQUATED = "import sys, loomopt as lo; s = lo.load('beatup'); a = 'sympy' in sys.modules; s.equations(); print(a)"
+
+
+def test_sympy_waits_until_equations_are_asked_for():
+    done = subprocess.run([sys.executable, "-c", EQUATED], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"

@@ -57,6 +57,9 @@ class Jobs:
     def check(self, scene):
         pass
 
+    def equations(self, scene):
+        return ()
+
     def schema(self, job, document, effects):
         return self.known
 

@@ -260,6 +260,9 @@ class Toys:
     def check(self, scene: Scene) -> None:
         pass
 
+    def equations(self, scene: Scene) -> tuple[Equation, ...]:
+        return self.job.views.equations(scene)
+
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
         return self.job.schema(document)
 

@@ -91,8 +91,7 @@ def _ended(scene: Scene, key: str, end: str) -> str:
 
 def equations(scene: Scene) -> list[str]:
     """Return the equations a scene really uses, as text, those of one name together."""
-    found = registry.of(scene).views.equations(scene)
-    groups = itertools.groupby(found, key=lambda equation: equation.name)
+    groups = itertools.groupby(scene.equations(), key=lambda equation: equation.name)
     return ["\n".join([name, *(f"    {equation.text}" for equation in group)]) for name, group in groups]
 
 
