@@ -81,7 +81,10 @@ class Row:
     warm: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Freeze what a frozen dataclass would leave open."""
+        """Freeze what a frozen dataclass would leave open; a reason is one line, and nothing that a terminal obeys."""
+        if self.reason and not self.reason.isprintable():
+            plain = "".join(c if c.isprintable() else " " for c in self.reason)
+            object.__setattr__(self, "reason", " ".join(plain.split()))
         freeze(self, "place", "design", "figures", "multipliers", "reached", "warm")
 
     def as_dict(self) -> dict[str, Any]:
@@ -107,6 +110,24 @@ def digest(rows: Iterable[Row]) -> str:
     ordered = sorted(rows, key=lambda row: row.point)
     data = [{name: value for name, value in row.as_dict().items() if name != UNTIMED} for row in ordered]
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+RESOLVED, ROUNDING = 1e-6, 1e-9
+"""How closely a number comes out again on another machine: relative, and SI where it is only rounding. On the same one
+it comes out bit by bit; an answer is right to 1e-8."""
+
+
+def agree(row: Row, again: Row) -> bool:
+    """Say whether a row is what solving its point again gives."""
+    mine, other = ({**each.design, **each.figures} for each in (row, again))
+    outcome = (row.status, row.certified) == (again.status, again.certified)
+    return outcome and mine.keys() == other.keys() and all(_alike(mine[name], other[name]) for name in mine)
+
+
+def _alike(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return one == other or abs(one - other) <= RESOLVED * max(abs(one), abs(other)) + ROUNDING
 
 
 @dataclass(frozen=True)

@@ -1,58 +1,118 @@
 """A durable store of studies in one SQLite file: each row in a transaction of its own, written by the driver alone.
 
 Rollback journal and synchronous=FULL: a row that was written is there after a crash, also of the machine; unlike a
-write-ahead log both work on network file systems. One run at a time has the file to itself.
+write-ahead log both work on network file systems. One run at a time has the file to itself. Each row has a checksum:
+what became of the file since it was written is told, not taken for a result.
 """
 
 import contextlib
+import hashlib
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
+from typing import Any, TypeGuard
 
 from loomopt.base import files
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, shown
 from loomopt.studies.run.rows import Row
 
-APPLICATION, VERSION = 0x6C6F6F6D, 1
+APPLICATION, VERSION = 0x6C6F6F6D, 2
 """What the file's head says: "loom", and the version of its tables."""
 COLUMNS = tuple(each.name for each in fields(Row))
-OBJECTS = "place", "design", "figures", "multipliers", "reached", "warm"
-KINDS: dict[str, type] = {"status": str, "certified": bool, **dict.fromkeys(OBJECTS, dict)}
-"""What a column's JSON text must hold."""
-TABLES = (
-    "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
-    f"CREATE TABLE row (study TEXT NOT NULL REFERENCES study (key), {', '.join(COLUMNS)}, PRIMARY KEY (study, point))",
-)
+STATUSES = frozenset({"optimal", "infeasible", "uncertified", "failed", "interrupted"})
+LARGEST_WHOLE = 2**53
+"""Whole number that a float holds."""
+STEPS = 1_000_000
+"""Instructions of SQLite after which Ctrl-C is looked for: some milliseconds."""
+TABLES = {
+    "study": "CREATE TABLE study (key TEXT PRIMARY KEY, told TEXT NOT NULL)",
+    "row": f"CREATE TABLE row (study TEXT NOT NULL REFERENCES study (key), {', '.join(COLUMNS)},"
+    " checksum TEXT NOT NULL, PRIMARY KEY (study, point))",
+}
 _OTHER = "Name another file"
 
 
+def _is_number(value: object) -> bool:
+    """Say whether a value is a number as rows have them."""
+    return isinstance(value, float) or (_is_whole(value) and abs(value) <= LARGEST_WHOLE)
+
+
+def _is_whole(value: object) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_place(value: object) -> bool:
+    """Say whether a value can be the number of a point."""
+    return _is_whole(value) and 0 <= value <= LARGEST_WHOLE
+
+
+def _is_text(value: object) -> bool:
+    """Say whether a value is text without anything that a terminal would obey."""
+    return isinstance(value, str) and value.isprintable()
+
+
+def _named(kind: Callable[[object], bool]) -> Callable[[object], bool]:
+    """Return a test for a table of values of a kind."""
+    return lambda value: isinstance(value, dict) and all(_is_text(name) and kind(each) for name, each in value.items())
+
+
+KINDS: dict[str, Callable[[object], bool]] = {
+    "point": _is_place,
+    "place": _named(_is_number),
+    "parent": lambda value: value is None or _is_place(value),
+    "status": lambda value: isinstance(value, str) and value in STATUSES,
+    "reason": lambda value: value is None or _is_text(value),
+    "design": _named(_is_number),
+    "figures": _named(lambda value: value is None or _is_number(value)),
+    "multipliers": _named(_is_number),
+    "reached": _named(lambda value: isinstance(value, bool)),
+    "certified": lambda value: isinstance(value, bool),
+    "seconds": _is_number,
+    "warm": lambda value: isinstance(value, dict),
+}
+"""What a column must hold."""
+
+
 class Store:
-    """A file of studies; every column of a row is JSON text, its point apart, which is a number."""
+    """A file of studies; every column of a row is JSON text, its point apart, which is a number, and its checksum."""
 
     def __init__(self, path: Path) -> None:
         """Open the file, or make it. Raises BadInput where it is none of a study, cannot be written, or is in use."""
         self.path = path
         files.check(path)
         with self._told():
-            self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
-            for setting in ("locking_mode = EXCLUSIVE", "journal_mode = DELETE", "synchronous = FULL"):
-                self._file.execute(f"PRAGMA {setting}")
-            with self._transaction():
-                self._begin()
+            # An absolute path is never one of the names that keep nothing: ":memory:", "file:...".
+            self._file = sqlite3.connect(path.absolute(), timeout=0.0, isolation_level=None, check_same_thread=False)
+        try:
+            with self._told():
+                self._file.set_progress_handler(lambda: 0, STEPS)  # where Python sees to Ctrl-C
+                for setting in ("locking_mode = EXCLUSIVE", "journal_mode = DELETE", "synchronous = FULL"):
+                    self._file.execute(f"PRAGMA {setting}")
+                with self._transaction():
+                    self._begin()
+        except BaseException:
+            self._file.close()
+            raise
 
     def _begin(self) -> None:
         """Make the tables in a new file, and check those of an old one."""
         head = tuple(self._file.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
-        if head == (0, 0) and not self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-            for table in TABLES:
+        query = "SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"
+        made = dict(self._file.execute(query).fetchall())
+        if head == (0, 0) and not made:
+            for table in TABLES.values():
                 self._file.execute(table)
             self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(f"PRAGMA user_version = {VERSION}")
         elif head != (APPLICATION, VERSION):
             raise BadInput("the file is no store of this version", file=str(self.path), key="store", remedy=_OTHER)
+        elif made != TABLES:  # a view or a trigger would be run whenever a row is read or written
+            others = sorted({*made, *TABLES} - {name for name, table in TABLES.items() if made.get(name) == table})
+            problem = f"it holds what no store holds: {', '.join(others)}"
+            raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -70,6 +130,8 @@ class Store:
         try:
             yield
         except sqlite3.Error as error:
+            if str(error) == "interrupted":
+                raise KeyboardInterrupt from None
             busy = "locked" in str(error)
             problem = "another run has it open" if busy else f"it cannot be used as a store: {error}"
             remedy = "Wait for that run, or name another file" if busy else _OTHER
@@ -89,26 +151,36 @@ class Store:
     def rows(self, key: str) -> list[Row]:
         """Return the rows of a study that are there. Raises BadInput for one that was damaged."""
         with self._told():
-            names = ", ".join(COLUMNS)
-            found = self._file.execute(f"SELECT {names} FROM row WHERE study = ? ORDER BY point", (key,)).fetchall()
-        return [self._row(cells) for cells in found]
+            query = f"SELECT {', '.join(COLUMNS)}, checksum FROM row WHERE study = ? ORDER BY point"
+            found = self._file.execute(query, (key,)).fetchall()
+        return [self._row(key, cells) for cells in found]
 
-    def _row(self, cells: Sequence[object]) -> Row:
-        try:
-            known = {name: _read(cell) for name, cell in zip(COLUMNS, cells, strict=True)}
-        except ValueError:
-            known = {}
-        if not all(isinstance(known.get(name), kind) for name, kind in KINDS.items()):
-            problem = f"the row of point {cells[0]} is damaged"
-            raise BadInput(problem, file=str(self.path), key="store", remedy=_OTHER)
+    def _row(self, key: str, cells: Sequence[object]) -> Row:
+        """Return the row of a study that cells hold. Raises BadInput where they are not as they were written."""
+        *own, checksum = cells
+        known: dict[str, Any] = {}
+        if checksum == _checksum(key, own):
+            with contextlib.suppress(ValueError, RecursionError):
+                known = {name: _read(cell) for name, cell in zip(COLUMNS, own, strict=True)}
+        if not known or not all(holds(known[name]) for name, holds in KINDS.items()):
+            problem = f"the row of point {shown(own[0])} is damaged: it is not as it was written"
+            remedy = (
+                f"{_OTHER}, or take the row out (DELETE FROM row WHERE point = {shown(own[0])}): it is solved again"
+            )
+            raise BadInput(problem, file=str(self.path), key="store", remedy=remedy)
         return Row.from_dict(known)
 
     def add(self, key: str, row: Row) -> None:
         """Write a finished row; it is there for good when this returns."""
         values = [value if name == "point" else json.dumps(value) for name, value in row.as_dict().items()]
-        marks = ", ".join("?" * (1 + len(COLUMNS)))
+        marks = ", ".join("?" * (2 + len(COLUMNS)))
         with self._told(), self._transaction():
-            self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values))
+            self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values, _checksum(key, values)))
+
+
+def _checksum(key: str, cells: Sequence[object]) -> str:
+    """Return 64 hex digits of what a row of a study holds, cell by cell."""
+    return hashlib.sha256(repr((key, *cells)).encode(errors="surrogatepass")).hexdigest()
 
 
 def _read(cell: object) -> object:

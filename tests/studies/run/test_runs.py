@@ -89,7 +89,7 @@ def test_a_broken_executor_of_the_callers_is_told(chain):
 
 
 @pytest.mark.parametrize("make", [None, ThreadPoolExecutor], ids=["serial", "threads"])
-def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_nothing(chain, tmp_path, make):
+def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_a_sample(chain, tmp_path, make):
     expected = digest(run.run(replace(chain, log=tmp_path / "other")))
 
     def stop(row):
@@ -105,7 +105,32 @@ def test_ctrl_c_keeps_what_is_finished_and_a_resumed_run_repeats_nothing(chain, 
     with Store(tmp_path / "s.db") as store:
         assert digest(run.run(chain, None, store)) == expected
     assert sorted({*chain.solves()}) == list(range(24))
-    assert all(chain.solves().count(point) == 1 for point in kept)
+    assert sum(chain.solves().count(point) - 1 for point in range(24)) == run.DOUBTED
+
+
+@pytest.mark.parametrize(
+    "change", [{"figures": {"value": 1.1, "nothing": None}}, {"figures": {}}, {"design": {"a": 1.0}}]
+)
+def test_a_row_that_does_not_come_out_again_stops_a_resumed_run(chain, tmp_path, change):
+    with Store(tmp_path / "s.db") as store:
+        store.begin(chain.key, {})
+        for row in run.run(replace(chain, count=1, log=tmp_path / "other")):
+            store.add(chain.key, replace(row, **change))
+    said = r"s\.db: store: solving point 0 again does not give the row"
+    with Store(tmp_path / "s.db") as store, pytest.raises(BadInput, match=said):
+        run.run(chain, None, store)
+    assert chain.solves() == [0]
+
+
+def test_rows_that_are_not_certified_are_not_doubted_and_rounding_is_none(chain, tmp_path):
+    with Store(tmp_path / "s.db") as store:
+        store.begin(chain.key, {})
+        first, second, *_ = run.run(replace(chain, count=2, log=tmp_path / "other"))
+        store.add(chain.key, replace(first, status="failed", certified=False))
+        store.add(chain.key, replace(second, figures={"value": 0.1 * (1 + 1e-9), "nothing": None}))
+    with Store(tmp_path / "s.db") as store:
+        assert run.run(chain, None, store)[0].status == "failed"
+    assert 0 not in chain.solves()
 
 
 def test_tasks_are_told_again_from_rows(chain):
@@ -122,6 +147,12 @@ def test_a_digest_leaves_out_seconds_and_order_and_nothing_else():
     assert digest([row, other]) == digest([other, replace(row, seconds=7.0)])
     for change in ({"warm": {"x": [0.2]}}, {"figures": {"f": 0.3333333333333333 + 1e-16}}, {"parent": 1}):
         assert digest([row, other]) != digest([replace(row, **change), other])
+
+
+def test_a_reason_is_one_line_and_nothing_that_a_terminal_obeys():
+    row = Row(0, {}, None, "failed", "no\nsuch \x1b[2J\x07 point")
+    assert row.reason == "no such [2J point"
+    assert Row(0, {}, None, "failed", "1 \u2264 2").reason == "1 \u2264 2"
 
 
 def test_a_row_is_the_same_through_json():
