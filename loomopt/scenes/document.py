@@ -1,6 +1,7 @@
 """A scene's raw tables: read from a file, copied, looked into and changed; where the files lie that it names."""
 
 import functools
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +12,10 @@ from loomopt.base.errors import BadInput, refusal, shown
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8
+_DOTS = 2 * _DEEPEST
+"""Dots in a key that is not read: each further one costs the parser the square of those before it."""
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+"""
+_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}\.[ \t]*+){{{_DOTS}}}")
 _MOST_REMEMBERED = 16
 
 
@@ -19,6 +24,8 @@ def read_document(path: Path | str) -> Mapping[str, Any]:
     origin = str(path)
     text = _read_text(Path(path), origin)
     try:
+        if _DEEP_KEY.search(text):
+            raise RecursionError
         return _tables(text)
     except tomllib.TOMLDecodeError as error:
         problem, remedy = f"it is not TOML: {str(error)[:200]}", "Correct the line"
@@ -93,8 +100,11 @@ def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
 def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, origin: str, key: str) -> dict[str, Any]:
     """Return tables in which one path has another value; tables on the way are made where they are missing.
 
-    key: the whole path, for the BadInput raised where it leads through a value.
+    key: the whole path, for the BadInput raised where it leads through a value, or too deep.
     """
+    if len(parts) > _DEEPEST + 1:
+        remedy = "Name the table and the key, such as operation.M0"
+        raise refusal(f"the key has {len(parts)} parts", origin, key, allowed=f"up to {_DEEPEST + 1}", remedy=remedy)
     first, *rest = parts
     if rest:
         inner = document.get(first, {})

@@ -195,6 +195,9 @@ FILES = [
     ("title = 'Webmaschine für Gewebe'".encode("cp1252"), "not UTF-8", "Save the file as UTF-8"),
     (b"a = " + b"9" * 5000, "thousands of digits", "Correct the number"),
     (b"a = " + b"[" * 2000 + b"]" * 2000, "nested too deep", "loomopt new"),
+    (b".".join([b"a"] * 40_000) + b" = 1", "nested too deep", "loomopt new"),
+    (b'[problem]\n[ "a b" . ' + b" . ".join([b"'a'"] * 20_000) + b"]", "nested too deep", "loomopt new"),
+    (b"a = {b = 1, " + b".".join([b"c"] * 40_000) + b" = 1}", "nested too deep", "loomopt new"),
     (b"# " + b"x" * 1_000_000, "too large", "the file you mean"),
     (b"%PDF-1.7 \x93\x8c", "not UTF-8", "Save the file as UTF-8"),
     (b'{"l1": "31 mm"}', "not TOML", "Correct the line"),
@@ -291,6 +294,27 @@ def test_an_unknown_packaged_name_tells_the_nearest():
     itself: dict[str, object] = {}
     itself["again"] = itself
     told(caught(scene, itself), "<dict>", "again", "nested too deep", "loomopt new")
+
+
+DOTTED = '# see a, 1.2.3.4.5.6.7.8.9.10.11.12.13.14.15\nsource = "1.2.3.4.5.6.7.8.9.10.11.12.13.14.15.16.17.18.19"'
+
+
+def test_dots_that_part_no_key_are_read(tmp_path):
+    path = tmp_path / "dots.toml"
+    path.write_text(TEXT.replace("source =", f"{DOTTED} #", 1), encoding="utf-8")
+    assert load(path).source.endswith("18.19")
+
+
+@pytest.mark.parametrize("key", ["a." * 50_000 + "a", "effects." + "a." * 50_000 + "a", "bounds.l1." + "a." * 9 + "a"])
+def test_a_key_of_many_parts_is_told(key):
+    told(caught(BEATUP.set, key, "1 mm"), "beatup.toml", "", f"the key has {key.count('.') + 1} parts", "operation.M0")
+    for change in (BEATUP.with_effect, BEATUP.without_effect):
+        assert "unknown effect" in caught(change, key).problem
+
+
+def test_an_effect_of_many_parts_is_told():
+    caught(BEATUP.with_effect, "gravity" + ".a" * 50_000)
+    caught(BEATUP.change, {}, ["inertia" + ".a" * 50_000])
 
 
 def test_there_are_enough_distinct_mistakes():
