@@ -12,7 +12,17 @@ def number(given: object, key: str, allowed: str, remedy: str) -> float:
     """Return a number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""
     if isinstance(given, bool) or not isinstance(given, Real):
         raise refusal("it is not a number", "", key, given, allowed, remedy)
-    return float(given)
+    try:
+        return float(given)
+    except OverflowError:
+        raise refusal("it is beyond all numbers that are computed with", "", key, given, allowed, remedy) from None
+
+
+def flag(given: object, key: str, remedy: str = "Write True or False") -> bool:
+    """Return a truth value, of Python or of NumPy. Raises BadInput for anything else, however true it looks."""
+    if isinstance(given, bool) or (type(given).__module__ == "numpy" and type(given).__name__ in ("bool", "bool_")):
+        return bool(given)
+    raise refusal("it is neither true nor false", "", key, given, "true, false", remedy)
 
 
 def whole(given: object, key: str, allowed: str, remedy: str) -> int:
@@ -34,6 +44,17 @@ def texts(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]
     if isinstance(given, str) or not _ordered(given):
         raise refusal("it is no list of names", "", key, given, allowed, remedy)
     return tuple(text(each, key, allowed, remedy) for each in given)
+
+
+def names(given: object, key: str, allowed: str, remedy: str) -> tuple[str, ...]:
+    """Return names in whatever order they come. Raises BadInput for anything else, a single name too."""
+    try:
+        found = None if isinstance(given, str | bytes | Mapping) else iter(given)  # type: ignore[call-overload]
+    except TypeError:
+        found = None
+    if found is None:
+        raise refusal("it is no list of names", "", key, given, allowed, remedy)
+    return tuple(text(each, key, allowed, remedy) for each in found)
 
 
 def listed(given: object, key: str, allowed: str, remedy: str) -> list[Any]:
@@ -65,4 +86,10 @@ def called(given: object, key: str, allowed: str, remedy: str) -> Callable[..., 
 
 
 def _ordered(given: object) -> TypeGuard[Sequence[Any]]:
-    return hasattr(given, "__getitem__") and hasattr(given, "__len__") and not isinstance(given, Mapping)
+    if isinstance(given, Mapping) or not hasattr(given, "__getitem__"):
+        return False
+    try:
+        len(given)  # type: ignore[arg-type]
+    except TypeError:  # NumPy's array of no dimension
+        return False
+    return True

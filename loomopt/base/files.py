@@ -28,8 +28,7 @@ def together(writes: Mapping[Path, Callable[[Path], None]]) -> None:
     at = Path()
     try:
         for at, write in writes.items():
-            place = Path(os.path.realpath(at))
-            _check(place, at)
+            place = _place(at)
             new = place.with_name(f".{secrets.token_hex(8)}{place.suffix}")
             staged.append((new, place))
             write(new)
@@ -47,7 +46,7 @@ def together(writes: Mapping[Path, Callable[[Path], None]]) -> None:
 
 def check(path: Path) -> None:
     """Raise BadInput where a file may not be written, its disk's room apart."""
-    _check(Path(os.path.realpath(path)), path)
+    _place(path)
 
 
 def check_room(folder: Path) -> None:
@@ -72,6 +71,20 @@ def suffix(path: Path, allowed: Sequence[str]) -> str:
             remedy=f"End the name in one of these, such as {path.stem or 'file'}{allowed[0]}",
         )
     return found
+
+
+def _place(path: Path) -> Path:
+    """Return where a file lies, all links followed. Raises BadInput where it may not be written."""
+    try:
+        place = Path(os.path.realpath(path))
+        _check(place, path)
+    except BadInput:
+        raise
+    except OSError as error:
+        raise _unwritable(path, error.strerror or str(error)) from None
+    except ValueError:
+        raise _unwritable(path, "no file can have this name") from None
+    return place
 
 
 def _check(place: Path, path: Path) -> None:

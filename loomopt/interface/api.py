@@ -1,9 +1,10 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
@@ -72,6 +73,10 @@ def solve(
     from loomopt.solving import engine
 
     own = _scene(scene)
+    for key, hook in (("on_iteration", on_iteration), ("on_start", on_start), ("on_step", on_step)):
+        if hook is not None:
+            arguments.called(hook, key, "a function", "Give a function, or leave it out")
+    arguments.flag(prove, "prove")
     if near is not None and not isinstance(near, solution.Solution):
         raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
     found = engine.solve(
@@ -82,7 +87,9 @@ def solve(
         seed=seed,
         near=[near.point] if near and near.point else [],
         prove=prove,
-        global_proof=GlobalProof(gap, seconds, on_step or (lambda text: None)) if everywhere else None,
+        global_proof=GlobalProof(gap, seconds, on_step or (lambda text: None))
+        if arguments.flag(everywhere, "everywhere")
+        else None,
         on_iteration=on_iteration,
         on_start=on_start,
         on_step=on_step,
@@ -133,7 +140,7 @@ def simulate(
     if accuracy is not None:
         check_numbers(accuracy, 1)
     own = _scene(scene)
-    name = target_name(own, target) if target else None
+    name = None if target is None else target_name(own, target)
     return tables.curves(own, _design(design, own), accuracy, name)
 
 
@@ -217,7 +224,7 @@ def pareto(
     from loomopt.studies.front import front
 
     own = _scene(scene)
-    asked = front.si(own, ranges or {})
+    asked = front.si(own, {} if ranges is None else ranges)
     study = front.trade(own, axes, target, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
     return conducted(study, executor, workers, store, resume, on_row)
 
@@ -235,4 +242,4 @@ def _design(given: Design | solution.Evaluated | None, scene: Scene) -> dict[str
         if given.scene:
             designs.check_job(given.scene.job, scene, "<answer>")
         given = given.design
-    return designs.checked(given, scene) if given else {}
+    return {} if given is None or (isinstance(given, Mapping) and not given) else designs.checked(given, scene)

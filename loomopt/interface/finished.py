@@ -11,7 +11,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.records import lazy
 from loomopt.interface import study_table
-from loomopt.interface.results import Answer, solved
+from loomopt.interface.results import PICTURE, Answer, solved
 from loomopt.scenes.scene import Scene
 from loomopt.studies.effects import study
 from loomopt.studies.effects.study import Effects, concluded
@@ -58,14 +58,15 @@ class DesignStudy:
 
     def table(self, *, si: bool = False) -> "pd.DataFrame":
         """Return one line per row, units in the column names; si: in SI, else in the scene's own units."""
-        return study_table.frame(self.study, self.rows, si)
+        return study_table.frame(self.study, self.rows, arguments.flag(si, "si"))
 
     def answer(self, point: int) -> Answer:
         """Return the whole answer of a row: its solve is repeated, to the same digits. Raises BadInput."""
-        for task, parent in run.tasks(self.study, self.solved):
-            if task.point == point:
-                return solved(self.study.solve(task, parent), self.study.scene_at(point))
         allowed = ", ".join(str(row.point) for row in self.solved[:20])
+        number = arguments.whole(point, "point", allowed, "Choose one of them")
+        for task, parent in run.tasks(self.study, self.solved):
+            if task.point == number:
+                return solved(self.study.solve(task, parent), self.study.scene_at(number))
         raise refusal("the study has no such point", key="point", origin="", value=point, allowed=allowed)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
@@ -75,7 +76,8 @@ class DesignStudy:
         """
         from loomopt.interface.figures import study
 
-        drawn: Figure = study.plot(self.study, self.solved, None if path is None else Path(path))
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        drawn: Figure = study.plot(self.study, self.solved, place)
         return drawn
 
     def as_dict(self) -> dict[str, object]:
@@ -117,9 +119,8 @@ def conducted(
     count: of worker processes, where there is no executor; store: file that each row is written to as it comes; resume:
     whether rows that are there are taken. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
-    executor = who(executor, count)
-    if on_row is not None:
-        arguments.called(on_row, "on_row", "a function of a row", "Give a function, or leave it out")
+    executor, resume = who(executor, count), arguments.flag(resume, "resume")
+    _check_hook(on_row)
     if store is None:
         if resume:
             raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
@@ -132,6 +133,12 @@ def conducted(
             raise refusal(problem, str(store), "store", remedy=remedy)
         opened.begin(study.key, study_identity(study))
         return DesignStudy(study, run.run(study, executor, opened, on_row))
+
+
+def _check_hook(on_row: object) -> None:
+    """Raise BadInput for what cannot be called with each row."""
+    if on_row is not None:
+        arguments.called(on_row, "on_row", "a function of a row", "Give a function, or leave it out")
 
 
 def who(executor: Executor | run.Making | None, count: int | None) -> Executor | run.Making | None:
@@ -158,7 +165,7 @@ class EffectsStudy(study.Found):
         """Return one line per effect, units in the column names; si: in SI, else in the scene's own units."""
         from loomopt.interface.text import effects
 
-        return effects.frame(self, si)
+        return effects.frame(self, arguments.flag(si, "si"))
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
         """Return the bars of shift and regret beside the tolerance; the figure shows itself in Jupyter.
@@ -167,7 +174,8 @@ class EffectsStudy(study.Found):
         """
         from loomopt.interface.figures import effects
 
-        drawn: Figure = effects.plot(self, None if path is None else Path(path))
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        drawn: Figure = effects.plot(self, place)
         return drawn
 
     def __repr__(self) -> str:
@@ -196,4 +204,5 @@ def conducted_effects(
 
     Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
+    _check_hook(on_row)
     return concluded_effects(study, run.run(study, who(executor, count), None, on_row))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from loomopt.base import records
+from loomopt.base import arguments, records
 from loomopt.base.records import lazy
 from loomopt.physics.tolerances import SLACK
 from loomopt.scenes import designs
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from loomopt.interface.text.notebook import Sketch
     from loomopt.solving.answer.solution import Proofs
+
+PICTURE = "a path that ends in .png, .svg or .pdf", "Name a file, or leave it out"
+"""What a figure may be written to, and what to do where it is none."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,7 +49,7 @@ class Evaluation(solution.Evaluated, records.Shown):
         """
         from loomopt.interface import tables
 
-        return tables.row(self, self.scene, self.sought, self._outcome, si=si)
+        return tables.row(self, self.scene, self.sought, self._outcome, si=arguments.flag(si, "si"))
 
     def curves(self) -> "pd.DataFrame":
         """Return the curves of the design over the cycle, SI, units in the column names."""
@@ -59,7 +62,8 @@ class Evaluation(solution.Evaluated, records.Shown):
         """
         from loomopt.interface.files import outputs
 
-        return outputs.plot(self, self.scene, self.target, None if path is None else Path(path))
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        return outputs.plot(self, self.scene, self.target, place)
 
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
@@ -75,8 +79,9 @@ class Evaluation(solution.Evaluated, records.Shown):
         """
         from loomopt.interface.files import outputs
 
-        outputs.linkage(Path(path), self.scene, self.design, outputs.what(self))
-        return Path(path)
+        place = Path(arguments.path(path, "path", "a path that ends in .dxf, .svg or .csv", "Name a file"))
+        outputs.linkage(place, self.scene, self.design, outputs.what(self))
+        return place
 
     def evaluate(self) -> "Evaluation":
         """Return figures and limits of the design in its own scene, judged by the limits of its own target."""

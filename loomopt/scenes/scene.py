@@ -4,9 +4,10 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from loomopt.base.errors import clean, refusal, shown, unknown
+from loomopt.base import arguments
+from loomopt.base.errors import clean, misread, refusal, shown, unknown
 from loomopt.base.records import Shown, freeze, lazy
-from loomopt.base.units import show
+from loomopt.base.units import QuantityError, show
 from loomopt.physics.effects.kinds import Effect, label, owned
 from loomopt.physics.schema import Table
 from loomopt.scenes import display
@@ -17,6 +18,12 @@ from loomopt.scenes.tables import Bound, JobNames, LimitRange, SceneSchema
 _Own = TypeVar("_Own", bound=Table)
 
 TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
+
+_KEY = "a dotted key", 'Write "operation.M0"'
+_SI = "an SI unit", 'Write "N*m"'
+_NAMES = "Name them in a list"
+_MOST_DIGITS = 17
+_DIGITS = f"1 to {_MOST_DIGITS}", "Give 6, or leave it out"
 
 
 class Equation(Protocol):
@@ -106,6 +113,7 @@ class Scene(Shown):
 
     def full(self, name: str) -> str:
         """Return the full name of a number by what a designer calls it; any other name is one already."""
+        arguments.text(name, "name", "the name of a number", 'Write "l1"')
         if name in self.mechanism or name in self.operation:
             return name
         labels = {label(e, key): owned(e, key) for e in reversed(self.active) for key in e.own.model_fields}
@@ -113,7 +121,7 @@ class Scene(Shown):
 
     def given(self, key: str) -> str | None:
         """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
-        value = looked_up(self.document, key.split("."))
+        value = looked_up(self.document, arguments.text(key, "key", *_KEY).split("."))
         if value is None or isinstance(value, Mapping):
             return None
         return value if isinstance(value, str) else shown(value)
@@ -125,23 +133,37 @@ class Scene(Shown):
 
     def shown_in(self, kind: str) -> str:
         """Return the unit in which a person sees quantities of a kind."""
-        return self.units[kind]
+        return self.units[self._kind_of_quantity(kind)]
+
+    def _kind_of_quantity(self, kind: str) -> str:
+        """Return a kind of quantity that there is. Raises BadInput for any other."""
+        if not isinstance(kind, str) or kind not in self.units:
+            allowed = ", ".join(self.units)
+            raise refusal("there is no such kind of quantity", "", "kind", kind, allowed, "Choose one of them")
+        return kind
 
     def unit_for(self, si: str) -> str:
         """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
-        return display.unit_for(si, self.units)
+        return display.unit_for(arguments.text(si, "si", *_SI), self.units)
 
     def filed_in(self, si: str) -> str:
         """Return the unit in which a file of curves has what has an SI unit."""
-        return display.filed_in(si, self.units, bool(self.document.get("display")))
+        chosen = bool(self.document.get("display"))
+        try:
+            return display.filed_in(arguments.text(si, "si", *_SI), self.units, chosen)
+        except QuantityError as error:
+            raise misread(error, "", "si", si) from None
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
         """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""
-        return show(value, self.units[kind], digits)
+        arguments.number(value, "value", "a number in SI", "Give a number")
+        if not 1 <= arguments.whole(digits, "digits", *_DIGITS) <= _MOST_DIGITS:
+            raise refusal("there is no such number of digits", "", "digits", digits, *_DIGITS)
+        return show(value, self.shown_in(kind), digits)
 
     def set(self, key: str, value: object) -> "Scene":
         """Return the scene with one dotted key set, such as set("operation.M0", "800 N*m"): see `update`."""
-        return self.update({key: value})
+        return self.update({arguments.text(key, "key", *_KEY): value})
 
     def update(self, values: Mapping[str, object]) -> "Scene":
         """Return the scene with several dotted keys set at once.
@@ -153,6 +175,8 @@ class Scene(Shown):
 
     def change(self, values: Mapping[str, object], on: Iterable[str] = (), off: Iterable[str] = ()) -> "Scene":
         """Return the scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
+        values = arguments.table(values, "values", "key of the scene → its value", 'Write {"operation.M0": "800 N*m"}')
+        on, off = (arguments.names(each, "effects", ", ".join(self.schema.effects), _NAMES) for each in (on, off))
         document = self._off(self._on(self._set(values), on), off)
         if document is self.document:
             return self
@@ -206,7 +230,8 @@ class Scene(Shown):
 
     def free(self, names: Iterable[str] | str) -> "Scene":
         """Return the scene with bounds freed that `free = false` holds at today's value; names: "J4, M0"."""
-        named = names.replace(",", " ").split() if isinstance(names, str) else list(names)
+        single = names.replace(",", " ").split() if isinstance(names, str) else names
+        named = arguments.names(single, "names", "names of bounds", 'Write ["J4"]')
         ranges = [name for name, bound in self.bounds.items() if bound.min < bound.max]
         groups = {group: [n for n in of if n in ranges] for group, of in self.schema.groups.items()}
         asked = [each for name in named for each in groups.get(name) or [name]]

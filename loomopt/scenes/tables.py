@@ -296,8 +296,9 @@ def _bound(raw: object, quantity: Quantity, origin: str, key: str) -> Bound:
         if end not in raw:
             remedy = f"Give min and max of {key}, or one value to fix it"
             raise refusal(f"{end} is missing: a bound has two ends", origin, f"{key}.{end}", remedy=remedy)
-    free = {"true": True, "false": False}.get(str(raw.get("free", True)).lower())
-    if free is None:
+    given = raw.get("free", True)
+    free = {"true": True, "false": False}.get(given.lower()) if isinstance(given, str) else given
+    if not isinstance(free, bool):
         free_key = f"{key}.free"
         raise refusal("it is neither true nor false", origin, free_key, raw["free"], "true, false", "Correct the value")
     low, high = (_value(quantity, raw[end], origin, f"{key}.{end}") for end in ("min", "max"))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, refusal
+from loomopt.base.errors import BadInput, refusal, shown
 from loomopt.physics.effects.kinds import EVALUATED
 from loomopt.physics.tolerances import COARSEST, TIGHTEST
 from loomopt.scenes.scene import Scene
@@ -104,7 +104,7 @@ def check_numbers(accuracy: float, starts: int | None, seed: int = 0) -> None:
         raise BadInput(
             "the accuracy is out of range",
             key="accuracy",
-            value=f"{accuracy:g}",
+            value=shown(accuracy),
             allowed=f"{TIGHTEST:g} to {COARSEST:g}",
             remedy="Give 1e-8, or leave it out.",
         )
@@ -112,7 +112,7 @@ def check_numbers(accuracy: float, starts: int | None, seed: int = 0) -> None:
         raise BadInput(
             "the number of starts is out of range",
             key="starts",
-            value=str(starts),
+            value=shown(starts),
             allowed=f"1 to {MOST_STARTS}",
             remedy="Give 20, or leave it out.",
         )

@@ -1,6 +1,11 @@
 """What Python gives the public functions: of the wrong kind it is one message, and NumPy's numbers do as well."""
 
+import inspect
+import math
 from concurrent.futures import ThreadPoolExecutor
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -95,3 +100,138 @@ def test_a_truth_value_is_no_number():
         assert read(2, "x", "", "") == 2
         with pytest.raises(lo.BadInput, match="given: true"):
             read(True, "x", "", "")
+
+
+SCENE = lo.load("beatup-light")
+
+
+class TakenError(Exception):
+    """Raised in place of what takes long: the arguments are taken."""
+
+
+def computing(*_: object, **__: object) -> None:
+    raise TakenError
+
+
+class Odd:
+    """What has neither a length nor a value, and shows itself as nothing."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
+ODD: list[Any] = [
+    *(None, True, 3, -1, 0, 2.5, 1e300, -1e300, math.nan, math.inf, 10**400, -(10**5000), 1j, Decimal(3)),
+    *(Fraction(10**400), "", "x", "a.b", "\0", "\ud800", "x" * 10_000, "\x1b[2J", b"x", Odd(), Odd, len, [], [3]),
+    *([None], ["l1", 2], {}, {"x": "y"}, {3: 4}, {"l1": None}, {"l1": 10**5000}, {"l1": Odd()}, set(), {3}, (), (1, 2)),
+    *({"operation.M0": Odd()}, {"operation.M0": [Odd()]}, range(3), iter([]), np.array(3), np.array(1e-8), np.nan),
+    *(np.array("l1"), np.array([1.0, 2.0]), np.array([]), np.array([["a"]]), np.bool_(True), np.float64("inf")),
+    *(np.str_("x"), Path("x"), Path("/"), Path("a\0b"), SCENE, iter([3]), {"m4e": (10**400, 1)}, {"m4e": Odd()}),
+]  # fmt: skip
+GIVEN: dict[str, dict[str, Any]] = {
+    "sweep": {"over": OVER},
+    "pareto": {"axes": AXES},
+    "set": {"key": "operation.M0", "value": "600 N*m"},
+    "update": {"values": {}},
+    "change": {"values": {}},
+    "free": {"names": []},
+    "given": {"key": "operation.M0"},
+    "full": {"name": "l1"},
+    "show": {"value": 1.0, "kind": "length"},
+    "shown_in": {"kind": "length"},
+    "unit_for": {"si": "m"},
+    "filed_in": {"si": "m"},
+    "export": {"path": "x.csv"},
+    "answer": {"point": 0},
+}
+FUNCTIONS = ["load", "scene", "solve", "evaluate", "simulate", "prove", "sweep", "effects", "pareto"]
+OF_SCENE = ["set", "update", "change", "with_effect", "without_effect", "free", "given", "full", "show"]
+OF_SCENE += ["shown_in", "unit_for", "filed_in"]
+OF_ANSWER = ["plot", "export", "to_frame", "simulate", "prove"]
+OF_STUDY = ["table", "answer", "plot"]
+ENGINES = "loomopt.solving.engine.solve", "loomopt.studies.run.run.run", "loomopt.solving.proof.whole_cycle._readings"
+ENGINES += "loomopt.interface.tables.curves", "loomopt.interface.figures.study.plot"
+
+
+@pytest.fixture(scope="module")
+def owners() -> dict[str, Any]:
+    answer, study = lo.evaluate(SCENE), lo.sweep(SCENE, OVER)
+    return {"": lo, "scene": SCENE, "answer": answer, "study": study}
+
+
+METHODS = {"": FUNCTIONS, "scene": OF_SCENE, "answer": OF_ANSWER, "study": OF_STUDY}
+
+
+@pytest.mark.parametrize(("owner", "name"), [(owner, name) for owner in METHODS for name in METHODS[owner]])
+def test_whatever_is_given_is_taken_or_told_in_one_line(monkeypatch, tmp_path, owners, owner, name):
+    monkeypatch.chdir(tmp_path)
+    for place in ENGINES:
+        monkeypatch.setattr(place, computing)
+    call = getattr(owners[owner], name)
+    first = {"scene": "beatup-light"} if not owner and name not in ("load", "scene") else {}
+    several = name in ("with_effect", "without_effect")
+    others = {**first, **GIVEN.get(name, {})}
+    wrong = []
+    for parameter in inspect.signature(call).parameters:
+        for odd in ODD:
+            try:
+                call(odd) if several else call(**{**others, parameter: odd})
+            except TakenError:
+                pass
+            except lo.BadInput as told:
+                if not str(told).isprintable():
+                    wrong.append((parameter, type(odd), repr(str(told))))
+            except BaseException as error:
+                wrong.append((parameter, type(odd), f"{error!r}"[:150]))
+    assert not wrong, "\n".join(map(str, wrong))
+
+
+KEYS = ["problem", "problem.title", "problem.name", "display", "display.length", "effects", "effects.inertia", "bounds"]
+KEYS += ["bounds.l1", "bounds.l1.free", "limits.swing", "targets.balance.expected", "targets.retrofit.weights.l1"]
+KEYS += ["targets", "available.gravity", "mechanism.l1", "effects.resistance.table", "operation"]
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_whatever_a_key_is_set_to_is_taken_or_told(key):
+    told = []
+    for odd in ODD:
+        try:
+            repr(SCENE.set(key, odd))
+        except lo.BadInput as error:
+            told.append(str(error))
+    assert told
+    assert "".join(told).isprintable()
+
+
+def test_a_hook_or_a_flag_of_the_wrong_kind_is_told():
+    for key in ("on_iteration", "on_start", "on_step"):
+        with pytest.raises(lo.BadInput, match=rf"{key}: it cannot be called \(given: 3\)"):
+            lo.solve(SCENE, **{key: 3})  # type: ignore[arg-type]
+    with pytest.raises(lo.BadInput, match="on_row: it cannot be called"):
+        lo.effects(SCENE, on_row=3)  # type: ignore[arg-type]
+    for key in ("prove", "everywhere"):
+        with pytest.raises(lo.BadInput, match=f'{key}: it is neither true nor false .given: "no"'):
+            lo.solve(SCENE, **{key: "no"})  # type: ignore[arg-type]
+    with pytest.raises(lo.BadInput, match="resume: it is neither true nor false"):
+        lo.sweep(SCENE, OVER, store="s.db", resume="no")  # type: ignore[arg-type]
+    assert arguments.flag(np.bool_(True), "x")
+
+
+def test_a_name_in_place_of_names_is_told():
+    for call in (lambda: SCENE.change({}, "gravity"), lambda: SCENE.change({}, (), "gravity")):
+        with pytest.raises(lo.BadInput, match=r'it is no list of names \(given: "gravity"\)'):
+            call()
+    assert SCENE.free("") is not None
+    assert SCENE.change({}, {"gravity"}).effects.keys() == SCENE.with_effect("gravity").effects.keys()
+
+
+@pytest.mark.parametrize("error", [RuntimeError("no more"), KeyError("x"), SystemExit(3), AssertionError()])
+@pytest.mark.parametrize("hook", ["on_iteration", "on_start", "on_step"])
+def test_an_error_in_a_hook_is_that_error(error, hook):
+    def raising(*_):
+        raise error
+
+    with pytest.raises(type(error)) as caught:
+        lo.solve(SCENE, **{hook: raising})
+    assert caught.value is error
+    assert lo.solve(SCENE).status == "optimal"

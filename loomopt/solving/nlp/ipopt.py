@@ -217,7 +217,7 @@ def run(
 ) -> IpoptAnswer:
     """Return IPOPT's answer from variables x (SI) and extra; warm: multipliers to start from, if there are any.
 
-    Raises KeyboardInterrupt on Ctrl-C.
+    Raises KeyboardInterrupt on Ctrl-C, and what the callback raises.
     """
     arguments = calls.arguments(nlp, sampler, x, extra, nodes)
     if calls.overdetermined(arguments):
@@ -230,7 +230,7 @@ def run(
     stats = solver.stats()
     status = str(stats["return_status"])
     if status in STOPPED:
-        raise KeyboardInterrupt
+        raise calls.settings.callback.error() if calls.settings.callback else KeyboardInterrupt
     evaluated = sum(int(count) for name, count in stats.items() if name.startswith("n_call_nlp_"))
     sampler.session.positions += evaluated * max(1, sum(map(len, nodes)))
     flat, lam_x, lam_g = (np.asarray(said[name]).ravel() for name in ("x", "lam_x", "lam_g"))
@@ -241,21 +241,39 @@ def run(
 
 
 class IterationCallback:
-    """Reports each iteration; one CasADi callback per NLP size, kept alive with it."""
+    """Reports each iteration; one CasADi callback per NLP size, kept alive with it.
+
+    What a report raises stops IPOPT, which tells no more than that it was stopped: `error` says why.
+    """
 
     def __init__(self, report: Callable[[int], None]) -> None:
         self.report = report
+        self.raised: BaseException | None = None
         self._made: dict[tuple[int, int, int], Any] = {}
 
     def for_size(self, variables: int, rows: int, parameters: int) -> Any:
         """Return the CasADi callback for an NLP of this size."""
         size = (variables, rows, parameters)
         if size not in self._made:
-            self._made[size] = _make(self.report, *size)
+            self._made[size] = _make(self._told, *size)
         return self._made[size]
 
+    def error(self) -> BaseException:
+        """Return what a report has raised, once; without, it was Ctrl-C."""
+        found, self.raised = self.raised, None
+        return found or KeyboardInterrupt()
 
-def _make(report: Callable[[int], None], variables: int, rows: int, parameters: int) -> Any:
+    def _told(self, number: int) -> bool:
+        """Report an iteration; say whether that has failed."""
+        try:
+            self.report(number)
+        except BaseException as error:
+            self.raised = error
+            return True
+        return False
+
+
+def _make(report: Callable[[int], bool], variables: int, rows: int, parameters: int) -> Any:
     """Return a CasADi callback; defined here so that CasADi is imported only when one is wanted."""
     import casadi as ca
 
@@ -283,8 +301,7 @@ def _make(report: Callable[[int], None], variables: int, rows: int, parameters: 
             return ca.Sparsity.dense(shapes.get(str(ca.nlpsol_out(place)), 0), 1)
 
         def eval(self, arguments: Any) -> list[int]:
-            report(self.count)
             self.count += 1
-            return [0]
+            return [int(report(self.count - 1))]
 
     return Report()

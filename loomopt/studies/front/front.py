@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, misread, refusal
+from loomopt.base.errors import BadInput, misread, refusal, shown
 from loomopt.base.quantities import read as read_quantity
 from loomopt.base.units import SI_UNIT, QuantityError
 from loomopt.physics.schema import Sense
@@ -59,7 +59,7 @@ def trade(
     wanted = POINTS if points is None else arguments.whole(points, "points", allowed, "Correct the number")
     if not FEWEST <= wanted <= numbers.MOST_VALUES:
         problem = "a front needs more points" if wanted < FEWEST else "a front has no such number of points"
-        raise BadInput(problem, key="points", value=str(points), allowed=allowed, remedy="Correct the number.")
+        raise BadInput(problem, key="points", value=shown(points), allowed=allowed, remedy="Correct the number.")
     for name, (low, high) in (ranges or {}).items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             value, allowed = f"{low:g}:{high:g} in SI", "the smaller end, then the larger one"

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, refusal
+from loomopt.base.errors import BadInput, refusal, shown
 from loomopt.model.session import working
 from loomopt.studies.run.rows import Row, Study, StudyTask, agree
 
@@ -40,7 +40,7 @@ def workers(count: int) -> Callable[[], Executor]:
         raise BadInput(
             "there can be no such number of workers",
             key="workers",
-            value=str(count),
+            value=shown(count),
             allowed=f"1 to {MOST_WORKERS}",
             remedy=remedy,
         )
