@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput, unknown
 from loomopt.jobs.base import Job
+from loomopt.model.numbers import words
 from loomopt.physics.effects.kinds import Effect, ranked
 from loomopt.scenes import packaged
 from loomopt.scenes.document import Paths, read_document
@@ -117,6 +118,7 @@ class _Registered:
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
+        words(scene)  # what loads read of files is a curve, or bad input
         of(scene).check(scene)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:

@@ -94,6 +94,11 @@ FLOAT = Maths(
 """Plain float64 scalars: several times faster than NumPy on one angle."""
 
 
+def within_half_turn(maths: Maths, angle: Number) -> Number:
+    """Return an angle, rad, between −π and π: what is no sine of it is periodic so; its branch is half a turn away."""
+    return maths.atan2(maths.sin(angle), maths.cos(angle))
+
+
 def arrays(system: Maths) -> Maths:
     """Return the system in which a formula runs over an array of another's numbers, as its `spread` makes one."""
     if system is FLOAT:

@@ -1,9 +1,18 @@
 """A scene's numbers by one name each, whatever table they stand in."""
 
 from collections.abc import Mapping
+from typing import Any
 
-from loomopt.physics.effects.kinds import label, owned
+from loomopt.base.errors import refusal
+from loomopt.maths import periodic_cubic
+from loomopt.maths.periodic_cubic import PeriodicCubic
+from loomopt.physics.effects.kinds import Load, label, owned
+from loomopt.physics.schema import Table
+from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
+
+CORNER = "corner"
+"""The column that marks corners of a curve."""
 
 
 def numbers(scene: Scene) -> dict[str, float]:
@@ -16,14 +25,42 @@ def numbers(scene: Scene) -> dict[str, float]:
     return found
 
 
-def words(scene: Scene) -> tuple[tuple[str, str, str], ...]:
-    """Return (effect, key, word) for every value that chooses an effect's formula."""
+def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
+    """Return (effect, key, word) for every value that chooses an effect's formula; a curve for the name of its file.
+
+    Raises BadInput.
+    """
+    known = curves(scene)
     return tuple(
-        (name, key, value)
+        (name, key, known.get((name, key), value))
         for name, own in scene.effects.items()
         for key, value in own.model_dump().items()
         if isinstance(value, str)
     )
+
+
+def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic]:
+    """Return the curves that the scene's loads are, read from its files, by effect and key. Raises BadInput."""
+    on = zip(scene.active, scene.effects.values(), strict=True)
+    loads = [(effect, own) for effect, own in on if isinstance(effect, Load) and effect.tabulated]
+    found = {(load.name, load.tabulated.key): _curve(scene, load, own) for load, own in loads if load.tabulated}
+    return {place: curve for place, curve in found.items() if curve is not None}
+
+
+def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | None:
+    """Return the curve that a load's table names; None where it names none. Raises BadInput."""
+    table = load.tabulated
+    given = getattr(own, table.key) if table else None
+    if table is None or given is None:
+        return None
+    key = ".".join(("effects", *load.path, table.key))
+    columns, origin = csv_tables.read(scene, given, key, table.columns, (CORNER,), periodic_cubic.FEWEST)
+    angles, values, marked = columns
+    try:
+        return periodic_cubic.through(angles, values, tuple(map(bool, marked)))
+    except ValueError as error:
+        remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
+        raise refusal(f"the table is no curve over one turn: {error}", origin, remedy=remedy) from None
 
 
 def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -41,3 +78,21 @@ def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, f
 def labels(scene: Scene) -> dict[str, str]:
     """Return what a designer calls each number of the effects that are on, by its full name."""
     return {owned(effect, key): label(effect, key) for effect in scene.active for key in effect.own.model_fields}
+
+
+def told(scene: Scene) -> tuple[str, ...]:
+    """Return what to know of the curves that loads are read from: each a sentence without its full stop."""
+    found = []
+    loads = {load.name: load for load in scene.active if isinstance(load, Load)}
+    for (name, key), curve in curves(scene).items():
+        table = loads[name].tabulated
+        assert table is not None
+        corners = "one corner" if curve.corners == 1 else f"{curve.corners or 'no'} corners"
+        left = scene.show(curve.spread, table.kind, 3)
+        unread = [each for each in table.needless if scene.given(each) is not None]
+        found.append(
+            f"{name}.{key} {scene.effects[name].model_dump()[key]}: a cubic through {curve.samples} samples with "
+            f"{corners}, rms of the fit {scene.show(0.0, table.kind)}; left out one at a time, samples lie {left} rms "
+            f"off the curve of the others{f'. {unread[0]} is not read' if unread else ''}"
+        )
+    return tuple(found)

@@ -20,8 +20,8 @@ from loomopt.physics.tolerances import SAME_ANGLE
 TURN = 2 * math.pi
 Floats = NDArray[np.float64]
 Pieces = NDArray[np.intp]
-Where = tuple[str, float]
-"""A switch by name, and its value on the pieces that are meant."""
+Where = tuple[str, float | tuple[float, ...]]
+"""A switch by name, and its value, or any of its values, on the pieces that are meant."""
 
 
 class Node(NamedTuple):
@@ -63,7 +63,7 @@ class Cycle:
         """Say of each piece whether it is meant; all are without `where`."""
         if where is None:
             return np.ones(self.pieces, dtype=bool)
-        return np.asarray(self.switches[:, self.names.index(where[0])] == where[1])
+        return np.isin(self.switches[:, self.names.index(where[0])], where[1])
 
     def stretch(self, where: Where | None) -> tuple[float, float]:
         """Return the crank angles, rad, where a stretch of the cycle that is meant begins and ends."""

@@ -106,6 +106,8 @@ def _in_symbols(pose: Motion, inertia: Expression, carried: Expression) -> "Writ
 def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
     """Write a load's term, with where each of its formulas holds."""
     name = symbol(f"{letter}_{load.name}")
+    if isinstance(load, Load) and load.tabulated and load.tabulated.key in known.own[load.name]:
+        return _tabulated(load, name, known)
     if isinstance(load, Load) and load.told:
         rows: list[Case] = [(force(load, pose, known, switch), where) for switch, where in load.told.items()]
         alike = len({formula for formula, _ in rows}) == 1
@@ -119,6 +121,16 @@ def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
     choice = r" \\ ".join([*lines, rf"{latex(last)} & \text{{else}}"])
     written = rf"{latex(name)} = \begin{{cases}} {choice} \end{{cases}}"
     return Equation(load.name, f"{text(name)} = {', '.join(told)}, else {text(last)}", written)
+
+
+def _tabulated(load: Load[Any], name: Expression, known: Given) -> Equation:
+    """Say what a load's curve is: of each interval only its own numbers differ."""
+    assert load.tabulated is not None
+    curve = known.own[load.name][load.tabulated.key]
+    bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
+    said = f"a cubic between each of the table's {curve.samples} samples and the next, C2 but for {bent}"
+    said += f", angles {load.tabulated.angle}"
+    return Equation(load.name, f"{text(name)}: {said}", rf"{latex(name)}:\ \text{{{said}}}")
 
 
 def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:

@@ -118,7 +118,9 @@ def _shown(load: Acting, value: Expression) -> Acting:
 
 def own_values(effect: Effect, words: Mapping[str, str]) -> Values:
     """Return the symbols of an effect's table; words: values that choose a formula."""
-    return {key: words.get(key, symbol(effect.letters.get(key, key))) for key in effect.own.model_fields}
+    curve = effect.tabulated.key if isinstance(effect, Load) and effect.tabulated else ""
+    keys = [key for key in effect.own.model_fields if key != curve or key in words]
+    return {key: words.get(key, symbol(effect.letters.get(key, key))) for key in keys}
 
 
 def equation(name: str, left: Expression, right: Expression) -> Equation:

@@ -60,16 +60,16 @@ class JobViews(abc.ABC):
         return {}
 
     def remarks(self, scene: "Scene", design: Numbers) -> tuple[str, ...]:
-        """Return what to know beside the numbers, each a sentence without its full stop: what checks remark."""
-        from loomopt.model.numbers import numbers
+        """Return what to know beside the numbers, each a sentence without its full stop: curves, what checks remark."""
+        from loomopt.model.numbers import numbers, told
         from loomopt.physics.effects.kinds import Check, owned
 
         known = numbers(scene) | {scene.full(name): value for name, value in design.items()}
-        told = []
+        found = list(told(scene))
         for check in (effect for effect in scene.active if isinstance(effect, Check)):
             own = {key: known.get(owned(check, key)) for key in check.own.model_fields}
-            told.append(check.remark(known, own, scene.show))
-        return tuple(text for text in told if text)
+            found.append(check.remark(known, own, scene.show))
+        return tuple(text for text in found if text)
 
     def missing(self, scene: "Scene") -> tuple[str, ...]:
         """Return the keys without which the scene cannot be drawn."""

@@ -13,8 +13,15 @@ from loomopt.base.units import DISPLAY_UNIT, factor
 from loomopt.scenes.scene import Scene
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
-UNITS = {"angle": ("deg", "rad"), "length": ("mm", "cm", "m", "in")}
+UNITS = {
+    "angle": ("deg", "rad"),
+    "length": ("mm", "cm", "m", "in"),
+    "torque": ("N*m", "kN*m", "N*mm", "lbf*in", "lbf*ft"),
+    "force": ("N", "kN", "lbf"),
+}
 """Units a column may have, by kind of quantity."""
+MARKS = {"": 0.0, "0": 0.0, "1": 1.0, "x": 1.0}
+"""What a column of marks may hold."""
 TURN = 2 * math.pi + 1e-4
 """Largest angle, rad: one turn, with room for 6.2832."""
 _HEADING = re.compile(r"(.*\S) +\[(.+)\]")
@@ -29,10 +36,13 @@ class _Column(NamedTuple):
     unit: float
 
 
-def read(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[list[tuple[float, ...]], str]:
+def read(
+    scene: Scene, given: str, key: str, kinds: Mapping[str, str], marks: Sequence[str] = (), fewest: int = FEWEST_ROWS
+) -> tuple[list[tuple[float, ...]], str]:
     """Return the columns of a table, SI, and the file as named. Raises BadInput.
 
-    given: the file as the scene names it, under `key`; kinds: column name → kind of quantity.
+    given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
+    unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be.
     """
     path = scene.paths.located(given, key, scene.origin)
     try:
@@ -55,7 +65,7 @@ def read(scene: Scene, given: str, key: str, kinds: Mapping[str, str]) -> tuple[
     except (csv.Error, ValueError):
         remedy = "Write short cells, and close every quotation mark on its own line"
         raise refusal("the table is not CSV", given, allowed=header(kinds), remedy=remedy) from None
-    return _columns(rows, kinds, given), given
+    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
 
 
 def header(kinds: Mapping[str, str]) -> str:
@@ -63,13 +73,15 @@ def header(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{name} [{DISPLAY_UNIT[kind]}]" for name, kind in kinds.items())
 
 
-def _columns(rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: str) -> list[tuple[float, ...]]:
+def _columns(
+    rows: Sequence[Sequence[str]], kinds: Mapping[str, str], origin: str, fewest: int
+) -> list[tuple[float, ...]]:
     if not rows:
         raise refusal("the table is empty", origin, allowed=header(kinds), remedy="Give a header and rows")
     columns = list(_found(rows[0], kinds, origin))
-    if not FEWEST_ROWS <= len(rows) - 1 <= MOST_ROWS:
+    if not fewest <= len(rows) - 1 <= MOST_ROWS:
         found = f"the table has {len(rows) - 1} rows"
-        raise refusal(found, origin, allowed=f"{FEWEST_ROWS} to {MOST_ROWS}", remedy="Give more, or fewer")
+        raise refusal(found, origin, allowed=f"{fewest} to {MOST_ROWS}", remedy="Give more, or fewer")
     for line, row in enumerate(rows[1:], 2):
         _check_length(row, rows[0], line, origin)
     values = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
@@ -91,6 +103,19 @@ def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterat
             problem = f"the table has no column {name} with its unit ({units})"
             raise refusal(problem, origin, allowed=header(kinds), remedy="Name the columns so, parted by commas")
         yield _Column(name, kind, named[0][0], factor(named[0][1]))
+
+
+def _marked(rows: Sequence[Sequence[str]], name: str, origin: str) -> tuple[float, ...]:
+    """Return which rows a column marks; none where there is no such column. Raises BadInput."""
+    places = [place for place, cell in enumerate(rows[0]) if cell.strip() == name]
+    if not places:
+        return (0.0,) * (len(rows) - 1)
+    cells = [row[places[0]].strip().lower() for row in rows[1:]]
+    for line, cell in enumerate(cells, 2):
+        if cell not in MARKS:
+            problem = f"row {line} of the table holds no mark under {name}"
+            raise refusal(problem, origin, allowed="1 or x for a mark, 0 or nothing for none", remedy="Correct it")
+    return tuple(MARKS[cell] for cell in cells)
 
 
 def _check_length(row: Sequence[str], head: Sequence[str], line: int, origin: str) -> None:

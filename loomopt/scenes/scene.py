@@ -8,7 +8,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import clean, misread, refusal, shown, unknown
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.units import QuantityError, show
-from loomopt.physics.effects.kinds import Effect, label, owned
+from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
 from loomopt.scenes import display
 from loomopt.scenes import tables as read
@@ -194,6 +194,11 @@ class Scene(Shown):
             if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
                 document = replaced(document, own, {}, self.origin, key)
             document = replaced(document, parts, value, self.origin, key)
+            for other in _stood_for(effect, parts[len(own) :]):
+                # A curve takes the place of numbers, and they that of a curve, but for what is set in the same call.
+                place = [*own, other]
+                if looked_up(document, place) is not None and ".".join(place) not in values:
+                    document = removed(document, place)
         return document
 
     def with_effect(self, *names: str) -> "Scene":
@@ -210,8 +215,7 @@ class Scene(Shown):
 
     def _demand_values(self, document: Mapping[str, Any], name: str, parts: list[str]) -> None:
         """Raise BadInput for an effect that is off and has no table in [available]."""
-        fields = self._effect(name).own.model_fields
-        keys = [f"effects.{name}.{key}" for key, info in fields.items() if info.is_required()]
+        keys = [f"effects.{name}.{key}" for key in required(self._effect(name))]
         if keys and looked_up(document, ("available", *parts)) is None:
             remedy = f"Set {', '.join(keys)} instead, which puts it on, or add the table [available.{name}]"
             raise refusal(f"effect {name} has no values", self.origin, f"available.{name}", remedy=remedy)
@@ -288,6 +292,14 @@ class Scene(Shown):
         if self._kind(name) not in known:
             raise unknown("effect", name, known, self.origin, "effects")
         return name.split(".")
+
+
+def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
+    """Return the keys of an effect's table that say otherwise what the one that is set says."""
+    curve = effect.tabulated if isinstance(effect, Load) else None
+    if curve is None or len(key) != 1:
+        return ()
+    return curve.instead if key[0] == curve.key else (curve.key,) if key[0] in curve.instead else ()
 
 
 def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:

@@ -11,7 +11,7 @@ from loomopt.base.errors import invalid, misread, missing, refusal, shown, unkno
 from loomopt.base.quantities import Quantity, quantity_of, unit_of
 from loomopt.base.records import lazy
 from loomopt.base.units import QuantityError, ShowValue
-from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label
+from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label, needed, required
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
 
 
@@ -188,17 +188,35 @@ def effects(raw: object, schema: SceneSchema, origin: str, path: str) -> dict[Ef
             problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
             raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
         if not effect.many:
-            found[effect] = checked(effect.own, inner[name], origin, f"{path}.{name}")
+            found[effect] = _checked_effect(effect, inner[name], origin, f"{path}.{name}")
             continue
         for each, values in table(inner[name], origin, f"{path}.{name}").items():
-            found[instance(effect, each)] = checked(effect.own, values, origin, f"{path}.{name}.{each}")
+            found[instance(effect, each)] = _checked_effect(effect, values, origin, f"{path}.{name}.{each}")
+    return found
+
+
+def _checked_effect(effect: Effect, raw: object, origin: str, path: str) -> Table:
+    """Return an effect's table: of one that may be a curve of one's own either that, or what it stands for."""
+    found = checked(effect.own, raw, origin, path)
+    curve = effect.tabulated if isinstance(effect, Load) else None
+    if curve is None:
+        return found
+    if getattr(found, curve.key) is None:
+        for key in required(effect):
+            if getattr(found, key) is None:
+                raise missing(effect.own, origin, path, key)
+        return found
+    others = [key for key in curve.instead if key in found.model_fields_set]
+    if others:
+        problem = f"{curve.key} and {', '.join(others)} say the same twice"
+        raise refusal(problem, origin, f"{path}.{curve.key}", remedy=f"Take {curve.key} out, or {', '.join(others)}")
     return found
 
 
 def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], origin: str) -> None:
     """Raise BadInput where an active effect, or the job, needs a number that is not given."""
     needs = [(key, f"job {schema.name}") for key in schema.needs]
-    needs += [(key, f"effect {effect.name}") for effect in active for key in effect.needs]
+    needs += [(key, f"effect {effect.name}") for effect, own in active.items() for key in needed(effect, own)]
     for key, who in needs:
         path, name = key.split(".")
         if getattr(tables[path], name) is None:

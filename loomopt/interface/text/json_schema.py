@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 
 from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of
 from loomopt.base.units import DISPLAY_UNIT
+from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import TABLES
@@ -34,8 +35,8 @@ def scene(schema: SceneSchema) -> Json:
     }
     tables = {name: makers[name](schema) for name in TABLES}
     whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
-    rules = [_given(each, "") for each in schema.needs]
-    rules += [_given(key, effect.name) for effect in schema.effects.values() for key in effect.needs]
+    rules = [_given(each) for each in schema.needs]
+    rules += [_given(key, effect) for effect in schema.effects.values() for key in effect.needs]
     found: Json = {"$schema": DIALECT, "title": f"A loomopt scene: {schema.title}", **whole}
     return _hoisted(found | ({"allOf": rules} if rules else {}))
 
@@ -60,7 +61,7 @@ def _problem(schema: SceneSchema) -> Json:
 def _effects(schema: SceneSchema) -> Json:
     found = {}
     for effect in schema.effects.values():
-        own = _model(effect.own, effect.summary)
+        own = _model(effect.own, effect.summary) | _either(effect)
         found[effect.name] = {"type": "object", "additionalProperties": own} if effect.many else own
     return _closed(found)
 
@@ -94,13 +95,29 @@ def _limits(schema: SceneSchema) -> Json:
     return _closed({name: _closed(of) | {"minProperties": 1, "description": said[name]} for name, of in sides.items()})
 
 
-def _given(key: str, effect: str) -> Json:
+def _either(effect: Effect) -> Json:
+    """Return that a load is either a curve of its own, or the numbers that this stands for."""
+    curve = effect.tabulated if isinstance(effect, Load) else None
+    if curve is None:
+        return {}
+    numbers = [key for key in required(effect) if key in curve.instead]
+    return {
+        "if": {"required": [curve.key]},
+        "then": {"properties": dict.fromkeys(curve.instead, False)},
+        "else": {"required": numbers},
+    }
+
+
+def _given(key: str, effect: Effect | None = None) -> Json:
     """Return the rule that a key is given; effect: where that is on, always without one."""
     table = next(table for table in TABLES if key.startswith(f"{table}."))
     then = {"required": [table], "properties": {table: {"required": [key.removeprefix(f"{table}.")]}}}
     if not effect:
         return then
-    return {"if": {"required": ["effects"], "properties": {"effects": {"required": [effect]}}}, "then": then}
+    on: Json = {"required": [effect.name]}
+    if isinstance(effect, Load) and effect.tabulated and key in effect.tabulated.needless:
+        on |= {"properties": {effect.name: {"not": {"required": [effect.tabulated.key]}}}}
+    return {"if": {"required": ["effects"], "properties": {"effects": on}}, "then": then}
 
 
 def _closed(properties: Mapping[str, Json], required: list[str] | None = None) -> Json:

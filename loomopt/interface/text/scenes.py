@@ -10,6 +10,7 @@ from loomopt.base.units import factor
 from loomopt.interface.text.layout import GAP, Grid
 from loomopt.jobs import registry
 from loomopt.model.curves import split
+from loomopt.model.numbers import told
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
 from loomopt.picture.job_views import Marks, Span
@@ -41,6 +42,7 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
         Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
         Grid("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
+        *told(scene),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
         Grid("Figures", ("figure", "what it is"), figures),

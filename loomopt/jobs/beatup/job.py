@@ -58,13 +58,13 @@ class Beatup(Job):
                 remedy="Add the table [effects.inertia] with J4, or another effect.",
             )
         base.demand(scene, target)
-        resisted = "M0" in scene.operation and RESISTED[0] in scene.effects
+        resisted = RESISTED[0] in scene.effects
         if target == "torque" and scene.table(TorqueTarget).M3_tolerance is None and not resisted:
             raise BadInput(
                 "target torque needs a tolerance for the reed torque",
                 file=scene.origin,
                 key="targets.torque.M3_tolerance",
-                remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of M0.',
+                remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of its largest torque.',
             )
         for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
             if name not in VARIABLES:

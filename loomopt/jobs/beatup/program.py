@@ -13,10 +13,11 @@ from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, Torqu
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
-from loomopt.model.numbers import numbers, words
+from loomopt.model.numbers import curves, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
 from loomopt.model.program import Goal, Move, Numbers, Preference, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
+from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
 from loomopt.physics.tolerances import NO_MASS
 from loomopt.scenes.scene import Scene
@@ -63,13 +64,19 @@ MASKED = 1e-3
 """A reed torque that moves by less than this share of the resistance is scaled by the resistance."""
 
 
+def resisted(scene: Scene) -> Where:
+    """Return the pieces of the cycle in which the cloth resists; of a curve those where it is not 0 all over."""
+    curve = next((found for (name, _), found in curves(scene).items() if name == RESISTED[0]), None)
+    return RESISTED if curve is None else (RESISTED[0], curve.acting)
+
+
 def model(scene: Scene, known: Numbers, design: Numbers | None = None, changes: bool = False) -> JobModel:
     """Return the mechanism with the effects the scene calls for, as its states need it. Raises BadInput.
 
     known: the scene's numbers; design: what is not today's; changes: whether the change from today is read.
     """
     changing = tuple(VARIABLES) if changes else ()
-    found = beatup.model(scene.active, words(scene), frozenset(known), RESISTED, changing)
+    found = beatup.model(scene.active, words(scene), frozenset(known), resisted(scene), changing)
     if not found.states:
         return found
     try:
@@ -166,7 +173,7 @@ class BeatupTask(Task):
         if self.fallen or self.target not in ("retrofit", "torque"):
             return []
         tolerance = self.scene.table(TorqueTarget).M3_tolerance if self.target == "torque" else 0.0
-        tolerance = 0.01 * self.scene.operation["M0"] if tolerance is None else tolerance
+        tolerance = 0.01 * self.resistance if tolerance is None else tolerance
         sides = [(0, 0.0)] if tolerance == 0.0 else [(-1, -tolerance), (1, tolerance)]
         return [self.row_limit("M3_fdc", sign, "M3_fdc", value, self.torque) for sign, value in sides]
 
@@ -238,6 +245,9 @@ class BeatupTask(Task):
     @lazy
     def resistance(self) -> float:
         """The cloth's, N·m."""
+        curve = next((found for (name, _), found in curves(self.scene).items() if name == RESISTED[0]), None)
+        if curve is not None:
+            return curve.largest
         return self.known.get("M0", 0.0) if RESISTED[0] in self.scene.effects else 0.0
 
     @lazy

@@ -37,7 +37,9 @@ class Mechanism(Table):
 class TorqueTarget(TargetTable):
     """Values of the target torque."""
 
-    M3_tolerance: Torque | None = Field(None, description="largest |M3| at front dead centre; 1 % of M0 without it")
+    M3_tolerance: Torque | None = Field(
+        None, description="largest |M3| at front dead centre; 1 % of the cloth's largest torque, M0, without it"
+    )
 
 
 class RetrofitTarget(TargetTable):

@@ -127,12 +127,13 @@ class BeatupViews(JobViews):
         return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: a reed that twists away while it beats up."""
+        """Return what there is to remark upon: curves, a reed that twists away while it beats up."""
+        found = super().remarks(scene, design)
         if not any(isinstance(effect, State) for effect in scene.active):
-            return ()
+            return found
         from loomopt.picture.panels import twisted
 
-        return twisted(scene, registry.of(scene).sampler(scene, design))
+        return (*found, *twisted(scene, registry.of(scene).sampler(scene, design)))
 
     def words(self) -> "Mapping[str, Curve]":
         """Return what the curves are called."""

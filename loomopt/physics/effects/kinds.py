@@ -135,6 +135,42 @@ class Effect:
         return (self.kind, self.instance) if self.instance else (self.name,)
 
 
+class LoadTable(NamedTuple):
+    """A curve of one's own that a load may be: the key of its table that names a CSV file over the crank angle.
+
+    column, kind: what of the file is the curve, and its kind of quantity; angle: what its angles count from, in words.
+    instead: keys of the effect's table that it stands for; needless: of what the effect needs, what it does without.
+    Its words (`own[key]` of the formulas) are the curve itself, a `PeriodicCubic`.
+    """
+
+    column: str
+    kind: str
+    angle: str
+    instead: tuple[str, ...]
+    needless: tuple[str, ...] = ()
+    key: str = "table"
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Columns of the file, with their kinds of quantity."""
+        return {"angle": "angle", self.column: self.kind}
+
+
+def needed(effect: "Effect", own: Table) -> tuple[str, ...]:
+    """Return the scene keys that an effect needs with the values of its table."""
+    table = effect.tabulated if isinstance(effect, Load) else None
+    given = table is not None and getattr(own, table.key) is not None
+    return tuple(key for key in effect.needs if not (given and table and key in table.needless))
+
+
+def required(effect: "Effect") -> tuple[str, ...]:
+    """Return the keys of an effect's table without which it is none, those that a curve may stand for included."""
+    table = effect.tabulated if isinstance(effect, Load) else None
+    for_curve = table.instead if table else ()
+    fields = effect.own.model_fields.items()
+    return tuple(key for key, info in fields if info.is_required() or (key in for_curve and info.default is None))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load(Effect, Generic[Pose]):
     """An algebraic effect: one term of the force the output needs, or of the crank torque inside the drive.
@@ -148,6 +184,7 @@ class Load(Effect, Generic[Pose]):
     moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
     told: switch → where that formula holds, in words for its equation; by its corners without them.
+    tabulated: the curve of one's own that it may be; None for none.
     """
 
     acts: Literal["output", "drive"]
@@ -159,6 +196,7 @@ class Load(Effect, Generic[Pose]):
     response: ResponseFormula[Pose] | None = None
     symbol: str = ""
     told: Mapping[float, str] = field(default_factory=dict)
+    tabulated: LoadTable | None = None
 
 
 class FlatNumber(NamedTuple):
@@ -359,6 +397,9 @@ class SteadyOscillator(Protocol):
 
     def steady(self, frequency: Number, /) -> tuple[Number, Number]:
         """Return A and B of its answer A cos Ωt + B sin Ωt to the force cos Ωt; frequency: Ω, rad/s."""
+
+    def steady_cubic(self, force: Sequence[Number], /) -> tuple[Number, Number, Number, Number]:
+        """Return the powers of the cubic in time that answers a force that is one; force: its powers, N or N·m."""
 
     def repeated(self, position: Number, rate: Number, /) -> tuple[Number, Number]:
         """Return z and z˙ just after a kick of both, once a turn for ever."""

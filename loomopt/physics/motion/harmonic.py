@@ -62,6 +62,15 @@ class Oscillator:
         size = stiff * stiff + drag * drag
         return stiff / size, drag / size
 
+    def steady_cubic(self, force: Sequence[Number]) -> tuple[Number, Number, Number, Number]:
+        """Return the powers of the cubic in time that answers f0 + f1 t + f2 t² + f3 t³, in rad or m."""
+        f0, f1, f2, f3 = force
+        J, c, k = self.of.inertia, self.of.damping, self.of.stiffness
+        p3 = f3 / k
+        p2 = (f2 - 3 * c * p3) / k
+        p1 = (f1 - 2 * c * p2 - 6 * J * p3) / k
+        return (f0 - c * p1 - 2 * J * p2) / k, p1, p2, p3
+
     def repeated(self, position: Number, rate: Number) -> Pair:
         """Return z and z˙ just after a kick that adds position and rate once a turn, those of all turns before kept."""
         of = self.of

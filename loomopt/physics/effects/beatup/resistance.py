@@ -1,16 +1,19 @@
-"""Beating-up resistance of the cloth: a half cosine around front dead centre.
+"""Beating-up resistance of the cloth: a half cosine around front dead centre, or a curve of one's own.
 
-Output term M_R = M0 cos(π(φ−β)/δ) for |φ−β| ≤ δ/2, else 0 [Yuan24, eq 3-4]; the corners move with the design.
+Output term M_R = M0 cos(π(φ−β)/δ) for |φ−β| ≤ δ/2, else 0 [Yuan24, eq 3-4]; or M_R(φ−β) through the samples of a
+table. The corners move with the design.
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from loomopt.base.quantities import PulseAngle
+from loomopt.maths.periodic_cubic import TURN, PeriodicCubic, interval_at
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Load, LoadTable
 from loomopt.physics.schema import Table, Values
 
 if TYPE_CHECKING:
@@ -20,23 +23,33 @@ if TYPE_CHECKING:
 class Own(Table):
     """Values of the cloth."""
 
-    pulse: PulseAngle = Field(description="crank angle δ through which the cloth resists, about front dead centre")
+    pulse: PulseAngle | None = Field(
+        None, description="crank angle δ through which the cloth resists, about front dead centre"
+    )
+    table: str | None = Field(
+        None, description="CSV file of M_R instead: angle [deg] from front dead centre, M [N*m], corner"
+    )
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
-    """Return where the pulse begins and ends, rad: β ∓ δ/2."""
+    """Return where the pulse begins and ends, rad: β ∓ δ/2; of a table where its intervals begin."""
+    if "table" in own:
+        return tuple(given["beta"] + maths.number(begin) for begin in own["table"].begins)
     return given["beta"] - own["pulse"] / 2, given["beta"] + own["pulse"] / 2
 
 
 def switch(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 inside the pulse and 0 outside; angle in rad, anywhere on the turn."""
+    """Return 1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
+    if len(corners) != 2:
+        return interval_at(angle, corners)
     begin, end = corners
-    turn = 6.283185307179586
-    return 1.0 if (angle - begin) % turn < end - begin else 0.0
+    return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return M_R, N·m."""
+    if "table" in own:
+        return own["table"].at(maths, pose.phi - given["beta"], switch)
     return switch * given["M0"] * maths.cos(maths.pi * (pose.phi - given["beta"]) / own["pulse"])
 
 
@@ -48,6 +61,8 @@ def response(
     A cos Ωt + B sin Ωt inside, and the free vibrations that begin at both corners, each with z = B and z˙ = −A Ω: there
     the answer to the cosine sets in, or falls away. The branch of t = (φ−β)/ω jumps where the other formula holds.
     """
+    if "table" in own:
+        return _tabulated(maths, oscillator, own["table"], pose.phi - given["beta"], pose.omega, switch)
     frequency, half = maths.pi * pose.omega / own["pulse"], own["pulse"] / (2 * pose.omega)
     along, across = (given["M0"] * share for share in oscillator.steady(frequency))
     angle, side = pose.phi - given["beta"], 2 * switch - 1
@@ -60,6 +75,38 @@ def response(
     position = switch * (along * cosine + across * sine) + first[0] + second[0]
     rate = switch * frequency * (across * cosine - along * sine) + first[1] + second[1]
     return position, rate
+
+
+def _tabulated(
+    maths: Maths, oscillator: "SteadyOscillator", curve: PeriodicCubic, angle: Number, omega: Number, interval: Number
+) -> tuple[Number, Number]:
+    """Return z, rad, and z˙ in answer to a curve: a cubic in each interval, and free vibrations from where each begins.
+
+    Where one interval becomes the next, what both cubics are apart by begins to ring. angle: φ−β, rad.
+    """
+    count = curve.samples
+    answers = [
+        oscillator.steady_cubic(tuple(maths.number(c) * omega**n for n, c in enumerate(cubic)))
+        for cubic in curve.cubics
+    ]
+    halves = [(middle - begin) for middle, begin in zip(curve.middles, curve.begins, strict=True)]
+    time = curve.from_middle(maths, angle, interval) / omega
+    position, rate = _cubic([maths.choose(interval, [answer[n] for answer in answers]) for n in range(4)], time)
+    for k in range(count):
+        before = _cubic(answers[k - 1], maths.number(halves[k - 1]) / omega)
+        after = _cubic(answers[k], -maths.number(halves[k]) / omega)
+        kick = oscillator.repeated(before[0] - after[0], before[1] - after[1])
+        since = [(middle - curve.begins[k]) % TURN for middle in curve.middles]
+        elapsed = maths.choose(interval, [maths.number(angle) for angle in since]) / omega + time
+        rung = oscillator.ringing(kick, elapsed)
+        position, rate = position + rung[0], rate + rung[1]
+    return position, rate
+
+
+def _cubic(powers: Sequence[Number], time: Number) -> tuple[Number, Number]:
+    """Return a cubic of time and its rate."""
+    p0, p1, p2, p3 = powers
+    return p0 + time * (p1 + time * (p2 + time * p3)), p1 + time * (2 * p2 + time * (3 * p3))
 
 
 EFFECT = Load(
@@ -75,5 +122,6 @@ EFFECT = Load(
     response=response,
     symbol="M_R",
     switch=switch,
+    tabulated=LoadTable("M", "torque", "counted from front dead centre", ("pulse",), ("operation.M0",)),
     examples=({"pulse": "29.8 deg"},),
 )

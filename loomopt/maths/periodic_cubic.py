@@ -1,0 +1,168 @@
+"""A periodic curve through samples of one turn: cubics between them, with one slope and curvature but at corners.
+
+Between two corners the curve is the C² cubic that has one formula over its first two intervals and over its last two
+(not-a-knot); between corners without a sample between them a straight line. Without corners it is the periodic C²
+cubic. Nothing is smoothed, and nothing holds it between its samples: it may overshoot them.
+"""
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from loomopt.maths.systems import Maths, Number, within_half_turn
+
+TURN = 2 * math.pi
+SAME = 1e-9
+"""rad; angles this close are one: 360 deg and 0."""
+WIDEST = math.pi / 2
+"""rad; a wider interval holds no sample that says what the curve does: it must be a line between corners."""
+FEWEST = 3
+"""Samples of a curve."""
+BESIDE = 8
+"""Samples on each side of one that is left out: what lies beyond moves the curve there by less than 3e-5 of its own."""
+
+
+@dataclass(frozen=True)
+class PeriodicCubic:
+    """Cubics c0 + c1 t + c2 t² + c3 t³, t counted from each interval's middle, rad.
+
+    begins: angles where intervals begin, rad, ascending within one turn; middles: theirs; cubics: c0 … c3 by interval;
+    corners: how many there are; spread: rms by which samples, left out one at a time, lie off the curve of the others.
+    """
+
+    begins: tuple[float, ...]
+    middles: tuple[float, ...]
+    cubics: tuple[tuple[float, float, float, float], ...]
+    corners: int
+    spread: float
+
+    @property
+    def samples(self) -> int:
+        """How many samples it goes through."""
+        return len(self.begins)
+
+    @property
+    def largest(self) -> float:
+        """The largest |value| among its samples."""
+        return max(abs(self._value(k, self.begins[k])) for k in range(self.samples))
+
+    @property
+    def acting(self) -> tuple[float, ...]:
+        """The intervals in which it is not 0 all over."""
+        return tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
+
+    def _value(self, k: int, angle: float) -> float:
+        t, (c0, c1, c2, c3) = angle - self.middles[k], self.cubics[k]
+        return c0 + t * (c1 + t * (c2 + t * c3))
+
+    def at(self, maths: Maths, angle: Number, interval: Number) -> Number:
+        """Return the value at an angle, rad, on any turn; interval: 0.0, 1.0 …, data of a node, never of the design."""
+        t = self.from_middle(maths, angle, interval)
+        columns = ([maths.number(value) for value in column] for column in zip(*self.cubics, strict=True))
+        c0, c1, c2, c3 = (maths.choose(interval, column) for column in columns)
+        return c0 + t * (c1 + t * (c2 + t * c3))
+
+    def from_middle(self, maths: Maths, angle: Number, interval: Number) -> Number:
+        """Return how far an angle on any turn lies behind its interval's middle, rad."""
+        return within_half_turn(maths, angle - maths.choose(interval, [maths.number(value) for value in self.middles]))
+
+
+def interval_at(angle: float, begins: Sequence[float]) -> float:
+    """Return the interval that an angle lies in on any turn, rad; begins: where intervals begin, in order."""
+    return float(sum((angle - begins[0]) % TURN >= begin - begins[0] for begin in begins) - 1)
+
+
+@functools.lru_cache(maxsize=16)
+def through(angles: tuple[float, ...], values: tuple[float, ...], marked: tuple[bool, ...]) -> PeriodicCubic:
+    """Return the curve through samples, in any order; angles: rad, of one turn; marked: whether each is a corner.
+
+    A last sample one turn after the first is the same one. Raises ValueError, with what is wrong, in words.
+    """
+    rows = sorted(zip(angles, values, marked, strict=True))
+    if len(rows) > 2 and rows[-1][0] - rows[0][0] > TURN - SAME:
+        if rows[-1][1] != rows[0][1]:
+            raise ValueError("the last row is the first one turn later, with another value")
+        rows = [(rows[0][0], rows[0][1], rows[0][2] or rows[-1][2]), *rows[1:-1]]
+    if len(rows) < FEWEST:
+        raise ValueError("it has too few angles")
+    corners = [k for k, row in enumerate(rows) if row[2]]
+    _refuse_gaps(rows)
+    turned = [*rows, *((angle + TURN, value, mark) for angle, value, mark in rows)]
+    if not corners:
+        return _made(rows, _cubics([*rows, turned[len(rows)]], closed=True), 0, _spread(rows, closed=True))
+    first = corners[0]
+    ends = [*corners, first + len(rows)]
+    cubics: list[tuple[float, ...]] = []
+    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+        cubics += _cubics(turned[begin : end + 1])
+    # The intervals are counted from the first sample on again.
+    cubics = cubics[-first:] + cubics[:-first] if first else cubics
+    arcs = [turned[begin : end + 1] for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+    squares = [square for arc in arcs for square in _left_out(arc, range(1, len(arc) - 1))]
+    return _made(rows, cubics, len(corners), _rms(squares))
+
+
+_Row = tuple[float, float, bool]
+"""Angle, rad; value; whether it is a corner."""
+
+
+def _refuse_gaps(rows: Sequence[_Row]) -> None:
+    """Raise ValueError for a wide interval without samples that is no line between corners."""
+    for row, after in zip(rows, [*rows[1:], (rows[0][0] + TURN, *rows[0][1:])], strict=True):
+        if after[0] - row[0] > WIDEST and not (row[2] and after[2]):
+            begin, end = math.degrees(row[0]), math.degrees(after[0])
+            raise ValueError(
+                f"nothing says what the curve does between {begin:.6g} and {end:.6g} deg: mark both as corners for a "
+                "straight line between them, or give samples there"
+            )
+
+
+def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[tuple[float, ...]]:
+    """Return c0 … c3 between samples, about each interval's middle; closed: the last is the first one turn later."""
+    from scipy.interpolate import CubicSpline
+
+    angles, values = [row[0] for row in rows], [row[1] for row in rows]
+    if not any(values):
+        return [(0.0, 0.0, 0.0, 0.0)] * (len(rows) - 1)
+    if len(rows) == 2:
+        slope = (values[1] - values[0]) / (angles[1] - angles[0])
+        return [((values[0] + values[1]) / 2, slope, 0.0, 0.0)]
+    found = CubicSpline(angles, values, bc_type="periodic" if closed else "not-a-knot")
+    shifted = []
+    for width, powers in zip((b - a for a, b in zip(angles, angles[1:], strict=False)), found.c.T, strict=True):
+        a3, a2, a1, a0 = map(float, powers)
+        h = width / 2
+        shifted.append((a0 + h * (a1 + h * (a2 + h * a3)), a1 + h * (2 * a2 + 3 * h * a3), a2 + 3 * h * a3, a3))
+    return shifted
+
+
+def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
+    """Return the squares of how far samples lie off the curve through those beside them."""
+    from scipy.interpolate import CubicSpline
+
+    squares = []
+    for k in places:
+        near = [row for j, row in enumerate(rows[: k + BESIDE + 1]) if j >= k - BESIDE and j != k]
+        curve = CubicSpline([row[0] for row in near], [row[1] for row in near])
+        squares.append(float(curve(rows[k][0]) - rows[k][1]) ** 2)
+    return squares
+
+
+def _spread(rows: Sequence[_Row], closed: bool) -> float:
+    """Return the rms of `_left_out` of all samples of a closed curve."""
+    before = [(angle - TURN, value, mark) for angle, value, mark in rows[-BESIDE:]]
+    after = [(angle + TURN, value, mark) for angle, value, mark in rows[:BESIDE]]
+    whole = [*before, *rows, *after]
+    return _rms(_left_out(whole, range(len(before), len(before) + len(rows))))
+
+
+def _rms(squares: Sequence[float]) -> float:
+    return math.sqrt(math.fsum(squares) / len(squares)) if squares else 0.0
+
+
+def _made(rows: Sequence[_Row], cubics: Sequence[tuple[float, ...]], corners: int, spread: float) -> PeriodicCubic:
+    begins = tuple(row[0] for row in rows)
+    middles = tuple((a + b) / 2 for a, b in zip(begins, (*begins[1:], begins[0] + TURN), strict=True))
+    four = tuple((cubic[0], cubic[1], cubic[2], cubic[3]) for cubic in cubics)
+    return PeriodicCubic(begins, middles, four, corners, spread)
