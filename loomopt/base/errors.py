@@ -131,7 +131,8 @@ def missing(model: type[BaseModel], origin: str, table: str, name: str, needed: 
 def invalid(error: ValidationError, model: type[BaseModel], origin: str, table: str) -> BadInput:
     """Return the error for the first thing pydantic found wrong with a table."""
     first = error.errors(include_url=False)[0]
-    names = [str(name) for name in first["loc"]]
+    # Places in a list count from 1, as a caller's keys do.
+    names = [str(name + 1 if isinstance(name, int) else name) for name in first["loc"]]
     if first["type"] == "missing" and len(names) == 1:
         return missing(model, origin, table, names[0])
     key, value = ".".join((table, *names)), first["input"]

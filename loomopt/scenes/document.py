@@ -87,13 +87,18 @@ def copied(table: Mapping[Any, Any], origin: str, path: tuple[str, ...] = ()) ->
 
 
 def _copied_value(value: object) -> object:
-    return list(value) if isinstance(value, list) else value
+    if not isinstance(value, list):
+        return value
+    return [dict(each) if isinstance(each, Mapping) else each for each in value]
 
 
 def looked_up(document: Mapping[str, Any], parts: Sequence[str]) -> object:
     """Return the raw value of a path of names; None where there is none."""
     value: object = document
     for part in parts:
+        if isinstance(value, list):
+            value = value[int(part) - 1] if _is_place(part, value) else None
+            continue
         if not isinstance(value, Mapping) or part not in value:
             return None
         value = value[part]
@@ -111,10 +116,30 @@ def replaced(document: Mapping[str, Any], parts: Sequence[str], value: object, o
     first, *rest = parts
     if rest:
         inner = document.get(first, {})
+        if isinstance(inner, list):
+            return {**document, first: _replaced_in(inner, rest, value, origin, key)}
         if not isinstance(inner, Mapping):
             raise refusal(f"{first} is a value, not a table", origin, key, inner, remedy=f"Set {first} itself")
         value = replaced(inner, rest, value, origin, key)
     return {**document, first: value}
+
+
+def _is_place(part: str, values: Sequence[object]) -> bool:
+    """Say whether a name is the place of a value of a list, counted from 1."""
+    return part.isascii() and part.isdigit() and 1 <= int(part[:9]) <= len(values)
+
+
+def _replaced_in(values: list[Any], parts: Sequence[str], value: object, origin: str, key: str) -> list[Any]:
+    """Return a list of tables in which one path has another value; its first part counts from 1."""
+    if not _is_place(parts[0], values):
+        problem = f"the list has no place {shown(parts[0])}"
+        raise refusal(problem, origin, key, allowed=f"1 to {len(values)}", remedy="Count from 1")
+    place = int(parts[0]) - 1
+    if parts[1:]:
+        if not isinstance(values[place], Mapping):
+            raise refusal("it is a value, not a table", origin, key, values[place], remedy="Set it itself")
+        value = replaced(values[place], parts[1:], value, origin, key)
+    return [*values[:place], value, *values[place + 1 :]]
 
 
 def removed(document: Mapping[str, Any], parts: Sequence[str]) -> dict[str, Any]:

@@ -35,6 +35,12 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
         for key, found in _fields(model):
             yield f"{table}.{key}", found
             labels.setdefault(key, found)
+        for key, value in scene.tables[table]:
+            if isinstance(value, tuple) and value and isinstance(value[0], Table):
+                for place, each in enumerate(value, 1):
+                    for own, found in _fields(type(each)):
+                        if getattr(each, own) is not None:
+                            yield f"{table}.{key}.{place}.{own}", found
     for effect in scene.active:
         for key, found in _fields(effect.own):
             yield ".".join(("effects", *effect.path, key)), found

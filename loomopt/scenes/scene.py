@@ -260,8 +260,8 @@ class Scene(Shown):
 
         content = {
             "job": self.job,
-            "operation": given(self.tables["operation"]),
-            "mechanism": given(self.tables["mechanism"]),
+            "operation": self.tables["operation"].model_dump(exclude_none=True),
+            "mechanism": self.tables["mechanism"].model_dump(exclude_none=True),
             "effects": {name: own.model_dump() for name, own in self.effects.items()},
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},

@@ -13,6 +13,7 @@ from loomopt.model.curves import split
 from loomopt.model.numbers import told
 from loomopt.physics.cycle import Floats
 from loomopt.physics.effects.kinds import label, owned
+from loomopt.physics.schema import Table
 from loomopt.picture.job_views import Marks, Span
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
@@ -74,7 +75,11 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
     """Yield the dotted key of each number, word and list, what a designer calls it, and its SI value."""
     for table in ("operation", "mechanism"):
         for name, value in given(scene.tables[table]).items():
-            yield f"{table}.{name}", name, value
+            if isinstance(value, tuple) and value and isinstance(value[0], Table):
+                for k, each in enumerate(value, 1):
+                    yield from ((f"{table}.{name}.{k}.{key}", key, one) for key, one in given(each).items())
+            else:
+                yield f"{table}.{name}", name, value
     for effect in scene.active:
         for key, value in scene.effects[effect.name].model_dump().items():
             if isinstance(value, int | float | str):

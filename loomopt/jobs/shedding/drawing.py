@@ -221,9 +221,7 @@ class CamDrawing:
     @property
     def segments(self) -> dict[str, tuple[float, float]]:
         """Cam angles, rad, between which each segment lasts."""
-        values = self.sampler.given.values
-        far, turn, near = (float(values[f"begin.{name}"]) for name in ("far", "return", "near"))
-        return {"rise": (0, far), "far dwell": (far, turn), "return": (turn, near), "near dwell": (near, 2 * math.pi)}
+        return frame(self.sampler.model).spans(self.sampler.given.values)
 
     def spring(self, top: Point = ORIGIN, h: float = 1.0) -> ReturnSpring:
         """Return the return spring with the heald frame's upper position at a point; h: text height, m."""
@@ -312,8 +310,8 @@ class Picture:
 
 def picture(found: CamDrawing, least: float) -> Picture:
     """Return the arm in both dwells and at the cam angle of least cam force, rad."""
-    begin, end = found.segments[FAR]
-    return Picture(found, {NEAR: 0.0, FAR: (begin + end) / 2, LEAST: least})
+    near, far = frame(found.sampler.model).ends(found.sampler.given.values)
+    return Picture(found, {NEAR: near, FAR: far, LEAST: least})
 
 
 def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:

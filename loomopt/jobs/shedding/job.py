@@ -30,9 +30,11 @@ from loomopt.jobs.shedding.scene import (
     SCHEMA,
     SEGMENTS,
     VARIABLES,
+    HealdFrame,
     LawTarget,
     check_known,
     check_law,
+    check_motion,
     dwelt,
     unfollowed,
 )
@@ -40,6 +42,7 @@ from loomopt.maths import systems
 from loomopt.maths.systems import Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import Formula, JobModel
+from loomopt.model.numbers import curves
 from loomopt.model.program import Numbers, Program, Variable
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics import balance
@@ -75,17 +78,22 @@ class Shedding(Job):
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput when the cam does not close, its law is none, or the follower cannot work."""
-        total = math.fsum(scene.mechanism[name] for name in SEGMENTS)
-        for name in ("rise", "return"):
+        check_motion(scene)
+        several = scene.table(HealdFrame).segments
+        angles = [each.angle for each in several] if several else [scene.mechanism[name] for name in SEGMENTS]
+        total = math.fsum(angles)
+        for name in () if several else ("rise", "return"):
             if not scene.mechanism[name] >= NARROWEST:
                 least = f"{scene.show(NARROWEST, 'angle')} and more"
                 raise _refused(scene, f"mechanism.{name}", f"the {name} takes no cam angle", least)
         if abs(total - 2 * math.pi) > SAME_TURN:
-            given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in SEGMENTS)
-            problem, keys = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}", ", ".join(SEGMENTS)
+            names = [f"segments.{k + 1}.angle" for k in range(len(several))] if several else SEGMENTS
+            given = " + ".join(str(scene.given(f"mechanism.{name}")) for name in names)
+            keys = "segments" if several else ", ".join(SEGMENTS)
+            problem = f"the cam's segments add to {scene.show(total, 'angle', 9)}: {given}"
             turn = f"{scene.show(2 * math.pi, 'angle', 9)} together"
             raise _refused(scene, f"mechanism.{keys}", problem, turn, "Correct one of them.")
-        if not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
+        if not several and not any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds):
             dwells = zip(DWELLS, dwelt(scene.mechanism), strict=True)
             check_known(scene, {(SEGMENT, float(segment)) for segment, on in dwells if on}, "dwells")
         check_law(scene)
@@ -101,6 +109,9 @@ class Shedding(Job):
     def demand(self, scene: Scene, target: str) -> None:
         """Raise BadInput where a target speaks of what the scene does not have, or today's frame cannot be followed."""
         base.demand(scene, target)
+        if target == "law" and scene.table(HealdFrame).segments:
+            problem, remedy = "target law chooses one law for rise and return", "Choose another target"
+            raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
         if target == "speed":
             demand_moving(scene, "choose another target")
         own = scene.table(LawTarget)
@@ -207,6 +218,9 @@ class Shedding(Job):
         known, law, model = scene.mechanism, scene.table(LawTarget), self.model(scene)
         free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
         alike = known["rise"] == known["return"] and not free and not law.symmetric
+        # A curve over the cam angle is no force that position and motion tell.
+        if curves(scene) or scene.table(HealdFrame).segments:
+            return None
         if not alike or set(scene.limits) - {LIMIT} or model.known_in or model.demands:
             return None
         frame, start = (

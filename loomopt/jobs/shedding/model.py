@@ -6,11 +6,13 @@ must never fall below N_min; cam torque = N X'. Cam angle θ from the beginning 
 
 import functools
 import math
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from loomopt.base.records import lazy
+from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Maths, Number
 from loomopt.maths.turning_points import followed
 from loomopt.model import drive
@@ -171,6 +173,16 @@ class CamFrame:
         """The half open shed, where it is one of the law's own breaks."""
         return frozenset((HALF_OPEN,) if self.law.symmetric and Fraction(1, 2) in self.law.breaks else ())
 
+    def spans(self, values: Values) -> dict[str, tuple[float, float]]:
+        """Return the cam angles, rad, between which each segment that is there lasts, by name; values: floats."""
+        ends = (0.0, *(float(values[f"begin.{name}"]) for name in ("far", "return", "near")), 2 * math.pi)
+        names = ("rise", "far dwell", "return", "near dwell")
+        return {name: (ends[k], ends[k + 1]) for k, name in enumerate(names) if ends[k + 1] > ends[k]}
+
+    def ends(self, values: Values) -> tuple[float, float]:
+        """Return a cam angle, rad, with the frame at its lowest X, and one at its highest; values: floats."""
+        return 0.0, float(values["begin.far"] + values["begin.return"]) / 2
+
     def linkage(self, maths: Maths, values: Values) -> None:
         """Return nothing: poses read the numbers."""
 
@@ -225,6 +237,188 @@ class CamFrame:
         return {"begin.rise": 0, **{name: given.values[name] for name in names}}
 
 
+MOVES = {RISE: "rise", FAR_DWELL: "dwell", RETURN: "return"}
+"""What kinds of segments are called."""
+
+
+class Segment(NamedTuple):
+    """A segment of a motion in several: its cam law, None in a dwell, and whether X grows."""
+
+    law: CamLaw | None
+    rises: bool = False
+
+    @property
+    def kind(self) -> int:
+        """The one of the four segments whose formulas are its own."""
+        return FAR_DWELL if self.law is None else RISE if self.rises else RETURN
+
+
+def height(k: int) -> str:
+    """Return the name of X, m, at the end of segment k; that of the last stands at the beginning too."""
+    return f"segments.{k + 1}.to"
+
+
+def width(k: int) -> str:
+    """Return the name of the cam angle, rad, that segment k takes."""
+    return f"segments.{k + 1}.angle"
+
+
+@dataclass(frozen=True)
+class ProgramMotion(FrameMotion):
+    """The frame in a motion of several segments: X = low + span s(u), whose span is 0 in a dwell."""
+
+    low: Number = None
+    span: Number = None
+
+    @lazy
+    def q(self) -> Number:
+        """X, m."""
+        return self.low + self.span * self.law.s
+
+    @lazy
+    def lowered(self) -> Number:
+        """X/h."""
+        return self.q / self.travel
+
+    @lazy
+    def q1(self) -> Number:
+        """X', m/rad."""
+        return self.span * self.law.s1 * self.rate
+
+    @lazy
+    def q2(self) -> Number:
+        """X'', m/rad²."""
+        return self.span * self.law.s2 * self.rate**2
+
+    @lazy
+    def q3(self) -> Number:
+        """Third derivative of X, m/rad³."""
+        return self.span * self.law.s3 * self.rate**3
+
+    def contact(self, follower: Follower) -> Contact:
+        """Return roller and cam at this position."""
+        swing = follower.arm_swing / self.travel
+        return Contact(self.maths, follower, swing * self.q, swing * self.q1, swing * self.q2)
+
+
+@dataclass(frozen=True)
+class CamProgram(CamFrame):
+    """The frame's motion in several segments, in order from cam angle 0; their angles and heights are given numbers."""
+
+    moves: tuple[Segment, ...] = ()
+
+    @property
+    def structure(self) -> Hashable:
+        """Each segment's law and direction."""
+        return "shedding", tuple((move.law.key if move.law else None, move.rises) for move in self.moves)
+
+    @lazy
+    def segments(self) -> tuple[int, ...]:
+        """The kinds of segments that are there."""
+        return tuple(sorted({move.kind for move in self.moves}))
+
+    def spans(self, values: Values) -> dict[str, tuple[float, float]]:
+        """Return the cam angles, rad, between which each segment lasts, by place and kind; values: floats."""
+        begins = [float(values[f"begin.{k + 1}"]) for k in range(len(self.moves))]
+        names = [f"{k} {MOVES[move.kind]}" for k, move in enumerate(self.moves, 1)]
+        return dict(zip(names, zip(begins, [*begins[1:], 2 * math.pi], strict=True), strict=True))
+
+    def ends(self, values: Values) -> tuple[float, float]:
+        """Return the cam angles, rad, where X is first at its lowest and at its highest; values: floats."""
+        tops = [float(values[height(k)]) for k in range(len(self.moves))]
+        begins = [begin for begin, _ in self.spans(values).values()]
+        at = dict(zip([*tops[-1:], *tops[:-1]][::-1], begins[::-1], strict=True))
+        return at[min(tops)], at[max(tops)]
+
+    @lazy
+    def stretches(self) -> tuple[tuple[int, int], ...]:
+        """The segment, and the piece of its law, of each stretch between corners in order."""
+        found = []
+        for k, move in enumerate(self.moves):
+            count = len(move.law.breaks) + 1 if move.law else 1
+            pieces = range(count) if move.rises else reversed(range(count))
+            found += [(k, piece) for piece in pieces]
+        return tuple(found)
+
+    @lazy
+    def arcs(self) -> tuple[Arcs, ...]:
+        """The segments with the pieces of their laws."""
+        return (Arcs(SEGMENT, self._begins, interval_at),)
+
+    def _begins(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        values, found = given.values, []
+        for k, move in enumerate(self.moves):
+            begin, whole = values[f"begin.{k + 1}"], values[width(k)]
+            found.append(begin)
+            shares = move.law.breaks if move.law else ()
+            turned = shares if move.rises else tuple(1 - share for share in reversed(shares))
+            found += [begin + whole * share.numerator / share.denominator for share in turned]
+        return tuple(found)
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
+        """Return the angles where segments begin, rad, and what their laws are made of."""
+        values, angle, found = given.values, 0, {}
+        for k, move in enumerate(self.moves):
+            found[f"begin.{k + 1}"] = angle
+            angle = angle + values[width(k)]
+            found |= move.law.prepared(maths, values) if move.law else {}
+        return found
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        """Return nothing: every event has a formula."""
+        return {}
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> FrameMotion:
+        """Return the pose at cam angles θ, rad; switches: the stretch, by `stretches`; worst."""
+        values, theta = given.values, node.phi
+        place = node.switch[SEGMENT]
+        segments = [k for k, _ in self.stretches]
+
+        def chosen(numbers: Sequence[Number]) -> Number:
+            """Return a number of the segment."""
+            return maths.choose(place, [numbers[k] for k in segments])
+
+        piece = maths.choose(place, [piece for _, piece in self.stretches])
+        count = len(self.moves)
+        tops = [values[height(k)] for k in range(count)]
+        lows = [tops[k - 1] if move.rises or not move.law else tops[k] for k, move in enumerate(self.moves)]
+        spans = [
+            0 * tops[k] if not move.law else tops[k] - tops[k - 1] if move.rises else tops[k - 1] - tops[k]
+            for k, move in enumerate(self.moves)
+        ]
+        begins, whole = [values[f"begin.{k + 1}"] for k in range(count)], [values[width(k)] for k in range(count)]
+        sign = chosen([1 if move.rises else -1 for move in self.moves])
+        # From the beginning of a segment in which X grows, back from the end of one in which it falls.
+        since = [begin if move.rises else begin + w for move, begin, w in zip(self.moves, begins, whole, strict=True)]
+        still = chosen([0 if move.law else 1 for move in self.moves])
+        rate = sign * (1 - still) / chosen(whole)
+        u = (theta - chosen(since)) * rate
+        speeds = values.get("speed"), values.get("omega_dot")
+        kind, worst = chosen([move.kind for move in self.moves]), node.switch.get("worst", LEAST)
+        law = self._law(maths, given, place, u, piece)
+        found = (maths, theta, values["travel"], kind, u, rate, law, worst, *speeds)
+        return ProgramMotion(*found, low=chosen(lows), span=chosen(spans))
+
+    def _law(self, maths: Maths, given: Given, place: Number, u: Number, piece: Number) -> LawDerivatives:
+        """Return the law that holds, of all that there are."""
+        laws = list(dict.fromkeys(move.law for move in self.moves if move.law))
+        found = [law.at(maths, given.values, u, piece) for law in laws]
+        if len(found) == 1:
+            return found[0]
+        which = [laws.index(move.law) if move.law else 0 for move in self.moves]
+        return LawDerivatives(
+            *(maths.choose(place, [column[which[k]] for k, _ in self.stretches]) for column in zip(*found, strict=True))
+        )
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> FrameMotion:
+        """Return the pose at the beginning of the first segment."""
+        return self.pose(maths, given, Node(0, {**switch, SEGMENT: 0.0}))
+
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return where the segments begin, rad."""
+        return {f"begin.{k + 1}": given.values[f"begin.{k + 1}"] for k in range(len(self.moves))}
+
+
 def follower(values: Values) -> Follower:
     """Return the roller follower."""
     return Follower(**{name: values[name] for name in FOLLOWER})
@@ -267,7 +461,7 @@ ROWS: dict[str, DesignRow] = {
     "travel": DesignRow(lambda at: at.values["travel"]),
     "spring_stretch": DesignRow(lambda at: at.values["X0"] + at.values["travel"]),
     "spring_force_max": DesignRow(lambda at: at.values["K1"] * (at.values["X0"] + at.values["travel"])),
-    "near_dwell": DesignRow(lambda at: at.values["near_dwell"]),
+    "near_dwell": DesignRow(lambda at: at.values["near_dwell"], ("rise",)),
     "speed": DesignRow(lambda at: at.values["speed"], ("speed",)),
     "cam_period": DesignRow(lambda at: 1 / at.values["speed"], ("speed",)),
 }
@@ -307,14 +501,16 @@ def model(
     words: tuple[tuple[str, str, str], ...],
     known: frozenset[str],
     raced: tuple[str, ...] = (),
+    moves: tuple[Segment, ...] = (),
 ) -> JobModel:
-    """Return the frame with its return spring and effects; raced: what of RACED is limited."""
+    """Return the frame with its return spring and effects; raced: what of RACED is limited; moves: several segments."""
+    motion = CamProgram(law, moves=moves) if moves else CamFrame(law, dwells)
     followed = known.issuperset(FOLLOWER)
-    partly = JobModel(CamFrame(law, dwells), effects, words).known_in
+    partly = JobModel(motion, effects, words).known_in
     driven = {} if partly else drive.quantities((RETURN_SPRING, *effects), known)
     arm = {"the arm stays below 180 deg": ("arm_angle", math.pi)} if followed else {}
     return JobModel(
-        CamFrame(law, dwells),
+        motion,
         (RETURN_SPRING, *effects),
         words,
         QUANTITIES | {name: RACED[name] for name in raced} | (FOLLOWED if followed else {}) | driven,

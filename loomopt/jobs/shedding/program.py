@@ -13,7 +13,16 @@ from loomopt.base.records import Frozen, lazy
 from loomopt.jobs.base import Demanded, Ends, Task, bound_limits, ends, size_read
 from loomopt.jobs.shedding import model as shedding
 from loomopt.jobs.shedding.model import AT_REST, CYCLE, FASTEST, FOLLOWER, LIFT, RETURN_SPRING, law_rows
-from loomopt.jobs.shedding.scene import SEGMENTS, VARIABLES, HealdFrame, LawTarget, chosen, dwelt
+from loomopt.jobs.shedding.scene import (
+    SEGMENTS,
+    VARIABLES,
+    HealdFrame,
+    LawTarget,
+    chosen,
+    dwelt,
+    moves,
+    program_numbers,
+)
 from loomopt.maths import systems
 from loomopt.maths.systems import numpy
 from loomopt.model import drive
@@ -124,15 +133,20 @@ MEGA = 1e6
 
 def scene_numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by name, SI, the knots of a spline law included."""
-    return numbers(scene) | named_knots(map(float, scene.table(HealdFrame).law_coefficients or ()))
+    return (
+        numbers(scene)
+        | program_numbers(scene)
+        | named_knots(map(float, scene.table(HealdFrame).law_coefficients or ()))
+    )
 
 
 def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) -> JobModel:
     """Return the frame with the effects the scene calls for; law: another than the scene's; raced: of model.RACED."""
     free = any(scene.bounds[name].free for name in SEGMENTS if name in scene.bounds)
-    dwells = (True, True) if free else dwelt(scene.mechanism)
+    several = moves(scene)
+    dwells = (True, True) if free or several else dwelt(scene.mechanism)
     known = frozenset((*scene_numbers(scene), *((CONTACT_SPEED,) if FASTEST in raced else ())))
-    return shedding.model(law or chosen(scene), dwells, scene.active, words(scene), known, raced)
+    return shedding.model(law or chosen(scene), dwells, scene.active, words(scene), known, raced, several)
 
 
 def survived(sampler: Sampler, least: float) -> float:
@@ -256,7 +270,8 @@ class SheddingTask(Task):
     def kept(self) -> list[str]:
         """What the target keeps: the travel, and the speed where an effect needs it."""
         needed = {key for effect in self.scene.active for key in effect.needs}
-        return ["travel", *(["speed"] if SPEED in needed else [])]
+        travel = ["travel"] if "travel" in self.scene.mechanism else []
+        return [*travel, *(["speed"] if SPEED in needed else [])]
 
     @lazy
     def checks(self) -> list[Check[Any]]:

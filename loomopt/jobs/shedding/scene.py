@@ -6,12 +6,13 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from loomopt.base.errors import BadInput, refusal
+from loomopt.base.errors import BadInput, missing, refusal
 from loomopt.base.quantities import (
     NARROWEST,
     Angle,
     Force,
     Length,
+    MoveAngle,
     Numbers,
     PositiveLength,
     PositiveNumber,
@@ -20,9 +21,9 @@ from loomopt.base.quantities import (
     Stiffness,
 )
 from loomopt.base.units import ShowValue, usual
-from loomopt.jobs.shedding.model import FOLLOWER
+from loomopt.jobs.shedding.model import FOLLOWER, HALF_OPEN, Segment, height, width
 from loomopt.model import drive
-from loomopt.model.numbers import words
+from loomopt.model.numbers import curves, words
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects import kinds
 from loomopt.physics.effects.kinds import Load
@@ -37,7 +38,7 @@ from loomopt.scenes.tables import SceneSchema
 SEGMENTS = ("rise", "far_dwell", "return", "near_dwell")
 CYCLOID = 2 * math.pi
 """Peak s'' of the cycloidal law, which bounds a free law where the scene says nothing else."""
-LAW = Literal[
+NAMED_LAW = Literal[
     "cycloidal",
     "harmonic",
     "modified_sine",
@@ -47,9 +48,8 @@ LAW = Literal[
     "polynomial_56789",
     "gutman_13",
     "freudenstein_13",
-    "spline",
-    "table",
 ]
+LAW = NAMED_LAW | Literal["spline", "table"]
 
 
 class Operation(Table):
@@ -59,16 +59,27 @@ class Operation(Table):
     N_min: Force = Field(0.0, description="least cam force that counts as contact")
 
 
+class SegmentTable(Table):
+    """A segment of a motion in several: a dwell, or a move to a height."""
+
+    angle: MoveAngle = Field(description="cam angle that it takes")
+    to: Length | None = Field(None, description="X at its end; a dwell has none")
+    law: NAMED_LAW | None = Field(None, description="its cam law, that of the mechanism without one")
+
+
 class HealdFrame(Table):
     """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
-    travel: Length = Field(description="travel of the heald frame")
+    travel: Length | None = Field(None, description="travel of the heald frame; of segments the largest height")
     law: LAW = Field("cycloidal", description="cam law of the rise, and mirrored of the return")
     law_coefficients: Numbers | None = Field(None, description="s'' of a spline law at evenly spaced knots")
     law_table: str | None = Field(None, description="CSV file of a tabulated law")
-    rise: SegmentAngle = Field(description="cam angle of the rise")
-    far_dwell: SegmentAngle = Field(description="cam angle with the shed open downward")
-    near_dwell: SegmentAngle = Field(description="cam angle with the shed open upward")
+    rise: SegmentAngle | None = Field(None, description="cam angle of the rise")
+    far_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open downward")
+    near_dwell: SegmentAngle | None = Field(None, description="cam angle with the shed open upward")
+    segments: tuple[SegmentTable, ...] | None = Field(
+        None, description="the motion in several segments instead: dwells, and moves to a height, one turn together"
+    )
     base_radius: PositiveLength | None = Field(None, description="base circle of the roller's centre C, about A")
     arm: PositiveLength | None = Field(None, description="arm BC of the follower")
     centre_distance: PositiveLength | None = Field(None, description="from the cam shaft A to the arm's pivot B")
@@ -79,7 +90,7 @@ class HealdFrame(Table):
 
 
 # `return` is a word of the language: no field of a class can be written so.
-RETURNED = {"return": (SegmentAngle, Field(description="cam angle of the return"))}
+RETURNED = {"return": (SegmentAngle | None, Field(None, description="cam angle of the return"))}
 Mechanism: type[Table] = create_model("Mechanism", __base__=HealdFrame, **RETURNED)  # type: ignore[call-overload]
 
 
@@ -145,6 +156,78 @@ def dwelt(mechanism: Mapping[str, Any]) -> tuple[bool, bool]:
     """Say whether there is a far dwell, and a near one in what the others leave of the turn: rounding is none."""
     rise, far, turn, near = (float(mechanism[name]) for name in SEGMENTS)
     return far > SAME_ANGLE, min(near, 2 * math.pi - (rise + far + turn)) > SAME_ANGLE
+
+
+FORM = (*SEGMENTS, "travel")
+"""What a motion of rise, far dwell, return and near dwell gives."""
+
+
+def check_motion(scene: Scene) -> None:
+    """Raise BadInput where the motion is neither of four segments nor of several that close after one turn."""
+    own, segments = scene.tables["mechanism"], scene.table(HealdFrame).segments
+    given = [name for name in FORM if getattr(own, name) is not None]
+    if segments is None:
+        for name in FORM:
+            if name not in given:
+                raise missing(type(own), scene.origin, "mechanism", name)
+        return
+    if given:
+        problem = f"segments and {', '.join(given)} say the same twice"
+        remedy = f"Take segments out, or {', '.join(given)}"
+        raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
+    heights = [each.to for each in segments if each.to is not None]
+    if not heights or max(heights) == min(heights):
+        remedy = 'Write moves with the height at their end, such as { angle = "90 deg", to = "45 mm" }'
+        raise refusal("the segments move nothing", scene.origin, "mechanism.segments", remedy=remedy)
+    if min(heights) != 0.0:
+        problem = f"the lowest height is {scene.show(min(heights), 'length')}, and X counts from the lowest"
+        raise refusal(problem, scene.origin, "mechanism.segments", remedy='Let a move end at to = "0 mm"')
+    before = heights[-1]
+    for k, each in enumerate(segments, 1):
+        if each.law and (each.to is None or each.to == before):
+            problem = f"segment {k} is a dwell, which has no law"
+            raise refusal(problem, scene.origin, f"mechanism.segments.{k}.law", remedy="Take it out, or give a height")
+        before = before if each.to is None else each.to
+    known = curves(scene)
+    loads = [each.name for each in scene.active if HALF_OPEN in each.reads and (each.name, "table") not in known]
+    if loads:
+        problem = f"{loads[0]} is told for a motion of rise, far dwell, return and near dwell only"
+        remedy = f"Give effects.{loads[0]}.table, a curve over the cam angle"
+        raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
+
+
+def moves(scene: Scene) -> tuple[Segment, ...]:
+    """Return the segments of a motion in several; none of a motion in four. Raises BadInput."""
+    own = scene.table(HealdFrame)
+    if own.segments is None:
+        return ()
+    found, before = [], heights(scene)[-1]
+    for each, end in zip(own.segments, heights(scene), strict=True):
+        still = end == before
+        found.append(Segment(None) if still else Segment(Named(each.law) if each.law else chosen(scene), end > before))
+        before = end
+    return tuple(found)
+
+
+def heights(scene: Scene) -> list[float]:
+    """Return X, m, at the end of each segment of a motion in several."""
+    own = scene.table(HealdFrame).segments or ()
+    told = [each.to for each in own if each.to is not None]
+    before, found = told[-1], []
+    for each in own:
+        before = before if each.to is None else each.to
+        found.append(before)
+    return found
+
+
+def program_numbers(scene: Scene) -> dict[str, float]:
+    """Return angles, rad, and heights, m, of a motion in several segments by name, and its travel; {} of one in four."""
+    own = scene.table(HealdFrame).segments
+    if own is None:
+        return {}
+    ends = heights(scene)
+    found = {width(k): each.angle for k, each in enumerate(own)}
+    return found | {height(k): end for k, end in enumerate(ends)} | {"travel": max(ends)}
 
 
 def chosen(scene: Scene) -> CamLaw:
@@ -223,6 +306,8 @@ def fault(numbers: Mapping[str, Any], shown: ShowValue = usual) -> str:
     reason = cam_spline.fault(coefficients) if coefficients else ""
     if reason:
         return f"its law is none: {reason}"
+    if "rise" not in numbers:
+        return unfollowed(numbers, shown)
     dwell = 2 * math.pi - sum(numbers[name] for name in ("rise", "far_dwell", "return"))
     if dwell < -1e-9:
         return "rise, far dwell and return take more than a whole turn"

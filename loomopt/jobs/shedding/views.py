@@ -15,13 +15,17 @@ from loomopt.jobs.shedding.model import (
     LAW,
     LEAST,
     MOST,
+    MOVES,
     NEAR_DWELL,
     RETURN,
     RISE,
     SEGMENT,
     CamFrame,
+    CamProgram,
     FrameMotion,
     frame,
+    height,
+    width,
 )
 from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT, Maths, Number
@@ -29,7 +33,7 @@ from loomopt.model.curves import POWER
 from loomopt.model.model import JobModel
 from loomopt.model.sampling import Sampler, near_zero
 from loomopt.physics.balance import Acting, Given
-from loomopt.physics.cycle import Node
+from loomopt.physics.cycle import TURN, Node
 from loomopt.physics.effects.kinds import Load, Motion
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
@@ -181,7 +185,12 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     rise; omega: speed of the cam shaft; w: |d(x, y)/d theta|.
     """
     known, cam = _given(model), frame(model)
-    found = [*law(cam.law), *motion(cam, known), *_forces(model, known)]
+    if isinstance(cam, CamProgram):
+        laws = dict.fromkeys(move.law for move in cam.moves if move.law)
+        moved = [*(each for one in laws for each in law(one)), *program(cam, known)]
+    else:
+        moved = [*law(cam.law), *motion(cam, known)]
+    found = [*moved, *_forces(model, known)]
     if model.has_quantity("curvature"):
         found += follower()
     pose = _pose(model, cam.segments[0], LEAST)
@@ -193,6 +202,11 @@ def _given(model: JobModel) -> Given:
     knots = set(filter(of_knots, model.known))
     values = {name: symbol(name) for name in model.known - knots - set(model.labels)}
     values |= {"speed": symbol(SPEED)} if "speed" in values else {}
+    cam = frame(model)
+    if isinstance(cam, CamProgram):
+        named = {each: symbol(f"{letter}_{k + 1}") for k in range(len(cam.moves)) for letter, each in _letters(k)}
+        values |= named
+        return effect_equations.given(model, {**values, **cam.derived(systems.sympy(), Given(values, {}), ())})
     far = values["rise"]
     turning = far + values["far_dwell"]
     values |= {"begin.far": far, "begin.return": turning, "begin.near": turning + values["return"]}
@@ -261,6 +275,38 @@ def motion(cam: CamFrame, given: Given) -> list[Equation]:
         *(
             cases(kind, symbol(name), [(of(at), where) for where, at in poses.items()])
             for (kind, name), of in zip(named, read, strict=True)
+        ),
+    ]
+
+
+def _letters(k: int) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Return the letters of a segment's cam angle and of X at its end, with the names of their numbers."""
+    return ("a", width(k)), ("X", height(k))
+
+
+def program(cam: CamProgram, given: Given) -> list[Equation]:
+    """Return the segments of a motion in several, and u, X, X' and X'' in each; a_k: angle, X_k: X at its end."""
+    theta, values, pi = symbol("theta"), given.values, systems.sympy().pi
+    count = len(cam.moves)
+    ends = [*(sympy().sympify(values[f"begin.{k + 1}"]) for k in range(count)), 2 * pi]
+    unwritten = dataclasses.replace(
+        cam, moves=tuple(move._replace(law=Unwritten(move.law)) if move.law else move for move in cam.moves)
+    )
+    first = {k: place for place, (k, _) in reversed(list(enumerate(cam.stretches)))}
+    poses = [unwritten.pose(systems.sympy(), given, Node(theta, {SEGMENT: first[k]})) for k in range(count)]
+    names = [f"in segment {k + 1}, a {MOVES[move.kind]}" for k, move in enumerate(cam.moves)]
+    read: dict[str, Callable[[FrameMotion], Number]] = {
+        "u": lambda at: at.u,
+        "X": lambda at: at.q,
+        "X'": lambda at: at.q1,
+        "X''": lambda at: at.q2,
+    }
+    spans = [(name.removeprefix("in "), (ends[k], theta, ends[k + 1])) for k, name in enumerate(names)]
+    return [
+        cases("segments", symbol("segment"), spans),
+        *(
+            cases("travel", symbol(to), [(of(at), name) for at, name in zip(poses, names, strict=True)])
+            for to, of in read.items()
         ),
     ]
 
@@ -359,11 +405,9 @@ class SheddingViews(JobViews):
         """Return the dwells, cam angles in rad, and where the cam force is least if the frame stays on its cam."""
         job = registry.of(scene)
         values = job.sampler(scene, design).given.values
-        found: dict[str, float | Span] = {}
-        if float(values["far_dwell"]) > 0.0:
-            found["far dwell"] = Span(float(values["begin.far"]), float(values["begin.return"]))
-        if float(values["near_dwell"]) > 0.0:
-            found["near dwell"] = Span(float(values["begin.near"]), 0.0)
+        spans = frame(job.model(scene)).spans(values)
+        dwells = {name: Span(begin, end % TURN) for name, (begin, end) in spans.items() if "dwell" in name}
+        found: dict[str, float | Span] = {**dwells}
         parted = job.parted(scene, job.sampler(scene, design))
         if parted is None or not parted.course.parted:
             angle = job.figures(scene, design)["contact_angle"]
@@ -460,7 +504,7 @@ def _undercut(scene: Scene, design: Mapping[str, float]) -> Iterator[str]:
 
 def _partly(sampler: Sampler) -> Iterator[str]:
     """Say of loads that are known in the dwells only what acts where contact is then not judged."""
-    acting = " and ".join(_acting(sampler))
+    acting = " and ".join(_acting(sampler)) if sampler.model.known_in else ""
     for load in sampler.model.loads:
         words = sampler.model.words_of(load.name)
         if acting and isinstance(load, Load) and load.known_in(words):

@@ -13,6 +13,10 @@ class FramePose(Protocol):
     """
 
     @property
+    def phi(self) -> Number:
+        """Cam angle θ, rad."""
+
+    @property
     def segment(self) -> Number:
         """Segment of the cam."""
 

@@ -5,6 +5,9 @@ T is T1 with the shed open upward (X = 0) and −T2 with it open downward. Betwe
              X = h/2, the event half_open
     step     the cubic STEP of eq 8 over the rise and over the return
     levels   nothing is said: T is T1 and −T2 in the dwells, and contact is judged there only
+
+Or T(θ) is a curve of one's own, through the samples of a table over the cam angle: the pull of the warp as measured, or
+any load that the frame carries in step with its cam (negative where it presses the roller on the cam).
 """
 
 from collections.abc import Callable, Mapping
@@ -13,8 +16,9 @@ from typing import Literal
 from pydantic import Field
 
 from loomopt.base.quantities import Force
+from loomopt.maths.periodic_cubic import interval_at
 from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Place
+from loomopt.physics.effects.kinds import Load, LoadTable, Place
 from loomopt.physics.effects.shedding import FramePose
 from loomopt.physics.schema import Table, Values
 
@@ -24,24 +28,34 @@ TURN = 6.283185307179586
 class Own(Table):
     """Values of the warp."""
 
-    T1: Force = Field(description="pull of the warp with the shed open upward")
-    T2: Force = Field(description="pull of the warp with the shed open downward")
+    T1: Force | None = Field(None, description="pull of the warp with the shed open upward")
+    T2: Force | None = Field(None, description="pull of the warp with the shed open downward")
     shape: Literal["levels", "linear", "step"] = Field("linear", description="how the one pull becomes the other")
+    table: str | None = Field(
+        None, description="CSV file of T instead: angle [deg] of the cam, T [N] positive downward, corner"
+    )
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
-    """Return the cam angles where the shed is half open, rad, on the rise and on the return; none where none counts."""
+    """Return the cam angles where the shed is half open, rad, on the rise and on the return; none where none counts.
+
+    Of a table those where its intervals begin.
+    """
+    if "table" in own:
+        return tuple(map(maths.number, own["table"].begins))
     return tuple(given["half_open"]) if own["shape"] == "linear" else ()
 
 
 def past_middle(angle: float, corners: tuple[float, ...]) -> float:
-    """Return 1 between the angles where the shed is half open, 0 outside and without any."""
+    """Return 1 between the angles where the shed is half open, 0 outside and without any; of a table the interval."""
+    if len(corners) > 2:
+        return interval_at(angle, corners)
     return float(corners[0] <= angle % TURN < corners[1]) if corners else 0.0
 
 
 def known_in(words: Mapping[str, str]) -> tuple[Place, ...]:
     """Return the dwells where nothing is said of the moves."""
-    return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" else ()
+    return (("segment", 1.0), ("segment", 3.0)) if words["shape"] == "levels" and "table" not in words else ()
 
 
 def linear(maths: Maths, pose: FramePose, own: Values, switch: Number) -> Number:
@@ -67,7 +81,9 @@ SHAPES: dict[str, Callable[[Maths, FramePose, Values, Number], Number]] = {
 
 
 def force(maths: Maths, pose: FramePose, given: Values, own: Values, switch: Number) -> Number:
-    """Return −T, N, by the shape the scene names."""
+    """Return −T, N, by the shape the scene names, or by its table."""
+    if "table" in own:
+        return -own["table"].at(maths, pose.phi, switch)
     return SHAPES[own["shape"]](maths, pose, own, switch)
 
 
@@ -83,6 +99,7 @@ EFFECT = Load(
     told={0.0: "for 0 <= X <= travel/2", 1.0: "for travel/2 <= X <= travel"},
     switch=past_middle,
     known_in=known_in,
+    tabulated=LoadTable("T", "force", "of the cam, 0 where its motion begins", ("T1", "T2", "shape")),
     examples=(
         {"T1": "124.545 N", "T2": "83.03 N", "shape": "linear"},
         {"T1": "124.545 N", "T2": "83.03 N", "shape": "step"},
