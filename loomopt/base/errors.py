@@ -3,16 +3,27 @@
 Text from outside is shortened, and stripped of whatever a terminal would obey.
 """
 
+import contextlib
+import copy
 import difflib
-from collections.abc import Iterable, Sequence
+import itertools
+import re
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from types import TracebackType
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
 
 from loomopt.base.quantities import described, quantity_of
 from loomopt.base.units import QuantityError
 
 _LONGEST = {"file": 240, "key": 190, "problem": 480, "value": 120, "allowed": 480, "remedy": 240}
 """Characters of each part, so that a message is read."""
+WHOLE, MACHINE, GAP, NAME, VALUE = range(5)
+"""How bad a mistake is: it hides others, the machine cannot work, something is missing, a name or a value is none."""
+_MOST, _MOST_TOLD = 100, 20
+"""Mistakes after which nothing more is read; those that are told one by one."""
 
 
 def clean(text: str, longest: int = 1000) -> str:
@@ -27,7 +38,8 @@ def clean(text: str, longest: int = 1000) -> str:
 class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch it by this name)
     """Input that cannot be worked with, as one plain message.
 
-    file: where it stands; key: dotted path; value: as given; allowed: what may stand there; remedy: what to do.
+    file: where it stands; key: dotted path; value: as given; allowed: what may stand there; remedy: what to do;
+    grade: how bad it is, 0 the worst. Of several mistakes the message has a line each, and all else is of the first.
     """
 
     def __init__(
@@ -39,8 +51,9 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         value: str = "",
         allowed: str = "",
         remedy: str = "",
+        grade: int = VALUE,
     ) -> None:
-        self.problem, self.file, self.key = problem, file, key
+        self.problem, self.file, self.key, self.grade = problem, file, key, grade
         self.value, self.allowed, self.remedy = value, allowed, remedy
         parts = {"file": file, "key": key, "problem": problem, "value": value, "allowed": allowed, "remedy": remedy}
         file, key, problem, value, allowed, remedy = (clean(text, _LONGEST[name]) for name, text in parts.items())
@@ -48,10 +61,69 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         shown = f" (given: {value})" if value else ""
         sentences = [f"{problem}{shown}", f"Allowed: {allowed}" if allowed else "", remedy]
         text = " ".join(sentence.rstrip(".") + "." for sentence in sentences if sentence)
-        super().__init__(f"{place}: {text}" if place else text)
+        self.text = f"{place}: {text}" if place else text
+        self.others: tuple[BadInput, ...] = ()
+        super().__init__(self.text)
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def faults(self) -> "tuple[BadInput, ...]":
+        """Each mistake as an error of its own, the worst first."""
+        return (self, *self.others)
+
+    def together(self, others: "Sequence[BadInput]") -> "BadInput":
+        """Return one error of this mistake and of others, a line each."""
+        found = copy.copy(self)
+        found.others = tuple(others)
+        told, more = others[: _MOST_TOLD - 1], len(others) - _MOST_TOLD + 1
+        rest = [f"and {more} more: correct these first"] if more > 0 else []
+        found.text = "\n".join([*(each.text for each in (self, *told)), *rest])
+        return found
+
+
+class Faults:
+    """All that is wrong with what somebody gave: `with faults:` keeps a mistake and goes on, `tell` raises them."""
+
+    def __init__(self) -> None:
+        self.found: list[BadInput] = []
+
+    def __enter__(self) -> "Faults":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> bool:
+        if not isinstance(error, BadInput):
+            return False
+        self.add(error)
+        return True
+
+    def add(self, error: BadInput) -> None:
+        """Keep a mistake. Raises BadInput where there are too many to go on."""
+        self.found += error.faults
+        if len(self.found) >= _MOST:
+            self.tell()
+
+    def within(self, *tables: str) -> bool:
+        """Say whether a mistake stands in one of these tables."""
+        return any(each.key.split(".")[0] in tables for each in self.found)
+
+    def told(self) -> BadInput:
+        """Return the error of all mistakes, the worst first; there must be one."""
+        first, *others = sorted(self.found, key=lambda each: each.grade)
+        return first.together(others) if others else first
+
+    def tell(self) -> None:
+        """Raise BadInput where there is any mistake."""
+        if self.found:
+            raise self.told()
 
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450
+_MOST_FILES = 1000
+"""Files of a folder that are looked through for one of a near name."""
+NEAR, SAME = 0.5, 0.75
+"""Share of letters that two names have in common: of which one may be meant, and of which one surely is."""
 _NOTHING = object()
 _PROBLEMS = {
     "dict_type": "it is not a table",
@@ -84,9 +156,15 @@ def shown(value: object) -> str:
 
 
 def refusal(
-    problem: str, origin: str, key: str = "", value: object = _NOTHING, allowed: str = "", remedy: str = ""
+    problem: str,
+    origin: str,
+    key: str = "",
+    value: object = _NOTHING,
+    allowed: str = "",
+    remedy: str = "",
+    grade: int = VALUE,
 ) -> BadInput:
-    """Return the error for one problem; value: as given, where one is given."""
+    """Return the error for one problem; value: as given, where one is given; grade: how bad it is."""
     return BadInput(
         clean(problem, _LONGEST_PART),
         file=clean(origin, _LONGEST_PART),
@@ -94,6 +172,7 @@ def refusal(
         value="" if value is _NOTHING else shown(value),
         allowed=clean(allowed, _LONGEST_PART),
         remedy=clean(remedy, _LONGEST_PART),
+        grade=grade,
     )
 
 
@@ -104,15 +183,45 @@ def unknown(
     origin: str,
     key: str,
     remedy: str = "Correct the name or take it out",
+    given: Collection[str] = (),
 ) -> BadInput:
     """Return the error for a name nobody knows, with the nearest known one; what: "key", "effect", …
 
-    remedy: where none is near.
+    remedy: where none is near; given: names that are there too, and so are meant less likely.
     """
     names = list(known)
-    near = difflib.get_close_matches(name[:_LONGEST_VALUE], names, n=1, cutoff=0.5)
-    remedy = f'Perhaps "{near[0]}" is meant' if near else remedy
-    return refusal(f"unknown {what} {shown(name)}", origin, key, allowed=", ".join(names) or "none", remedy=remedy)
+    near = nearest(name, names, given)
+    remedy = f'Perhaps "{near}" is meant' if near else remedy
+    grade = WHOLE if what in ("table", "job", "effect", "target") else NAME
+    allowed = ", ".join(names) or "none"
+    return refusal(f"unknown {what} {shown(name)}", origin, key, allowed=allowed, remedy=remedy, grade=grade)
+
+
+def nearest(name: str, known: Iterable[str], given: Collection[str] = (), least: float = NEAR) -> str:
+    """Return the known name that is meant, whatever its case and its hyphens; "" where none is near.
+
+    given: names that come last among equally near ones; least: how alike names must be, 1 for the same letters.
+    """
+    plain, found = _plain(name[:_LONGEST_VALUE]), ("", 0.0)
+    for each in sorted(known, key=lambda each: each in given):
+        alike = difflib.SequenceMatcher(None, _plain(each), plain).ratio()
+        if alike >= least and alike > found[1]:
+            found = each, alike
+    return found[0]
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\s_-]+", "_", name).casefold()
+
+
+def near_file(path: Path) -> str:
+    """Return the path of the file beside one that is not there which is meant; "" where none is near."""
+    with contextlib.suppress(OSError, ValueError):
+        beside = itertools.islice(path.parent.iterdir(), _MOST_FILES)
+        names = [each.name for each in beside if each.suffix == path.suffix and each.is_file()]
+        found = nearest(path.stem, [Path(name).stem for name in names], least=SAME)
+        return str(path.with_name(found + path.suffix)) if found else ""
+    return ""
 
 
 def misread(error: QuantityError, origin: str, key: str, value: object) -> BadInput:
@@ -125,22 +234,21 @@ def missing(model: type[BaseModel], origin: str, table: str, name: str, needed: 
     quantity = quantity_of(model, name)
     sort = described(quantity.kind) if quantity else "text"
     problem = f"{name} is missing{': ' if needed else ''}{needed}"
-    return refusal(problem, origin, f"{table}.{name}", allowed=sort, remedy=f"Add {name} to [{table}]")
+    return refusal(problem, origin, f"{table}.{name}", allowed=sort, remedy=f"Add {name} to [{table}]", grade=GAP)
 
 
-def invalid(error: ValidationError, model: type[BaseModel], origin: str, table: str) -> BadInput:
-    """Return the error for the first thing pydantic found wrong with a table."""
-    first = error.errors(include_url=False)[0]
+def invalid(error: ErrorDetails, model: type[BaseModel], origin: str, table: str) -> BadInput:
+    """Return the error for one thing that pydantic found wrong with a table."""
     # Places in a list count from 1, as a caller's keys do.
-    names = [str(name + 1 if isinstance(name, int) else name) for name in first["loc"]]
-    if first["type"] == "missing" and len(names) == 1:
+    names = [str(name + 1 if isinstance(name, int) else name) for name in error["loc"]]
+    if error["type"] == "missing" and len(names) == 1:
         return missing(model, origin, table, names[0])
-    key, value = ".".join((table, *names)), first["input"]
-    cause = first.get("ctx", {}).get("error")
+    key, value = ".".join((table, *names)), error["input"]
+    cause = error.get("ctx", {}).get("error")
     if isinstance(cause, QuantityError):
         return misread(cause, origin, key, value)
-    allowed = str(first.get("ctx", {}).get("expected", "")).replace("'", '"')
-    problem = "it is none of the known choices" if allowed else _PROBLEMS.get(first["type"], first["msg"])
+    allowed = str(error.get("ctx", {}).get("expected", "")).replace("'", '"')
+    problem = "it is none of the known choices" if allowed else _PROBLEMS.get(error["type"], error["msg"])
     return refusal(problem, origin, key, value, allowed or _bounds(model, names), "Correct the value")
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, Unit, fits, parse_unit, show
+from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, UNITS, QuantityError, Unit, fits, meant_unit, parse_unit, show
 
 NARROWEST = 1e-10
 """rad: the least pulse, rise and return; a hundred times SAME_ANGLE."""
@@ -107,7 +107,9 @@ def read(text: str, kind: str) -> float:
     try:
         unit = parse_unit(unit_text)
     except QuantityError as error:
-        raise _misreading(text, kind, error.problem, error.remedy) from None
+        meant = meant_unit(unit_text, kind)
+        problem = f'"{unit_text}" is not a unit' if meant else error.problem
+        raise _misreading(text, kind, problem, _perhaps(meant) or error.remedy) from None
     _check_dimension(unit, unit_text, number, kind)
     return _rounded(_as_written(number, kind) * unit.factor, kind)
 
@@ -195,7 +197,13 @@ def _check_dimension(unit: Unit, unit_text: str, number: str, kind: str) -> None
             "an angular speed in rpm, turn/min, deg/s or rad/s",
             f'If turns are meant, write "{turns:g} rpm"',
         )
-    raise _refusal(kind, misfit(unit_text, kind), f"Write it in {DISPLAY_UNIT[kind]}")
+    # Of units that there are, one of two letters is a slip for nearly any other.
+    remedy = _perhaps(meant_unit(unit_text, kind, shortest=3)) or f"Write it in {DISPLAY_UNIT[kind]}"
+    raise _refusal(kind, misfit(unit_text, kind), remedy)
+
+
+def _perhaps(unit: str) -> str:
+    return f'Perhaps "{unit}" is meant; units are case-sensitive and joined by * or /' if unit else ""
 
 
 def misfit(unit_text: str, kind: str) -> str:
@@ -254,7 +262,8 @@ class Quantity(NamedTuple):
         elif isinstance(raw, bool) or not isinstance(raw, int | float):
             raise _refusal(self.kind, "it is not a quantity")
         elif self.kind != "number":
-            raise _refusal(self.kind, "the unit is missing", 'Write number and unit as text, in "quotes"')
+            written = f'"{str(raw)[:_MOST_DIGITS]} {DISPLAY_UNIT[self.kind]}"'
+            raise _refusal(self.kind, "the unit is missing", f"Write number and unit as text, in quotes: {written}")
         elif isinstance(raw, float) and not math.isfinite(raw):
             raise _refusal(self.kind, "it is not a finite number")
         else:

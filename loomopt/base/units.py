@@ -86,7 +86,16 @@ class ShowValue(Protocol):
         """Return the text; digits: significant ones."""
 
 
-_LARGEST_EXPONENT = 4
+_USUAL: dict[str, str] = {
+    "torque": "N*m N*mm N*cm kN*m lbf*in lbf*ft",
+    "inertia": "kg*m^2 kg*mm^2 kg*cm^2 g*mm^2 lb*in^2",
+    "angular speed": "rpm rad/s deg/s turn/min",
+    "angular acceleration": "rad/s^2 deg/s^2",
+    "stiffness": "N/m N/mm kN/m lbf/in",
+    "density": "kg/m^3 g/cm^3 lb/in^3",
+}
+"""Composed units that people write, by kind of quantity, beside those of `SI_UNIT`."""
+_LARGEST_EXPONENT, _LONGEST_UNIT = 4, 20
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
@@ -200,6 +209,39 @@ def _from_pint(name: str) -> Unit:
     if not 0 < size.magnitude < math.inf:
         raise unknown
     return Unit(Fraction(repr(float(size.magnitude))), (powers[0], powers[1], powers[2], powers[3]))
+
+
+def meant_unit(text: str, kind: str, shortest: int = 2) -> str:
+    """Return the unit of a kind of quantity that stands a slip away from text that is none of it; "" where none does.
+
+    Case, and what joins units, count for nothing; a slip is a letter more, less, another one, or two exchanged.
+    shortest: letters of text in which there may be one.
+    """
+    usual = [DISPLAY_UNIT[kind], SI_UNIT[kind], *_USUAL.get(kind, "").split(), *(u for u in UNITS if fits(u, kind))]
+    given = _letters(_MISTAKEN.get(text, text))
+    powers = sum(map(str.isdigit, given))
+    alike = (unit for unit in dict.fromkeys(usual) if sum(map(str.isdigit, unit)) >= powers)
+    slips = {unit: _slips(given, _letters(unit)) for unit in alike}
+    best = min(slips, key=lambda unit: (slips[unit], abs(len(_letters(unit)) - len(given))), default="")
+    return best if slips and slips[best] <= (len(given) >= shortest) else ""
+
+
+def _letters(unit: str) -> str:
+    """Return a unit's letters and digits, all small."""
+    return re.sub(r"[^a-z0-9]", "", ascii_unit(unit[:_LONGEST_UNIT]).lower())
+
+
+def _slips(one: str, other: str) -> int:
+    """Return how many letters are to be put in, taken out, changed or exchanged to make one word of another."""
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for i, a in enumerate(one):
+        last, before, row = before, row, [i + 1]
+        for j, b in enumerate(other):
+            row.append(min(before[j] + (a != b), before[j + 1] + 1, row[j] + 1))
+            if i and j and a == other[j - 1] and b == one[i - 1]:
+                row[-1] = min(row[-1], last[j - 1] + 1)
+    return row[-1]
 
 
 @functools.cache

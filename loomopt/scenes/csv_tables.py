@@ -5,9 +5,10 @@ import io
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
-from loomopt.base.errors import BadInput, refusal
+from loomopt.base.errors import BadInput, near_file, refusal
 from loomopt.base.quantities import plain_number
 from loomopt.base.units import DISPLAY_UNIT, factor
 from loomopt.scenes.scene import Scene
@@ -48,7 +49,9 @@ def read(
     try:
         if not path.is_file():
             problem = "the table cannot be read: there is no such file"
-            raise refusal(problem, scene.origin, key, given, remedy="Correct it")
+            near = near_file(path)
+            remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
+            raise refusal(problem, scene.origin, key, given, remedy=remedy)
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
         if len(raw) > LARGEST_FILE:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from loomopt.base.errors import BadInput, clean, misread, refusal, shown, unknown
+from loomopt.base.errors import BadInput, Faults, clean, misread, near_file, refusal, shown, unknown
 from loomopt.base.quantities import Quantity, described, quantity_of
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.physics.effects.kinds import label
@@ -47,7 +47,9 @@ def loaded(path: Path) -> object:
     try:
         if not path.is_file():
             what = "it is no ordinary file" if path.exists() else "there is no such file"
-            raise refusal(f"the design cannot be read: {what}", origin, remedy="Correct the path")
+            near = near_file(path)
+            remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
+            raise refusal(f"the design cannot be read: {what}", origin, remedy=remedy)
         with path.open("rb") as file:
             raw = file.read(LARGEST_FILE + 1)
         if len(raw) > LARGEST_FILE:
@@ -241,7 +243,11 @@ def _resumed(own: object, scene: Scene, origin: str) -> Scene:
         paths = Paths(scene.paths.folder or Path(origin).resolve().parent)
         return build(document, scene.jobs, scene.origin, paths)
     except BadInput as error:
-        raise refusal(error.problem, origin, f"{key}.{error.key}", allowed=error.allowed, remedy=error.remedy) from None
+        faults = Faults()
+        for each in error.faults:
+            told = {"allowed": each.allowed, "remedy": each.remedy}
+            faults.add(refusal(each.problem, origin, f"{key}.{each.key}", **told, grade=each.grade))
+        raise faults.told() from None
 
 
 def check_job(job: object, scene: Scene, origin: str) -> None:

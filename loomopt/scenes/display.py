@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from loomopt.base.errors import misread, refusal, unknown
+from loomopt.base.errors import Faults, misread, refusal, unknown
 from loomopt.base.quantities import misfit, quantity_of, unit_of
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
 from loomopt.physics.effects.kinds import Effect
@@ -23,25 +23,31 @@ _PRESSURES = {"lbf": "psi"}
 """Unit of force → the unit of pressure that goes with it by habit."""
 
 
-def read(raw: object, origin: str) -> dict[str, str]:
-    """Return [display]: kind of quantity → its unit. Raises BadInput for the first thing that is wrong."""
-    found = {}
-    for key, unit in table(raw, origin, "display").items():
-        path = f"display.{key}"
-        if key not in KINDS:
-            raise unknown("kind of quantity", key, KINDS, origin, path)
-        kind = KINDS[key]
-        allowed = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
-        if not isinstance(unit, str) or len(unit) > _LONGEST:
-            raise refusal("it is not a unit", origin, path, unit, allowed, "Write the unit alone, as text")
-        try:
-            fitting = fits(unit.strip(), kind)
-        except QuantityError as error:
-            raise misread(QuantityError(error.problem, allowed, error.remedy), origin, path, unit) from None
-        if not fitting:
-            raise refusal(misfit(unit.strip(), kind), origin, path, unit, allowed, "Write another unit")
-        found[kind] = ascii_unit(unit.strip())
+def read(raw: object, origin: str, faults: Faults) -> dict[str, str]:
+    """Return [display]: kind of quantity → its unit."""
+    found, given = {}, dict[str, Any]()
+    with faults:
+        given = dict(table(raw, origin, "display"))
+    for key, unit in given.items():
+        with faults:
+            if key not in KINDS:
+                raise unknown("kind of quantity", key, KINDS, origin, f"display.{key}", given=given)
+            found[KINDS[key]] = _unit(unit, KINDS[key], origin, f"display.{key}")
     return found
+
+
+def _unit(unit: object, kind: str, origin: str, path: str) -> str:
+    """Return a unit of a kind, in ASCII. Raises BadInput."""
+    allowed = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
+    if not isinstance(unit, str) or len(unit) > _LONGEST:
+        raise refusal("it is not a unit", origin, path, unit, allowed, "Write the unit alone, as text")
+    try:
+        fitting = fits(unit.strip(), kind)
+    except QuantityError as error:
+        raise misread(QuantityError(error.problem, allowed, error.remedy), origin, path, unit) from None
+    if not fitting:
+        raise refusal(misfit(unit.strip(), kind), origin, path, unit, allowed, "Write another unit")
+    return ascii_unit(unit.strip())
 
 
 def units(
@@ -58,7 +64,7 @@ def units(
     for kind, unit in _written(document, schema, active, ranges):
         if kind not in first and fits(unit, kind):
             first[kind] = ascii_unit(unit)
-    return _completed({**first, **read(document.get("display", {}), "")})
+    return _completed({**first, **read(document.get("display", {}), "", Faults())})
 
 
 def unit_for(si: str, known: Mapping[str, str]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from loomopt.base.errors import BadInput, refusal, shown
+from loomopt.base.errors import BadInput, near_file, refusal, shown
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8
@@ -48,7 +48,9 @@ def _read_text(path: Path, origin: str) -> str:
         if path.is_dir():
             raise refusal("it is a folder", origin, allowed=allowed, remedy="Name the file in it")
         if not path.exists():
-            remedy = "Correct the path; a packaged scene is called by its name alone: see `loomopt list`"
+            near = near_file(path)
+            remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
+            remedy += "; a packaged scene is called by its name alone: see `loomopt list`"
             raise refusal("there is no such file", origin, allowed=allowed, remedy=remedy)
         if not path.is_file():
             raise refusal("it is not an ordinary file", origin, allowed=allowed, remedy="Name a file")

@@ -1,13 +1,12 @@
 """Where packaged scenes and reference results stand: in the installed package, else at the checkout's top."""
 
-import difflib
 import functools
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from loomopt.base.errors import BadInput, clean, shown
+from loomopt.base.errors import BadInput, clean, near_file, nearest, shown
 from loomopt.scenes.document import looked_up, read_document
 
 if TYPE_CHECKING:
@@ -60,8 +59,10 @@ def unknown_problem(name: str, known: Mapping[str, Path], faults: Iterable[BadIn
 
     faults: of jobs that other distributions bring: one that cannot be imported may be what brings the scene.
     """
-    near = difflib.get_close_matches(name[:80], known, n=1, cutoff=0.5)
-    hint = f'perhaps "{near[0]}" is meant' if near else "see `loomopt list`"
+    file = near_file(Path(f"{name[:80]}.toml"))
+    near = nearest(name, [*known, Path(file).stem] if file else known)
+    near = file if file and near == Path(file).stem else near
+    hint = f'perhaps "{near}" is meant' if near else "see `loomopt list`"
     return BadInput(
         "; ".join(["there is no packaged scene of this name", *(fault.problem for fault in faults)]),
         file=clean(name, 80),

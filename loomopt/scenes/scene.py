@@ -1,11 +1,13 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from loomopt.base import arguments
-from loomopt.base.errors import clean, misread, refusal, shown, unknown
+from loomopt.base.errors import MACHINE, SAME, BadInput, Faults, clean, misread, nearest, refusal, shown, unknown
+from loomopt.base.quantities import quantity_of
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.units import QuantityError, show
 from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
@@ -183,22 +185,30 @@ class Scene(Shown):
         return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
 
     def _set(self, values: Mapping[str, object]) -> Mapping[str, Any]:
-        document = self.document
+        document, faults = self.document, Faults()
         for key, value in values.items():
-            parts = self._path(key)
-            effect = self.schema.effects.get(parts[1]) if parts[0] == "effects" and len(parts) > 1 else None
-            own = parts[: 3 if effect and effect.many else 2]
-            inside = looked_up(document, own)
-            if parts[0] == "effects" and len(parts) > len(own) and inside is None:
-                document = _put_on(document, *own[1:])
-            if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
-                document = replaced(document, own, {}, self.origin, key)
-            document = replaced(document, parts, value, self.origin, key)
-            for other in _stood_for(effect, parts[len(own) :]):
-                # A curve takes the place of numbers, and they that of a curve, but for what is set in the same call.
-                place = [*own, other]
-                if looked_up(document, place) is not None and ".".join(place) not in values:
-                    document = removed(document, place)
+            with faults:
+                document = self._with_key(document, key, value, values)
+        faults.tell()
+        return document
+
+    def _with_key(
+        self, document: Mapping[str, Any], key: str, value: object, values: Mapping[str, object]
+    ) -> Mapping[str, Any]:
+        parts = self._path(key)
+        effect = self.schema.effects.get(parts[1]) if parts[0] == "effects" and len(parts) > 1 else None
+        own = parts[: 3 if effect and effect.many else 2]
+        inside = looked_up(document, own)
+        if parts[0] == "effects" and len(parts) > len(own) and inside is None:
+            document = _put_on(document, *own[1:])
+        if parts[0] == "bounds" and len(parts) > 2 and not isinstance(inside, Mapping):
+            document = replaced(document, own, {}, self.origin, key)
+        document = replaced(document, parts, value, self.origin, key)
+        for other in _stood_for(effect, parts[len(own) :]):
+            # A curve takes the place of numbers, and they that of a curve, but for what is set in the same call.
+            place = [*own, other]
+            if looked_up(document, place) is not None and ".".join(place) not in values:
+                document = removed(document, place)
         return document
 
     def with_effect(self, *names: str) -> "Scene":
@@ -244,7 +254,8 @@ class Scene(Shown):
                 single = [bound for bound in ranges if not self.bounds[bound].free]
                 held = ", ".join(dict.fromkeys([*(group for group, of in groups.items() if of), *single]))
                 allowed = held or "nothing: no bound has free = false"
-                remedy = "Give it min and max in [bounds]"
+                near = nearest(name, [*ranges, *(group for group, of in groups.items() if of)], least=SAME)
+                remedy = f'Perhaps "{near}" is meant' if near else "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
         return self.update({f"bounds.{name}.free": True for name in asked})
 
@@ -275,8 +286,23 @@ class Scene(Shown):
         if all(parts) and (len(parts) > 1 or key in TABLES):
             return parts
         problem = f"unknown table {shown(key)}" if len(parts) == 1 else "a name in the key is empty"
-        remedy = "Name the table and the key, such as operation.M0"
+        meant = " or ".join(self._keys_of(key)) if len(parts) == 1 else ""
+        remedy = f"Name the table too: {meant}" if meant else "Name the table and the key, such as operation.M0"
         raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
+
+    def _keys_of(self, name: str) -> list[str]:
+        """Return the dotted keys under which what a designer calls so may stand."""
+        schema = self.schema
+        known: dict[str, Iterable[str]] = {
+            "operation": schema.operation.model_fields,
+            "mechanism": schema.mechanism.model_fields,
+            **{f"effects.{e.name}": e.own.model_fields for e in schema.effects.values() if not e.many},
+            "bounds": {*schema.variables, *self.bounds},
+        }
+        sides = {figure.name: figure.sides for figure in schema.figures.values()}
+        near = nearest(name, [*(each for names in known.values() for each in names), *sides], least=SAME)
+        keys = [f"{table}.{near}" for table, names in known.items() if near in names]
+        return keys or [f"limits.{near}.{side}" for side in sides.get(near, ())]
 
     def _effect(self, name: str) -> Effect:
         """Return a declared effect; of an instance, its kind."""
@@ -312,48 +338,72 @@ def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
 def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None) -> Scene:
     """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
 
-    paths: where the files lie that it names; without, they are the caller's own. Raises BadInput for the first thing
-    that is wrong.
+    paths: where the files lie that it names; without, they are the caller's own. Raises BadInput that names all that is
+    wrong, the worst first.
     """
-    original = copied(document, origin)
+    original, faults = copied(document, origin), Faults()
+    raw: dict[str, Any] = {name: {} for name in TABLES} | original
     for name in original:
         if name not in TABLES:
-            raise unknown("table", name, TABLES, origin, name)
-    raw: dict[str, Any] = {name: {} for name in TABLES} | original
-    problem = read.problem(raw["problem"], jobs, origin)
-    named = [*read.table(raw["effects"], origin, "effects"), *read.table(raw["available"], origin, "available")]
-    schema = jobs.schema(problem.job, original, named)
+            faults.add(unknown("table", name, TABLES, origin, name, given=original))
+            near = nearest(name, TABLES, original, SAME)
+            raw |= {near: original[name]} if near not in original else {}
+    problem = read.problem(raw["problem"], jobs, origin, faults)
+    named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]
+    try:
+        schema = jobs.schema(problem.job, original, named)
+    except BadInput as error:
+        faults.add(error)
+        raise faults.told() from None
     tables = {
-        "operation": read.checked(schema.operation, raw["operation"], origin, "operation"),
-        "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism"),
+        "operation": read.checked(schema.operation, raw["operation"], origin, "operation", faults),
+        "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism", faults),
     }
-    active = read.effects(raw["effects"], schema, origin, "effects")
-    available = read.effects(raw["available"], schema, origin, "available")
-    read.demand(schema, tables, active, origin)
+    active = read.effects(raw["effects"], schema, origin, "effects", faults)
+    available = read.effects(raw["available"], schema, origin, "available", faults)
+    read.demand(schema, tables, active, origin, faults)
     places = list(read.places(schema, tables, active, available))
-    own_targets = {name: {} for name in schema.targets} | dict(read.table(raw["targets"], origin, "targets"))
     targets = {name: target.own for name, target in schema.targets.items()}
-    display.read(raw["display"], origin)
+    if isinstance(raw["targets"], Mapping):
+        raw["targets"] = {**{name: {} for name in targets}, **raw["targets"]}
+    display.read(raw["display"], origin, faults)
     scene = Scene(
         document=original,
         origin=clean(origin),
         schema=schema,
         jobs=jobs,
         name=problem.name,
-        title=clean(" ".join(problem.title.split())),
-        source=clean(" ".join(problem.source.split())),
+        title=clean(" ".join(str(problem.title).split())),
+        source=clean(" ".join(str(problem.source).split())),
         operation=_numbers(tables["operation"]),
         mechanism=_numbers(tables["mechanism"]),
         tables=tables,
         effects={effect.name: own for effect, own in active.items()},
         active=tuple(active),
-        bounds=read.bounds(raw["bounds"], schema, places, origin),
-        limits=read.limits(raw["limits"], schema, tuple(active), origin),
-        targets=read.named(own_targets, targets, "target", origin, "targets"),
+        bounds=read.bounds(raw["bounds"], schema, places, origin, faults),
+        limits=read.limits(raw["limits"], schema, tuple(active), origin, faults),
+        targets=read.named(raw["targets"], targets, "target", origin, "targets", faults),
         paths=paths or Paths(),
     )
-    jobs.check(scene)
+    if _judged(scene, faults):
+        try:
+            jobs.check(scene)
+        except BadInput as error:
+            for fault in error.faults:
+                fault.grade = MACHINE
+                faults.add(fault)
+    faults.tell()
     return scene
+
+
+def _judged(scene: Scene, faults: Faults) -> bool:
+    """Say whether it shows if today's machine can work: of its numbers only those are wrong that it can do without."""
+    own = scene.tables["mechanism"]
+    wrong = [name for name, value in own if value != value]
+    optional = [
+        name for name in wrong if quantity_of(type(own), name) and not type(own).model_fields[name].is_required()
+    ]
+    return wrong == optional and not faults.within("operation", "effects")
 
 
 def given(table: Table) -> dict[str, Any]:
@@ -363,4 +413,4 @@ def given(table: Table) -> dict[str, Any]:
 
 def _numbers(table: Table) -> dict[str, float]:
     """Return the numbers of a table that are given or defaulted."""
-    return {name: value for name, value in table if isinstance(value, float)}
+    return {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}

@@ -1,13 +1,30 @@
-"""What a scene of a job may hold, and its tables checked against that; the first fault is one BadInput."""
+"""What a scene of a job may hold, and its tables checked against that.
 
+Whoever reads a table gives the `Faults` that it keeps what is wrong in; what is right is returned all the same.
+"""
+
+import math
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 from pydantic import ValidationError
 
-from loomopt.base.errors import invalid, misread, missing, refusal, shown, unknown
+from loomopt.base.errors import (
+    GAP,
+    SAME,
+    WHOLE,
+    BadInput,
+    Faults,
+    invalid,
+    misread,
+    missing,
+    nearest,
+    refusal,
+    shown,
+    unknown,
+)
 from loomopt.base.quantities import Quantity, quantity_of, unit_of
 from loomopt.base.records import lazy
 from loomopt.base.units import QuantityError, ShowValue
@@ -136,68 +153,123 @@ class Place(NamedTuple):
 def table(raw: object, origin: str, path: str) -> Mapping[str, Any]:
     """Return raw if it is a table."""
     if not isinstance(raw, Mapping):
-        raise refusal("it is not a table", origin, path, raw, remedy=f"Write a table [{path}]")
+        raise refusal("it is not a table", origin, path, raw, remedy=f"Write a table [{path}]", grade=WHOLE)
     return raw
 
 
-def checked(model: type[_Model], raw: object, origin: str, path: str) -> _Model:
-    """Return a raw table as its model."""
-    values = dict(table(raw, origin, path))
-    for name in values:
-        if name not in model.model_fields:
-            raise unknown("key", name, model.model_fields, origin, f"{path}.{name}")
+def checked(model: type[_Model], raw: object, origin: str, path: str, faults: Faults) -> _Model:
+    """Return a raw table as its model, with NaN for what cannot be read.
+
+    A name that nobody knows stands for the one near it that is missing: that is one mistake, not two.
+    """
+    fields = model.model_fields
+    try:
+        given = table(raw, origin, path)
+    except BadInput as error:
+        faults.add(error)
+        return _right({}, model).model_copy(update=dict.fromkeys(fields, math.nan))
+    known = {name: value for name, value in given.items() if name in fields}
+    others = [name for name in fields if name not in known]
+    meant = {nearest(name, others, least=SAME) for name in given if name not in fields} - {""}
+    wrong = dict.fromkeys(meant, math.nan)
+    _all_known(given, fields, "key", origin, path, faults)
+    try:
+        found = model.model_validate(known)
+    except ValidationError as error:
+        for each in error.errors(include_url=False):
+            name = str(each["loc"][0])
+            if each["type"] != "missing" or len(each["loc"]) > 1 or name not in meant:
+                faults.add(invalid(each, model, origin, path))
+            wrong[name] = math.nan
+        found = _right({name: value for name, value in known.items() if name not in wrong}, model)
+    return found.model_copy(update=wrong) if wrong else found
+
+
+def _right(values: Mapping[str, Any], model: type[_Model]) -> _Model:
+    """Return values that can be read as their table, whatever else it requires."""
     try:
         return model.model_validate(values)
-    except ValidationError as error:
-        raise invalid(error, model, origin, path) from None
+    except ValidationError:
+        return cast(_Model, model.model_construct(**values))
 
 
-def problem(raw: object, jobs: JobNames, origin: str) -> Problem:
-    """Return [problem], its name fit for a file name and its job one of `jobs`."""
-    found = checked(Problem, raw, origin, "problem")
-    if not _NAME.fullmatch(found.name) or found.name.lower() in _TAKEN:
+def problem(raw: object, jobs: JobNames, origin: str, faults: Faults) -> Problem:
+    """Return [problem], its name fit for a file name and its job one of `jobs`.
+
+    Where its job is none, the near one tells what else is wrong. Raises BadInput where none is near.
+    """
+    found = checked(Problem, raw, origin, "problem", faults)
+    if not isinstance(found.job, str):
+        raise faults.told()
+    if isinstance(found.name, str) and (not _NAME.fullmatch(found.name) or found.name.lower() in _TAKEN):
         remedy = "Name it as a file could be named anywhere, such as beatup-wide"
         allowed = "up to 64 letters, digits, - and _, a letter or digit first, but for CON, NUL and the like"
-        raise refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy)
-    if found.job not in jobs:
-        raise unknown("job", found.job, jobs.names(), origin, "problem.job")
-    return found
+        faults.add(refusal("it is not a name", origin, "problem.name", found.name, allowed, remedy))
+    if found.job in jobs:
+        return found
+    faults.add(unknown("job", found.job, jobs.names(), origin, "problem.job"))
+    near = nearest(found.job, jobs.names(), least=SAME)
+    if not near:
+        raise faults.told()
+    return found.model_copy(update={"job": near})
 
 
-def named(raw: object, models: Mapping[str, type[Table]], what: str, origin: str, path: str) -> dict[str, Table]:
+def inner(raw: object, known: Collection[str], what: str, origin: str, path: str, faults: Faults) -> Mapping[str, Any]:
+    """Return a table of tables; one whose name nobody knows stands for the near one where that is not there.
+
+    what: what their names stand for.
+    """
+    with faults:
+        given = table(raw, origin, path)
+        _all_known(given, known, what, origin, path, faults)
+        meant = {nearest(name, known, given, SAME): values for name, values in given.items() if name not in known}
+        return meant | dict(given)
+    return {}
+
+
+def _all_known(
+    given: Collection[str], known: Collection[str], what: str, origin: str, path: str, faults: Faults
+) -> None:
+    for name in given:
+        if name not in known:
+            faults.add(unknown(what, name, known, origin, f"{path}.{name}", given=given))
+
+
+def named(
+    raw: object, models: Mapping[str, type[Table]], what: str, origin: str, path: str, faults: Faults
+) -> dict[str, Table]:
     """Return the tables inside a table, in the order of `models`; what: what their names stand for."""
-    inner = table(raw, origin, path)
-    for name in inner:
-        if name not in models:
-            raise unknown(what, name, models, origin, f"{path}.{name}")
+    given = inner(raw, models, what, origin, path, faults)
     return {
-        name: checked(model, inner[name], origin, f"{path}.{name}") for name, model in models.items() if name in inner
+        name: checked(model, given[name], origin, f"{path}.{name}", faults)
+        for name, model in models.items()
+        if name in given
     }
 
 
-def effects(raw: object, schema: SceneSchema, origin: str, path: str) -> dict[Effect, Table]:
+def effects(raw: object, schema: SceneSchema, origin: str, path: str, faults: Faults) -> dict[Effect, Table]:
     """Return the effects whose tables stand in a table, in the order of the job, with their values."""
-    inner, found = table(raw, origin, path), {}
-    for name in inner:
-        if name not in schema.effects:
-            raise unknown("effect", name, schema.effects, origin, f"{path}.{name}")
+    given = inner(raw, schema.effects, "effect", origin, path, faults)
+    found: dict[Effect, Table] = {}
     for name, effect in schema.effects.items():
-        if name not in inner:
+        if name not in given:
             continue
-        if isinstance(effect, Event) and not schema.parts:
-            problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
-            raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
-        if not effect.many:
-            found[effect] = _checked_effect(effect, inner[name], origin, f"{path}.{name}")
-            continue
-        for each, values in table(inner[name], origin, f"{path}.{name}").items():
-            found[instance(effect, each)] = _checked_effect(effect, values, origin, f"{path}.{name}.{each}")
+        with faults:
+            if isinstance(effect, Event) and not schema.parts:
+                problem = f"effect {name} parts the output from the mechanism, which job {schema.name} cannot follow"
+                raise refusal(problem, origin, f"{path}.{name}", remedy="Take the table out")
+            if not effect.many:
+                found[effect] = _checked_effect(effect, given[name], origin, f"{path}.{name}", faults)
+                continue
+            for each, values in table(given[name], origin, f"{path}.{name}").items():
+                key = f"{path}.{name}.{each}"
+                found[instance(effect, each)] = _checked_effect(effect, values, origin, key, faults)
     return found
 
 
-def _checked_effect(effect: Effect, raw: object, origin: str, path: str) -> Table:
+def _checked_effect(effect: Effect, raw: object, origin: str, path: str, faults: Faults) -> Table:
     """Return an effect's table: of one that may be a curve of one's own either that, or what it stands for."""
-    found = checked(effect.own, raw, origin, path)
+    found = checked(effect.own, raw, origin, path, faults)
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
         return found
@@ -213,31 +285,35 @@ def _checked_effect(effect: Effect, raw: object, origin: str, path: str) -> Tabl
     return found
 
 
-def demand(schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], origin: str) -> None:
-    """Raise BadInput where an active effect, or the job, needs a number that is not given."""
+def demand(
+    schema: SceneSchema, tables: Mapping[str, Table], active: Mapping[Effect, Table], origin: str, faults: Faults
+) -> None:
+    """Find where an active effect, or the job, needs a number that is not given, and effects that cannot be on."""
     needs = [(key, f"job {schema.name}") for key in schema.needs]
     needs += [(key, f"effect {effect.name}") for effect, own in active.items() for key in needed(effect, own)]
-    for key, who in needs:
+    first = dict(reversed(needs))
+    for key in dict.fromkeys(key for key, _ in needs):
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
-            raise missing(type(tables[path]), origin, path, name, f"{who} needs it")
+            faults.add(missing(type(tables[path]), origin, path, name, f"{first[key]} needs it"))
     if any(effect.beside or effect.clashes for effect in active):
-        _combined(active, origin)
+        _combined(active, origin, faults)
     for effect, own in active.items():
         words = {key: value for key, value in own if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
-            raise refusal(problem, origin, f"effects.{effect.name}", remedy="Take it off, or choose other values")
+            remedy = "Take it off, or choose other values"
+            faults.add(refusal(problem, origin, f"effects.{effect.name}", remedy=remedy))
 
 
-def _combined(active: Mapping[Effect, Table], origin: str) -> None:
-    """Raise BadInput where effects cannot be on together."""
-    from loomopt.physics.effects.kinds import faults
+def _combined(active: Mapping[Effect, Table], origin: str, faults: Faults) -> None:
+    """Find effects that cannot be on together."""
+    from loomopt.physics.effects.kinds import faults as combined
 
-    for fault in faults(active):
+    for fault in combined(active):
         remedy = f"Add [effects.{fault.other}], or take {fault.effect.name} off"
         remedy = remedy if fault.missing else f"Take one of them off (--without {fault.other})"
-        raise refusal(fault.problem, origin, f"effects.{fault.effect.name}", remedy=remedy)
+        faults.add(refusal(fault.problem, origin, f"effects.{fault.effect.name}", remedy=remedy))
 
 
 def places(
@@ -260,28 +336,32 @@ def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]
             yield Place(path, key, key, quantity, own is not None and getattr(own, key) is not None)
 
 
-def flat(raw: object, known: Iterable[str], origin: str, path: str) -> dict[str, Any]:
+def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
     """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m"."""
     found: dict[str, Any] = {}
-    for name, value in table(raw, origin, path).items():
+    for name, value in raw.items():
         inner = {f"{name}.{key}": each for key, each in value.items()} if isinstance(value, Mapping) else {}
         found |= inner if name not in known and inner.keys() & set(known) else {name: value}
     return found
 
 
-def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str) -> dict[str, Bound]:
+def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, faults: Faults) -> dict[str, Bound]:
     """Return [bounds]; known: places of the scene's numbers, any of which may be bounded.
 
     A bound on a number of an effect that is off waits for it: it is checked and left out.
     """
     found = {}
-    for name, each in flat(raw, [*schema.variables, *(place.label for place in known)], origin, "bounds").items():
-        waiting = [p for p in known if p.label == name and p.waits]
-        given = any(place.label == name and place.given for place in known)
-        quantity = waiting[0].quantity if waiting and not given else _bounded(name, schema, known, origin)
-        bound = _bound(each, quantity, origin, f"bounds.{name}")
-        if given or not waiting:
-            found[name] = bound
+    given_bounds: Mapping[str, Any] = {}
+    with faults:
+        given_bounds = flat(table(raw, origin, "bounds"), [*schema.variables, *(place.label for place in known)])
+    for name, each in given_bounds.items():
+        with faults:
+            waiting = [p for p in known if p.label == name and p.waits]
+            given = any(place.label == name and place.given for place in known)
+            quantity = waiting[0].quantity if waiting and not given else _bounded(name, schema, known, origin)
+            bound = _bound(each, quantity, origin, f"bounds.{name}")
+            if given or not waiting:
+                found[name] = bound
     return found
 
 
@@ -309,35 +389,43 @@ def _bound(raw: object, quantity: Quantity, origin: str, key: str) -> Bound:
     if not isinstance(raw, Mapping):
         value = _value(quantity, raw, origin, key)
         return Bound(value, value, True, _unit(raw))
-    _known_keys(raw, ("min", "max", "free"), origin, key)
-    for end in ("min", "max"):
-        if end not in raw:
-            remedy = f"Give min and max of {key}, or one value to fix it"
-            raise refusal(f"{end} is missing: a bound has two ends", origin, f"{key}.{end}", remedy=remedy)
+    faults = Faults()
+    _all_known(raw, ("min", "max", "free"), "key", origin, key, faults)
     given = raw.get("free", True)
     free = {"true": True, "false": False}.get(given.lower()) if isinstance(given, str) else given
     if not isinstance(free, bool):
-        free_key = f"{key}.free"
-        raise refusal("it is neither true nor false", origin, free_key, raw["free"], "true, false", "Correct the value")
-    low, high = (_value(quantity, raw[end], origin, f"{key}.{end}") for end in ("min", "max"))
-    _ordered(raw, low, high, origin, key)
-    return Bound(low, high, free, _unit(raw["min"]))
+        problem, allowed = "it is neither true nor false", "true, false"
+        faults.add(refusal(problem, origin, f"{key}.free", raw["free"], allowed, "Correct the value"))
+    found = _ends(raw, [end for end in ("min", "max") if end in raw], quantity, origin, key, faults)
+    for end in ("min", "max"):
+        if end not in raw and not any(nearest(name, (end,), least=SAME) for name in raw):
+            remedy = f"Give min and max of {key}, or one value to fix it"
+            problem = f"{end} is missing: a bound has two ends"
+            faults.add(refusal(problem, origin, f"{key}.{end}", remedy=remedy, grade=GAP))
+    faults.tell()
+    return Bound(found["min"], found["max"], free is True, _unit(raw["min"]))
 
 
-def limits(raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str) -> dict[str, LimitRange]:
+def limits(
+    raw: object, schema: SceneSchema, active: Sequence[Effect], origin: str, faults: Faults
+) -> dict[str, LimitRange]:
     """Return [limits]: figures of the job, and of the effects that are on."""
-    inner = flat(raw, schema.figures, origin, "limits")
+    given_limits: Mapping[str, Any] = {}
+    with faults:
+        given_limits = flat(table(raw, origin, "limits"), schema.figures)
     limitable = [name for name, figure in schema.figures.items() if figure.sides]
+    _all_known(given_limits, limitable, "figure to limit", origin, "limits", faults)
     on = {effect.name for effect in active}
-    for name in inner:
-        if name not in limitable:
-            raise unknown("figure to limit", name, limitable, origin, f"limits.{name}")
-        for other, effect in schema.effects.items():
-            given = isinstance(effect, Check | Speed) and name in {*getattr(effect, "quantities", ()), *effect.rows}
-            if given and other not in on:
-                remedy = f"Put {other} on, or take the limit out"
-                raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
-    return {name: _limit(inner[name], schema.figures[name], name, origin) for name in inner}
+    found = {}
+    for name in (name for name in given_limits if name in limitable):
+        with faults:
+            for other, effect in schema.effects.items():
+                given = isinstance(effect, Check | Speed) and name in {*getattr(effect, "quantities", ()), *effect.rows}
+                if given and other not in on:
+                    remedy = f"Put {other} on, or take the limit out"
+                    raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
+            found[name] = _limit(given_limits[name], schema.figures[name], name, origin)
+    return found
 
 
 def _limit(raw: object, figure: Figure, name: str, origin: str) -> LimitRange:
@@ -346,36 +434,34 @@ def _limit(raw: object, figure: Figure, name: str, origin: str) -> LimitRange:
     if not isinstance(raw, Mapping):
         remedy = f"Write a table with {sides}"
         raise refusal("it is not a table", origin, key, raw, f"a table with {sides}", remedy)
-    _known_keys(raw, ("min", "max"), origin, key)
-    for side in raw:
-        if side not in figure.sides:
-            remedy = f"Limit its {sides}"
-            raise refusal(f"{name} has no limit {side}", origin, f"{key}.{side}", raw[side], sides, remedy)
     if not raw:
         raise refusal("the limit is empty", origin, key, allowed=sides, remedy="Give a side, or take the limit out")
-    quantity = Quantity(figure.kind)
-    found = {side: _value(quantity, value, origin, f"{key}.{side}") for side, value in raw.items()}
-    if len(found) == 2:
-        _ordered(raw, found["min"], found["max"], origin, key)
+    faults = Faults()
+    _all_known(raw, ("min", "max"), "key", origin, key, faults)
+    given = [side for side in raw if side in ("min", "max")]
+    for side in given:
+        if side not in figure.sides:
+            problem, remedy = f"{name} has no limit {side}", f"Limit its {sides}"
+            faults.add(refusal(problem, origin, f"{key}.{side}", raw[side], sides, remedy))
+    given = [side for side in given if side in figure.sides]
+    found = _ends(raw, given, Quantity(figure.kind), origin, key, faults)
+    faults.tell()
     return LimitRange(found.get("min"), found.get("max"), _unit(next(iter(raw.values()))))
 
 
-def _known_keys(raw: Mapping[str, Any], known: tuple[str, ...], origin: str, key: str) -> None:
-    for name in raw:
-        if name not in known:
-            raise unknown("key", name, known, origin, f"{key}.{name}")
-
-
-def _ordered(raw: Mapping[str, Any], low: float, high: float, origin: str, key: str) -> None:
-    if low > high:
+def _ends(
+    raw: Mapping[str, Any], given: Iterable[str], quantity: Quantity, origin: str, key: str, faults: Faults
+) -> dict[str, float]:
+    """Return the ends of a range that are given, in order."""
+    found = {}
+    for end in given:
+        with faults:
+            found[end] = _value(quantity, raw[end], origin, f"{key}.{end}")
+    if len(found) == 2 and found["min"] > found["max"]:
         ends = f"min {shown(raw['min'])}, max {shown(raw['max'])}"
-        raise refusal(
-            f"min is more than max ({ends})",
-            origin,
-            key,
-            allowed="min <= max",
-            remedy="Exchange or correct them",
-        )
+        problem, remedy = f"min is more than max ({ends})", "Exchange or correct them"
+        faults.add(refusal(problem, origin, key, allowed="min <= max", remedy=remedy))
+    return found
 
 
 def _value(quantity: Quantity, raw: object, origin: str, key: str) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, refusal, shown
+from loomopt.base.errors import BadInput, nearest, refusal, shown
 from loomopt.physics.effects.kinds import EVALUATED
 from loomopt.physics.tolerances import COARSEST, TIGHTEST
 from loomopt.scenes.scene import Scene
@@ -71,13 +71,14 @@ def target_name(scene: Scene, target: str | None) -> str:
         arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
     name = target or scene.schema.default_target
     if name not in scene.schema.targets:
+        near = nearest(name, scene.schema.targets)
         raise BadInput(
             f"job {scene.job} has no target {name}",
             file=scene.origin,
             key="target",
             value=name,
             allowed=", ".join(scene.schema.targets),
-            remedy="Choose one of them.",
+            remedy=f'Perhaps "{near}" is meant' if near else "Choose one of them",
         )
     return name
 

@@ -4,12 +4,16 @@ import copy
 import datetime
 import math
 import os
+import pickle
+import re
 
 import pytest
 
 from loomopt.base.errors import BadInput
-from loomopt.jobs.registry import load, scene
-from loomopt.scenes import packaged
+from loomopt.base.quantities import Quantity
+from loomopt.base.units import QuantityError
+from loomopt.jobs.registry import find, load, scene
+from loomopt.scenes import designs, packaged
 
 BEATUP = load("beatup")
 TEXT = packaged.problems()["beatup"].read_text(encoding="utf-8")
@@ -176,7 +180,7 @@ CHANGES = [
     ("set", ("effects.wind.speed", "5 m/s"), "effects.wind", 'unknown effect "wind"', "inertia"),
     ("set", ("targets.torque", "5"), "targets.torque", "not a table", "[targets.torque]"),
     ("set", ("problem.job", "rapir"), "problem.job", 'unknown job "rapir"', '"rapier"'),
-    ("set", ("problem.job", "rapier"), "operation.M0", 'unknown key "M0"', "stroke"),
+    ("set", ("problem.job", "rapier"), "effects.inertia", 'unknown effect "inertia"', "head_inertia"),
     ("set", ("mechanism.l4", "600 mm"), "mechanism.l1, l2, l3, l4", "not a crank-rocker", "shortest"),
     ("with_effect", ("gravty",), "effects", 'unknown effect "gravty"', '"gravity"'),
     ("without_effect", ("resist",), "effects", 'unknown effect "resist"', '"resistance"'),
@@ -208,8 +212,8 @@ FILES = [
 
 
 def told(error, file, key, problem, remedy, given=None):
-    """Check one message: one printable line with all its parts."""
-    message = str(error)
+    """Check one message, the worst of them: one printable line with all its parts."""
+    message = str(error).split("\n")[0]
     assert message.isprintable(), message
     assert len(message) < 1500
     assert message.startswith(file)
@@ -324,6 +328,90 @@ def test_there_are_enough_distinct_mistakes():
     assert len(problems) >= 60
 
 
+EIGHT = [
+    ("bounds", {"l2": {"min": "30 mm", "max": "20 mm"}, "l3": "1,5 mm"}, ["bounds.l2", "bounds.l3"]),
+    ("mechanism", {"L4": "166 mm", "l1": "28 mn"}, ["mechanism.L4", "mechanism.l1"]),
+    ("operation", {"M0": 745}, ["operation.M0"]),
+    ("effects", {"inertia": {"J4": "1.15 kgm2"}, "resistence": {"pulse": "30 deg"}},
+     ["effects.inertia.J4", "effects.resistence"]),
+    ("limits", {"swing": {"low": "2 deg"}}, ["limits.swing.low"]),
+]  # fmt: skip
+
+
+def test_a_scene_with_eight_mistakes_names_eight_the_worst_first():
+    document, keys = copy.deepcopy(dict(BEATUP.document)), []
+    del document["mechanism"]["l4"]
+    del document["effects"]["resistance"]
+    values: dict[str, object]
+    for table, values, wrong in EIGHT:
+        document[table] = {**document[table], **values}
+        keys += wrong
+    error = caught(scene, document)
+    lines = str(error).split("\n")
+    assert len(lines) == len(error.faults) == len(keys) == 8
+    assert sorted(fault.key for fault in error.faults) == sorted(keys)
+    assert [str(fault.text) for fault in error.faults][1:] == lines[1:]
+    assert error.key == "effects.resistence"  # it hides what the effect's values are
+    assert "Perhaps" in lines[0]
+    hints = {fault.key: fault.remedy for fault in error.faults}
+    assert '"l4"' in hints["mechanism.L4"]
+    assert '"mm"' in hints["mechanism.l1"]
+    assert '"kg*m^2"' in hints["effects.inertia.J4"]
+    assert '"745 N*m"' in hints["operation.M0"]
+
+
+def test_what_is_wrong_elsewhere_does_not_hide_that_the_machine_cannot_work():
+    document = changed("mechanism", "l1", "170 mm")
+    document["mechanism"]["m4"] = "50"
+    document["limits"]["swing"] = {"min": "22 mm"}
+    error = caught(scene, document)
+    assert [fault.key for fault in error.faults] == ["mechanism.l1, l2, l3, l4", "mechanism.m4", "limits.swing.min"]
+
+
+def test_one_mistake_is_told_once():
+    document = changed("effects", "inertia", "J4", "heavy")
+    document["bounds"]["J4"] = {"min": "0.5 kg*m^2", "max": "1 kg*m^2"}
+    document["operation"]["M0"] = "745"
+    document["bounds"]["M0"] = {"min": "0.5 kN*m", "max": "1 kN*m"}
+    keys = [fault.key for fault in caught(scene, document).faults]
+    assert sorted(keys) == ["effects.inertia.J4", "operation.M0"]
+    tables = {name: copy.deepcopy(table) for name, table in BEATUP.document.items()}
+    tables["mechnism"] = tables.pop("mechanism")
+    assert [fault.key for fault in caught(scene, tables).faults] == ["mechnism"]
+
+
+def test_many_mistakes_are_told_in_part_and_soon():
+    many = {f"x{n}": "1 mm" for n in range(20_000)}
+    error = caught(scene, changed("mechanism", {**BEATUP.document["mechanism"], **many}))
+    lines = str(error).split("\n")
+    assert len(lines) == 21
+    assert lines[-1].startswith("and 80 more")
+
+
+def test_an_error_of_several_mistakes_pickles():
+    error = caught(scene, changed("mechanism", REMOVED))
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error)
+    assert len(again.faults) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "meant"),
+    [
+        ("28 mn", "length", "mm"), ("28 MM", "length", "mm"), ("1.15 kgm2", "inertia", "kg*m^2"),
+        ("1.15 Kg m²", "inertia", "kg*m^2"), ("745 nm", "torque", "N*m"), ("30 Deg", "angle", "deg"),
+        ("30 dge", "angle", "deg"), ("600 RPM", "angular speed", "rpm"), ("3 n/mm", "stiffness", "N/mm"),
+        ("62 rad", "angular speed", "rad/s"), ("2 Mpa", "pressure", "MPa"), ("31 kg", "length", ""),
+        ("31 s", "length", ""), ("80 mN", "torque", ""),
+    ],
+)  # fmt: skip
+def test_a_unit_s_hint_knows_dimension_and_case(text, kind, meant):
+    with pytest.raises(QuantityError) as found:
+        Quantity(kind).validate(text)
+    hint = re.search('Perhaps "(.*?)" is meant', found.value.remedy)
+    assert (hint[1] if hint else "") == meant
+
+
 def test_a_long_message_is_shortened():
     error = caught(scene, changed("mechanism", "l1", "x" * 100_000))
     assert len(str(error)) < 500
@@ -334,3 +422,26 @@ def test_a_long_message_is_shortened():
 def test_a_number_beyond_a_tables_own_bounds_says_what_is_allowed(turns, said):
     with pytest.raises(BadInput, match=rf"turns: .*{said}.*Allowed: a whole number, at least 1, at most 10000\."):
         load("shedding").change({"effects.separation.turns": turns}, ["separation"], [])
+
+
+def test_a_key_without_its_table_is_told_where_it_may_stand():
+    error = caught(BEATUP.update, {"l1": "30 mm", "j4": "1 kg*m^2", "swing": "23 deg"})
+    assert [fault.key for fault in error.faults] == ["l1", "j4", "swing"]
+    remedies = [fault.remedy.partition(": ")[2] for fault in error.faults]
+    assert remedies == ["mechanism.l1 or bounds.l1", "effects.inertia.J4", "limits.swing.min or limits.swing.max"]
+    assert '"l1"' in caught(BEATUP.free, ["L1"]).remedy
+
+
+def test_a_file_that_is_not_there_is_told_the_near_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my-bu.toml").write_text(TEXT)
+    (tmp_path / "first-answer.json").write_text("{}")
+    told(caught(load, "my_bu.toml"), "my_bu.toml", "", "no such file", '"my-bu.toml"')
+    told(caught(load, "My-bu"), "My-bu", "", "no packaged scene", '"my-bu.toml"')
+    assert "first-answer.json" in caught(designs.loaded, tmp_path / "first_answer.json").remedy
+    assert "my-bu" not in caught(load, "press.toml").remedy
+    wish = (packaged.problems()["rapier"].parent / "rapier-wish.csv").read_text()
+    (tmp_path / "rapier-wish.csv").write_text(wish)
+    (tmp_path / "r.toml").write_text(packaged.problems()["rapier"].read_text("utf-8"))
+    rapier = load("r.toml").set("targets.match.table", "rapier_wish.csv")
+    assert '"rapier-wish.csv"' in caught(find("rapier").demand, rapier, "match").remedy

@@ -220,7 +220,7 @@ def run(arguments: list[str] | None = None) -> int:
     except typer.Exit as error:
         status = error.exit_code
     except BadInput as error:
-        remark(f"loomopt: {worded(error)}")
+        remark("\n".join(f"loomopt: {line}" for line in str(worded(error)).split("\n")))
         return BAD_INPUT
     except CommandLineError as error:
         remark(f"loomopt: {mistake(error)}")

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, refusal
+from loomopt.base.errors import BadInput, Faults, refusal
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
-from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults
+from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, required
 from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs
@@ -41,7 +41,7 @@ class Together(NamedTuple):
 
 def known(scene: Scene) -> dict[Effect, Table]:
     """Return the effects of [effects] and [available] with their values, in the order of the job."""
-    off = read(scene.document.get("available", {}), scene.schema, scene.origin, "available")
+    off = read(scene.document.get("available", {}), scene.schema, scene.origin, "available", Faults())
     found = {**off, **dict(zip(scene.active, scene.effects.values(), strict=True))}
     order = list(scene.schema.effects)
     return dict(sorted(found.items(), key=lambda pair: (order.index(pair[0].path[0]), pair[0].name)))
