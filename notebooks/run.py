@@ -68,6 +68,8 @@ def executed(path: Path) -> NotebookNode:
     notebook.metadata = nbformat.from_dict(METADATA)
     for cell in notebook.cells:
         cell.metadata = {}
+        if "outputs" in cell:  # progress is an empty line in the end, and there where a cell has taken a second
+            cell.outputs = [each for each in cell.outputs if each.get("data") != {"text/plain": ""}]
         for output in cell.get("outputs", ()):
             output.metadata = {}
             _clean(output.get("data", {}))

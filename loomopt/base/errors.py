@@ -118,6 +118,10 @@ class Faults:
         if self.found:
             raise self.told()
 
+    def _render_traceback_(self) -> list[str]:
+        """Return what Jupyter and IPython show in place of a traceback: the sentence."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450
 _MOST_FILES = 1000

@@ -70,6 +70,7 @@ def solve(
     objective, in at most so many seconds (`answer.global_bound`). on_iteration(number), on_start(number, of),
     on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
+    from loomopt.interface.cli.shell import below_cell
     from loomopt.solving import engine
 
     own = _scene(scene)
@@ -79,21 +80,22 @@ def solve(
     arguments.flag(prove, "prove")
     if near is not None and not isinstance(near, solution.Solution):
         raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
-    found = engine.solve(
-        own,
-        target,
-        accuracy=accuracy,
-        starts=starts,
-        seed=seed,
-        near=[near.point] if near and near.point else [],
-        prove=prove,
-        global_proof=GlobalProof(gap, seconds, on_step or (lambda text: None))
-        if arguments.flag(everywhere, "everywhere")
-        else None,
-        on_iteration=on_iteration,
-        on_start=on_start,
-        on_step=on_step,
-    )
+    arguments.flag(everywhere, "everywhere")
+    with below_cell() as say:
+        told = on_step or say
+        found = engine.solve(
+            own,
+            target,
+            accuracy=accuracy,
+            starts=starts,
+            seed=seed,
+            near=[near.point] if near and near.point else [],
+            prove=prove,
+            global_proof=GlobalProof(gap, seconds, told or (lambda text: None)) if everywhere else None,
+            on_iteration=on_iteration,
+            on_start=on_start,
+            on_step=told,
+        )
     return results.solved(found, own)
 
 
@@ -116,10 +118,14 @@ def prove(
     the job's default without one. slack: what binding limits leave open, relative to each quantity's largest magnitude
     over the cycle. Raises BadInput.
     """
+    from loomopt.interface.cli.shell import below_cell
     from loomopt.solving.proof import whole_cycle
 
     own = _scene(scene)
-    return whole_cycle.prove(own, _design(design, own), target, slack)
+    with below_cell() as say:
+        if say:
+            say("proving")
+        return whole_cycle.prove(own, _design(design, own), target, slack)
 
 
 def simulate(

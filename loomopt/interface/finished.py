@@ -1,7 +1,9 @@
 """A finished study to work with: its rows as a table, a figure and files, and the whole answer of any row."""
 
+import contextlib
+import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,6 +13,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.base.records import lazy
 from loomopt.interface import study_table
+from loomopt.interface.cli.shell import below_cell
 from loomopt.interface.results import PICTURE, Answer, solved
 from loomopt.scenes.scene import Scene
 from loomopt.studies.effects import study
@@ -124,7 +127,8 @@ def conducted(
     if store is None:
         if resume:
             raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
-        return DesignStudy(study, run.run(study, executor, None, on_row))
+        with _told(lambda count: counted(study, count), on_row) as kept:
+            return DesignStudy(study, run.run(study, executor, None, kept))
     with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
         known = len(opened.rows(study.key))
         if known and not resume:
@@ -132,7 +136,26 @@ def conducted(
             remedy = "Resume (--resume, or resume=True), or name another file"
             raise refusal(problem, str(store), "store", remedy=remedy)
         opened.begin(study.key, study_identity(study))
-        return DesignStudy(study, run.run(study, executor, opened, on_row))
+        with _told(lambda count: counted(study, count), on_row) as kept:
+            return DesignStudy(study, run.run(study, executor, opened, kept))
+
+
+@contextlib.contextmanager
+def _told(said: Callable[[int], str], on_row: run.OnRow | None) -> Iterator[run.OnRow | None]:
+    """Yield what is called with each row: `on_row`, and in Jupyter what says below the cell how many there are."""
+    with below_cell() as say:
+        if say is None:
+            yield on_row
+            return
+        numbers = itertools.count(1)
+        say(said(0))
+
+        def kept(row: Row) -> None:
+            say(said(next(numbers)))
+            if on_row:
+                on_row(row)
+
+        yield kept
 
 
 def _check_hook(on_row: object) -> None:
@@ -205,4 +228,5 @@ def conducted_effects(
     Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     _check_hook(on_row)
-    return concluded_effects(study, run.run(study, who(executor, count), None, on_row))
+    with _told(lambda count: f"{count} solved" if count else "solving with all effects on", on_row) as kept:
+        return concluded_effects(study, run.run(study, who(executor, count), None, kept))

@@ -148,7 +148,7 @@ class Answer(Evaluation, solution.Solution):
 
     @property
     def _outcome(self) -> str:
-        return self.status
+        return self.outcome
 
     @property
     def _summary(self) -> str:

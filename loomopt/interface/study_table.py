@@ -102,7 +102,7 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
 
     made = columns(study, rows, si)
     cells: dict[str, object] = {c.heading: _floats(c) for c in (*made["place"], *made["sought"])}
-    cells |= {"status": [row.status for row in rows], "certified": [row.certified for row in rows]}
+    cells |= {"status": [row.outcome for row in rows], "certified": [row.certified for row in rows]}
     for part in ("design", "figures", "multipliers"):
         cells |= {column.heading: _floats(column) for column in made[part]}
     for name in dict.fromkeys(name for row in rows for name in row.reached):

@@ -168,6 +168,12 @@ class Goal(NamedTuple):
         return value is not None and self.low - slack <= value <= self.high + slack
 
 
+def shortfall(reached: Mapping[str, bool]) -> str:
+    """Return the goals that are missed, in words: "M3_fdc not reached"; "" for none. reached: goal → whether it is."""
+    missed = [name for name, met in reached.items() if not met]
+    return f"{' and '.join(missed)} not reached" if missed else ""
+
+
 def goals(limits: Iterable[Limit]) -> tuple[Goal, ...]:
     """Return limits that a target asks for by itself as goals of the figures they are named after, as closely held."""
     sides: dict[str, list[Limit]] = {}

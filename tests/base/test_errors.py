@@ -30,6 +30,11 @@ def test_what_is_short_is_said_as_it_is():
     assert (error.file, error.key, error.value) == ("a.toml", "b.c", "5")
 
 
+def test_in_jupyter_it_is_the_sentence_and_no_traceback():
+    error = BadInput("it is wrong", key="b.c", value="5")
+    assert error._render_traceback_() == ["BadInput: b.c: it is wrong (given: 5)."]
+
+
 def test_a_shortened_text_says_how_long_it_was():
     assert clean("x" * 20, 5) == "xxxxx... (20 characters)"
     assert clean("a\x1b" * 9, 6) == "a\\x1ba... (18 characters)"

@@ -107,3 +107,31 @@ def test_a_certificate_is_not_spoilt_by_a_late_interrupt():
     done = interrupted("solve", "beatup", "--json", at=100_000)
     assert done.returncode == 0
     assert '"status": "optimal"' in done.stdout
+
+
+STOPPED_BY_THE_CLOCK = """
+import os, signal, sys, threading
+from loomopt.interface.cli import app as cli
+from loomopt.solving.nlp import ipopt
+
+genuine, begun = ipopt._no_warning_on_ctrl_c, []
+
+def timed():
+    if not begun:
+        begun.append(1)
+        threading.Timer({after}, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    return genuine()
+
+ipopt._no_warning_on_ctrl_c = timed
+sys.argv = ["loomopt", "solve", "rapier", "--starts", "300"]
+cli.main()
+"""
+"""Ctrl-C arrives so many seconds after the first solve began, whether or not the solver is at work."""
+
+
+@pytest.mark.parametrize("after", [0.05, 0.3, 0.7])
+def test_ctrl_c_is_told_in_one_line_without_the_solvers_own_warning(after):
+    code = STOPPED_BY_THE_CLOCK.format(after=after)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr == "loomopt: stopped; nothing was left half-written.\n"

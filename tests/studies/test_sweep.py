@@ -14,6 +14,9 @@ from support import inch
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
+from loomopt.interface.files import outputs
+from loomopt.interface.text import studies
+from loomopt.interface.text.layout import Grid
 from loomopt.solving.answer.solution import Solution
 from loomopt.studies import sweep
 from loomopt.studies.run import run
@@ -130,6 +133,25 @@ def test_the_table_is_in_the_scenes_units_or_in_si_and_says_once_where_it_comes_
     assert "peak_torque [N*m]" in table._repr_html_()
     assert "peak_torque [N*m]" in serial._repr_html_()
     assert repr(serial) == "<DesignStudy sweep of beatup, balance: 21 of 21 points, 21 certified>"
+
+
+def test_a_row_that_misses_its_goal_is_nowhere_called_optimal_alone(serial):
+    missed = [row for row in serial.rows if abs(row.figures["M3_fdc"]) > 1.0]
+    assert [row.place["operation.M0"] for row in missed] == [600, 615, 630, 645, 660, 675, 885, 900]
+    table = serial.table()
+    for row in serial.rows:
+        said = "optimal but M3_fdc not reached" if row in missed else "optimal"
+        assert table.loc[row.point, "status"] == row.outcome == said
+        assert row.status == "optimal"
+    heading, grid, *_ = studies.parts(serial.study, serial.solved)
+    assert isinstance(grid, Grid)
+    assert heading == "beatup, balance: 21 points, 8 optimal but M3_fdc not reached, 13 optimal"
+    assert [line[-1] for line in grid.lines] == ["M3_fdc not reached" if row in missed else "" for row in serial.rows]
+    assert serial.as_dict()["rows"][0]["reached"] == {"M3_fdc": False}
+    answer = serial.answer(0)
+    assert "optimal but M3_fdc not reached" in repr(answer)
+    assert answer.to_frame()["outcome"].tolist() == ["optimal but M3_fdc not reached"]
+    assert outputs.what(answer).shortfall == "M3_fdc not reached"
 
 
 def test_changes_along_a_sweep_name_the_limits_that_come_and_go(serial):

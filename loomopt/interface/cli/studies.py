@@ -169,6 +169,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     count = None if how.workers is None else read_number("--workers", how.workers, int)
     try:
         with _executor(how.dask, count) as executor, Progress() as progress:
+            progress.say(counted(study, 0))
             found = conducted(study, executor, count, how.store, how.resume, kept)
     except KeyboardInterrupt:
         if rows:

@@ -14,6 +14,7 @@ from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
 from loomopt.interface import tables
 from loomopt.jobs import registry
+from loomopt.model.program import shortfall
 from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
@@ -42,10 +43,11 @@ FOUND = {
 
 
 class DrawnSubject(NamedTuple):
-    """What a drawn design is, in a few words, and the limits that it does not hold."""
+    """What a drawn design is, in a few words, the limits that it does not hold, and what of its goals it misses."""
 
     name: str
     broken: tuple[str, ...] = ()
+    shortfall: str = ""
 
     @property
     def text(self) -> str:
@@ -192,7 +194,8 @@ def plotted(
     panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
     subject = said or DrawnSubject(GIVEN if design else TODAY)
-    title = f"{scene.name}: {subject.name}{', limits not held' if subject.broken else ''}, curves over the cycle"
+    short = ", limits not held" if subject.broken else f", {subject.shortfall}" if subject.shortfall else ""
+    title = f"{scene.name}: {subject.name}{short}, curves over the cycle"
     unit = scene.shown_in("angle")
     drawn: Figure = curves.curves(frame, None, title, view.marks(scene, own), panels, today, view.angle, unit)
     return drawn
@@ -205,9 +208,10 @@ def what(found: Evaluated, target: str | None = None, status: str | None = None)
     """
     broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
     if isinstance(found, Solution):
-        return DrawnSubject(FOUND[found.status].format(found.sought), broken)
+        missed = shortfall(found.reached) if found.status == "optimal" else ""
+        return DrawnSubject(FOUND[found.status].format(found.sought), broken, missed)
     if target and status in FOUND and not (broken and status == "optimal"):
-        return DrawnSubject(FOUND[status].format(target), broken)
+        return DrawnSubject(FOUND[status].format(target), broken, shortfall(found.reached))
     own, scene = flat(found.design), found.scene
     now = registry.of(scene).today(scene) if scene else {}
     return DrawnSubject(TODAY if own.items() <= now.items() else GIVEN, broken)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     """Return the parts of a solved target: sentence, table, what binds, certificate, time."""
     heading = "relaxed" if answer.relaxation else "design"
-    parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.status}"]
+    parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
         parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]

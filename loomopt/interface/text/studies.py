@@ -72,8 +72,8 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     lines = []
     for place, row in enumerate(found.rows):
         cells = ["" if each is None else f"{each:.6g}" for each in (column.shown[place] for column in columns)]
-        lines.append((str(row.point), *cells, "" if row.status == "optimal" else row.status))
-    counts = Counter(row.status for row in found.rows)
+        lines.append((str(row.point), *cells, row.shortfall or ("" if row.status == "optimal" else row.status)))
+    counts = Counter(row.outcome for row in found.rows)
     outcome = ", ".join(f"{count} {status}" for status, count in counts.items())
     whole = study.size is None or len(rows) == study.size
     number = len(found.rows)

@@ -9,6 +9,7 @@ from loomopt.base.quantities import quantity_of
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.units import SI_UNIT, factor, show
 from loomopt.model.limits import CycleLimit, Limit
+from loomopt.model.program import shortfall
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.document import copied
@@ -252,6 +253,12 @@ class Solution(Evaluated):
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
         freeze(self, "design", "figures", "units", "reached", "solver", "time")
+
+    @property
+    def outcome(self) -> str:
+        """What came of it, for people: its status, and of an optimum the goals that it misses."""
+        missed = shortfall(self.reached) if self.status == "optimal" else ""
+        return f"{self.status} but {missed}" if missed else self.status
 
     @lazy
     def before(self) -> Evaluated | None:

@@ -1,9 +1,11 @@
 """How IPOPT is asked to work, and one run of it [Wächter and Biegler, Mathematical Programming 106 (2006)]."""
 
+import contextlib
 import functools
 import math
+import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -190,6 +192,8 @@ class Calls:
 
 STOPPED = frozenset({"NonIpopt_Exception_Thrown", "User_Requested_Stop"})
 """What IPOPT says when its callback raised, or asked it to stop."""
+WARNING, ON_CTRL_C = "CasADi - ", "KeyboardInterruptException"
+"""How CasADi begins a warning, and which one it gives on Ctrl-C: whoever pressed it knows."""
 
 
 class IpoptAnswer(NamedTuple):
@@ -226,7 +230,8 @@ def run(
     if warm:
         arguments |= {"lam_x0": warm.lam_x, "lam_g0": warm.grown(nlp.rows)}
     solver = nlp.solver(bool(warm), calls.settings)
-    said = solver(**arguments)
+    with _no_warning_on_ctrl_c():
+        said = solver(**arguments)
     stats = solver.stats()
     status = str(stats["return_status"])
     if status in STOPPED:
@@ -238,6 +243,40 @@ def run(
     multipliers = Multipliers(nlp.rows, lam_x, lam_g)
     iterations, value = int(stats.get("iter_count", 0)), float(np.asarray(said["f"]).item())
     return IpoptAnswer(status, calls.design(design), reached, multipliers, iterations, value)
+
+
+class _Unwarned:
+    """A stream without CasADi's warning on Ctrl-C, which it writes in pieces; all else passes."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream, self._held = stream, ""
+
+    def write(self, text: str) -> int:
+        """Write a text; of a warning the whole line at its end, or nothing."""
+        line = self._held + text if self._held or text.startswith(WARNING) else ""
+        self._held = "" if line.endswith("\n") else line
+        if self._held or ON_CTRL_C in line:
+            return len(text)
+        self._stream.write(line or text)
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextlib.contextmanager
+def _no_warning_on_ctrl_c() -> Iterator[None]:
+    """Keep CasADi from warning of Ctrl-C, which ends a solve as KeyboardInterrupt anyway."""
+    stream = sys.stderr
+    if stream is None:
+        yield
+        return
+    sys.stderr = unwarned = _Unwarned(stream)
+    try:
+        yield
+    finally:
+        if sys.stderr is unwarned:
+            sys.stderr = stream
 
 
 class IterationCallback:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from loomopt.base.records import freeze
-from loomopt.model.program import Program
+from loomopt.model.program import Program, shortfall
 from loomopt.model.sampling import Extreme
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Solution
@@ -86,6 +86,16 @@ class Row:
             plain = "".join(c if c.isprintable() else " " for c in self.reason)
             object.__setattr__(self, "reason", " ".join(plain.split()))
         freeze(self, "place", "design", "figures", "multipliers", "reached", "warm")
+
+    @property
+    def shortfall(self) -> str:
+        """The goals that a certified row misses, in words: "M3_fdc not reached"; "" for none."""
+        return shortfall(self.reached) if self.certified else ""
+
+    @property
+    def outcome(self) -> str:
+        """What came of it, for people: its status, and the goals that it misses."""
+        return f"{self.status} but {self.shortfall}" if self.shortfall else self.status
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data from which `from_dict` makes the same row, bit by bit."""

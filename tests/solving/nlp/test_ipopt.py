@@ -1,5 +1,6 @@
 """One run of IPOPT: what goes in, what comes out, and what stops it."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -100,3 +101,21 @@ def test_evaluations_are_counted_with_the_nodes_they_look_at(monkeypatch):
         "it did not come to iterate"
     )
     assert current().positions - before == 12, "a program without nodes is one position"
+
+
+def test_casadis_own_warning_on_ctrl_c_is_left_out_and_nothing_else(capsys):
+    pieces = ["CasADi - ", "2026-01-01", ' WARNING("', "KeyboardInterruptException", '") [', "ipopt_nlp.cpp:132", "]\n"]
+    other = ["CasADi - ", "2026-01-01", ' WARNING("', "nlp_f failed", '")', "\n", "start 2 of 9", "\n"]
+    stream = sys.stderr
+    with ipopt._no_warning_on_ctrl_c():
+        for text in (*pieces, *other):
+            sys.stderr.write(text)
+        assert not sys.stderr.isatty()
+    assert sys.stderr is stream
+    assert capsys.readouterr().err == "".join(other)
+
+
+def test_a_closed_stream_stays_closed(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    with ipopt._no_warning_on_ctrl_c():
+        assert sys.stderr is None
