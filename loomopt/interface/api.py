@@ -2,16 +2,17 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
 from loomopt.interface import results
 from loomopt.interface.results import Answer, Evaluation
-from loomopt.jobs.registry import load, scene
+from loomopt.jobs import registry
+from loomopt.jobs.registry import scene
 from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.scenes.designs import Given as Design
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Call, Scene
 from loomopt.solving.answer import solution
 from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_numbers, target_name
 
@@ -26,8 +27,12 @@ if TYPE_CHECKING:
     from loomopt.studies.run.rows import Row
     from loomopt.studies.sweep import Over
 
-Given = Scene | str | os.PathLike[str]
-"""A scene, or what `load` takes: a packaged name or a path."""
+Given = Scene | solution.Evaluated | str | os.PathLike[str]
+"""A scene, an answer in its own scene, or what `load` takes: a packaged name or a path."""
+Loaded = Scene | Evaluation
+"""What `load` returns; a file's name does not tell type checkers which, and most name scenes."""
+if TYPE_CHECKING:
+    Loaded = Scene | Any
 
 __all__ = [
     "Answer",
@@ -43,6 +48,15 @@ __all__ = [
     "solve",
     "sweep",
 ]
+
+
+def load(name_or_path: str | os.PathLike[str]) -> Loaded:
+    """Return the scene of a packaged name or of a TOML file; of an answer's JSON file the answer, in its own scene.
+
+    An answer comes as the `Evaluation` of its design, computed anew. Raises BadInput.
+    """
+    own, design = _opened(name_or_path)
+    return own if design is None else results.evaluated(own, design, None)
 
 
 def solve(
@@ -96,17 +110,17 @@ def solve(
             on_start=on_start,
             on_step=told,
         )
-    return results.solved(found, own)
+    return results.solved(found, own, target or own.call.target)
 
 
 def evaluate(scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None) -> Evaluation:
     """Return figures and limits of a design (SI and rad; today's where it names nothing). Raises BadInput.
 
-    design: a mapping, or an answer, of which the design alone is taken: `answer.evaluate()` takes its scene and target
-    too. target: whose limits, the job's default without one.
+    scene: as `load` takes it; without a design, an answer is judged as it is. design: a mapping, or an answer, of which
+    the design alone is taken. target: whose limits, the answer's own or the job's default without one.
     """
-    own = _scene(scene)
-    return results.evaluated(own, _design(design, own), target)
+    own, given = _request(scene, design)
+    return results.evaluated(own, given, target)
 
 
 def prove(
@@ -121,11 +135,11 @@ def prove(
     from loomopt.interface.cli.shell import below_cell
     from loomopt.solving.proof import whole_cycle
 
-    own = _scene(scene)
+    own, given = _request(scene, design)
     with below_cell() as say:
         if say:
             say("proving")
-        return whole_cycle.prove(own, _design(design, own), target, slack)
+        return whole_cycle.prove(own, given, target, slack)
 
 
 def simulate(
@@ -145,9 +159,9 @@ def simulate(
 
     if accuracy is not None:
         check_numbers(accuracy, 1)
-    own = _scene(scene)
-    name = None if target is None else target_name(own, target)
-    return tables.curves(own, _design(design, own), accuracy, name)
+    own, given = _request(scene, design)
+    name = target_name(own, target) if target or own.call.target else None
+    return tables.curves(own, given, accuracy, name)
 
 
 def sweep(
@@ -236,16 +250,39 @@ def pareto(
 
 
 def _scene(given: Given) -> Scene:
-    """Return a scene that is given as itself, by its name or by its path. Raises BadInput."""
-    return given if isinstance(given, Scene) else load(given)
+    """Return a scene that is given as itself, by its name or by its path; of an answer its own. Raises BadInput."""
+    return _opened(given)[0]
 
 
-def _design(given: Design | solution.Evaluated | None, scene: Scene) -> dict[str, float]:
-    """Return a design, checked; of an answer its design alone; nothing for today's. Raises BadInput."""
+def _opened(given: Given) -> tuple[Scene, dict[str, float] | None]:
+    """Return a scene; of an answer its own, which knows its target, and its design, checked. Raises BadInput."""
     from loomopt.scenes import designs
 
+    if isinstance(given, Scene):
+        return given, None
     if isinstance(given, solution.Evaluated):
-        if given.scene:
-            designs.check_job(given.scene.job, scene, "<answer>")
-        given = given.design
-    return {} if given is None or (isinstance(given, Mapping) and not given) else designs.checked(given, scene)
+        if given.scene is None:
+            raise refusal("the answer knows no scene", "", "scene", remedy="Give the scene it was found for")
+        target = getattr(given, "target", None) or None
+        return given.scene.called(Call(target=target)), designs.checked(given.design, given.scene)
+    if path := registry.answer_path(given):
+        own, handed = registry.answered(path)
+        return own, designs.checked(handed.design, own, own.origin)
+    return registry.load(given), None
+
+
+def _request(scene: Given, design: Design | solution.Evaluated | None) -> tuple[Scene, dict[str, float]]:
+    """Return a scene and a design in it, checked: of an answer its own, where none is given; else today's, as nothing.
+
+    Of an answer given as the design, its design alone. Raises BadInput.
+    """
+    from loomopt.scenes import designs
+
+    own, known = _opened(scene)
+    if isinstance(design, solution.Evaluated):
+        if design.scene:
+            designs.check_job(design.scene.job, own, "<answer>")
+        design = design.design
+    if design is None or (isinstance(design, Mapping) and not design):
+        return own, known or {}
+    return own, designs.checked(design, own)

@@ -69,7 +69,7 @@ class DesignStudy:
         number = arguments.whole(point, "point", allowed, "Choose one of them")
         for task, parent in run.tasks(self.study, self.solved):
             if task.point == number:
-                return solved(self.study.solve(task, parent), self.study.scene_at(number))
+                return solved(self.study.solve(task, parent), self.study.scene_at(number), self.study.target)
         raise refusal("the study has no such point", key="point", origin="", value=point, allowed=allowed)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":

@@ -169,9 +169,9 @@ def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | No
     return _judged(report.evaluate(scene, design, target), scene, target_name(scene, target))
 
 
-def solved(found: solution.Solution, scene: Scene) -> Answer:
-    """Return what a solve says as an object to work with."""
-    return Answer(**_fields(found) | {"scene": scene})
+def solved(found: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
+    """Return what a solve says as an object to work with; target: as the call named it."""
+    return Answer(**_fields(found) | {"scene": scene, "asked": target})
 
 
 def _judged(found: solution.Evaluated, scene: Scene, target: str) -> Evaluation:

@@ -26,6 +26,8 @@ from loomopt.scenes.tables import SceneSchema
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
+    from loomopt.scenes.designs import DesignGiven
+
 JOBS, EFFECTS = "loomopt.jobs", "loomopt.effects"
 """Groups of entry points."""
 HERE = Path(__file__).parent
@@ -205,10 +207,12 @@ def template(name: str) -> str:
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Scene:
-    """Return the scene of a packaged name or of a TOML file. Raises BadInput."""
+    """Return the scene of a packaged name, of a TOML file or of an answer's JSON file. Raises BadInput."""
     given = arguments.path(name_or_path, "scene", "a name that `loomopt list` shows, or a path", "Name a scene")
     if packaged.is_path(name_or_path):
         path = Path(given)
+        if answer_path(name_or_path):
+            return answered(path)[0]
         return _read(path, path.name if path.stem == given else given)
     own = packaged.problems()
     if given in own:
@@ -217,6 +221,18 @@ def load(name_or_path: str | os.PathLike[str]) -> Scene:
     if given in others:
         return _read(others[given], str(others[given]))
     raise packaged.unknown_problem(given, own | others, faults)
+
+
+def answer_path(given: object) -> Path | None:
+    """Return the path of an answer's JSON file; None for anything else."""
+    return Path(given) if isinstance(given, str | os.PathLike) and str(given).endswith(".json") else None
+
+
+def answered(path: Path) -> "tuple[Scene, DesignGiven]":
+    """Return the scene that an answer in a JSON file was found in, and what it brings. Raises BadInput."""
+    from loomopt.scenes import designs
+
+    return designs.read_answer(path, REGISTERED)
 
 
 def _read(path: Path, origin: str) -> Scene:

@@ -45,15 +45,9 @@ def read(
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
     unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be.
     """
-    path = scene.paths.located(given, key, scene.origin)
+    held = scene.paths.text(key)
     try:
-        if not path.is_file():
-            problem = "the table cannot be read: there is no such file"
-            near = near_file(path)
-            remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
-            raise refusal(problem, scene.origin, key, given, remedy=remedy)
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_FILE + 1)
+        raw = _bytes(scene, given, key) if held is None else held.encode()
         if len(raw) > LARGEST_FILE:
             raise refusal("the table is too large", given, allowed="up to 1 MB", remedy="Thin it out")
         lines = io.StringIO(raw.decode("utf-8-sig"), newline=None)
@@ -69,6 +63,18 @@ def read(
         remedy = "Write short cells, and close every quotation mark on its own line"
         raise refusal("the table is not CSV", given, allowed=header(kinds), remedy=remedy) from None
     return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+
+
+def _bytes(scene: Scene, given: str, key: str) -> bytes:
+    """Return what stands in a file, a byte more than may at most. Raises BadInput where there is none, and OSError."""
+    path = scene.paths.located(given, key, scene.origin)
+    if not path.is_file():
+        problem = "the table cannot be read: there is no such file"
+        near = near_file(path)
+        remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
+        raise refusal(problem, scene.origin, key, given, remedy=remedy)
+    with path.open("rb") as file:
+        return file.read(LARGEST_FILE + 1)
 
 
 def header(kinds: Mapping[str, str]) -> str:

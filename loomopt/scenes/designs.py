@@ -2,16 +2,18 @@
 
 import math
 import re
+import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from loomopt.base.errors import BadInput, Faults, clean, misread, near_file, refusal, shown, unknown
 from loomopt.base.quantities import Quantity, described, quantity_of
+from loomopt.base.records import Frozen
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.physics.effects.kinds import label
-from loomopt.scenes.document import Paths, looked_up
-from loomopt.scenes.scene import Scene, build
+from loomopt.scenes.document import Paths, copied, looked_up
+from loomopt.scenes.scene import Call, Jobs, Scene, build
 
 LARGEST_FILE = 1_000_000
 """Bytes; an answer has a few thousand."""
@@ -35,23 +37,21 @@ _GIVE_FILE = "Give the JSON that `loomopt solve --json` prints, or its design ob
 
 def read(path: Path, scene: Scene) -> dict[str, float]:
     """Return the design in a JSON file, SI and rad, by design variable. Raises BadInput."""
-    data = loaded(path)
-    return checked(data["design"] if isinstance(data, dict) and "design" in data else data, scene, str(path))
+    return checked(read_given(path).design, scene, named(path))
+
+
+def named(path: Path) -> str:
+    """Return what messages call the file of a design."""
+    return "standard input" if str(path) == PIPE else clean(str(path))
 
 
 def loaded(path: Path) -> object:
-    """Return what a JSON file of a design or an answer holds, unchecked. Raises BadInput."""
+    """Return what a JSON file of a design or an answer holds, unchecked; of `-` the pipe. Raises BadInput."""
     import json
 
-    origin = str(path)
+    origin = named(path)
     try:
-        if not path.is_file():
-            what = "it is no ordinary file" if path.exists() else "there is no such file"
-            near = near_file(path)
-            remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
-            raise refusal(f"the design cannot be read: {what}", origin, remedy=remedy)
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_FILE + 1)
+        raw = _piped() if str(path) == PIPE else _filed(path)
         if len(raw) > LARGEST_FILE:
             raise refusal("the file is too large for a design", origin, allowed="up to 1 MB", remedy=_GIVE_FILE)
         found: object = json.loads(raw.decode("utf-8-sig"), object_pairs_hook=lambda pairs: _once(pairs, origin))
@@ -63,6 +63,26 @@ def loaded(path: Path) -> object:
     except (ValueError, RecursionError):
         raise refusal("the file is not JSON", origin, remedy=_GIVE_FILE) from None
     return found
+
+
+def _filed(path: Path) -> bytes:
+    """Return the bytes of a file, one more than allowed at most. Raises BadInput for what is no file."""
+    if not path.is_file():
+        what = "it is no ordinary file" if path.exists() else "there is no such file"
+        near = near_file(path)
+        remedy = f'Perhaps "{near}" is meant' if near else "Correct the path"
+        raise refusal(f"the design cannot be read: {what}", str(path), remedy=remedy)
+    with path.open("rb") as file:
+        return file.read(LARGEST_FILE + 1)
+
+
+def _piped() -> bytes:
+    """Return the bytes of a pipe, one more than allowed at most. Raises BadInput where nothing comes through it."""
+    raw = b"" if sys.stdin is None else sys.stdin.buffer.read(LARGEST_FILE + 1)
+    if not raw.strip():
+        remedy = "Pipe an answer in: loomopt solve PROBLEM --json | loomopt evaluate PROBLEM --design -"
+        raise refusal("nothing came through the pipe", named(Path(PIPE)), remedy=remedy)
+    return raw
 
 
 def _once(pairs: Sequence[tuple[str, object]], origin: str) -> dict[str, object]:
@@ -204,50 +224,101 @@ def _fits(quantity: Quantity, value: float) -> bool:
 
 MOST_TOLD, LONGEST_TOLD = 8, 200
 """Changes that are told one by one: more are another scene altogether, and their number says so; characters of one."""
+PIPE = "-"
+"""What a design's file is called that comes through a pipe."""
 
 
 class DesignGiven(NamedTuple):
-    """What a design file brings: a design, unchecked; the scene it holds in; an answer's target and status."""
+    """What a design file brings: a design, unchecked; of a whole answer more.
+
+    call: what its call changed in its scene; target, status: its own; document: the tables it was found in; files: the
+    text of those that these name.
+    """
 
     design: object
-    scene: Scene
+    call: Call = Call()
     target: str | None = None
     status: str | None = None
+    document: Mapping[str, Any] | None = None
+    files: Mapping[str, str] = Frozen()
 
 
-def read_given(path: Path, scene: Scene) -> DesignGiven:
-    """Return what a design file brings; a design alone holds in `scene`, a whole answer in its own. Raises BadInput."""
-    data = loaded(path)
+def read_given(path: Path) -> DesignGiven:
+    """Return what the file of a design or of a whole answer brings. Raises BadInput."""
+    data, origin = loaded(path), named(path)
     if not isinstance(data, dict) or "design" not in data:
-        return DesignGiven(data, scene)
-    target, own = data.get("target"), data.get("scene")
+        return DesignGiven(data)
+    target, status, own = data.get("target"), data.get("status"), data.get("scene")
     if target is not None and not isinstance(target, str):
-        raise refusal("the target is no name", str(path), "target", target, remedy="Correct it or take it out")
-    status = data.get("status")
-    whole = scene if own is None else _resumed(own, scene, str(path))
-    return DesignGiven(data["design"], whole, target, status if isinstance(status, str) else None)
-
-
-def _resumed(own: object, scene: Scene, origin: str) -> Scene:
-    """Return the scene of an answer as one of the file that `scene` was read from. Raises BadInput."""
-    key = "scene.document"
+        raise refusal("the target is no name", origin, "target", target, remedy="Correct it or take it out")
+    status = status if isinstance(status, str) else None
+    if own is None:
+        return DesignGiven(data["design"], Call(target=target), target, status)
     document = own.get("document") if isinstance(own, Mapping) else None
     if not isinstance(document, Mapping):
         remedy = "Give the answer as it was printed, or its design object alone"
+        key = "scene.document"
         raise refusal("the answer's scene has no tables", origin, key, allowed="a scene's tables", remedy=remedy)
-    check_job(looked_up(document, ("problem", "job")), scene, origin)
-    if document == scene.document:
-        return scene
+    call = _call(own["call"], origin) if "call" in own else Call(target=target)
+    files = own.get("files", {})
+    if not isinstance(files, Mapping) or not all(isinstance(text, str) for text in files.values()):
+        raise refusal(
+            "the answer's files are no texts", origin, "scene.files", remedy="Give the answer as it was printed"
+        )
+    return DesignGiven(data["design"], call, target, status, document, Frozen(files))
+
+
+def _call(told: object, origin: str) -> Call:
+    """Return what the call of an answer changed. Raises BadInput."""
+    entries = told if isinstance(told, Mapping) else {"": told}
+    names = [entries.get(name, []) for name in ("with", "without", "free")]
+    values, target = entries.get("set", {}), entries.get("target")
+    listed = all(isinstance(each, list) and all(isinstance(name, str) for name in each) for each in names)
+    if "" in entries or not listed or not isinstance(values, Mapping) or not isinstance(target, str | None):
+        remedy = "Give the answer as it was printed, or its design object alone"
+        allowed = "set: keys and values; with, without, free: names; target: a name"
+        raise refusal("it does not say what a call changes", origin, "scene.call", allowed=allowed, remedy=remedy)
+    on, off, free = map(tuple[str, ...], names)
+    return Call(copied(values, origin), on, off, free, target)
+
+
+def read_answer(path: Path, jobs: Jobs) -> tuple[Scene, DesignGiven]:
+    """Return the scene that an answer in a file was found in, and what it brings. Raises BadInput."""
+    given, origin = read_given(path), named(path)
+    if given.document is None:
+        remedy = "Give what `loomopt solve --json` prints; a design alone goes with a scene: --design"
+        raise refusal("it is no answer with its scene", origin, remedy=remedy)
+    call = given.call.then(Call(target=given.target))
     try:
         # Somebody else may have made the file: what it names is bound as what a scene file names.
-        paths = Paths(scene.paths.folder or Path(origin).resolve().parent)
-        return build(document, scene.jobs, scene.origin, paths)
+        return build(given.document, jobs, origin, Paths(path.absolute().parent, texts=given.files), call), given
     except BadInput as error:
         faults = Faults()
         for each in error.faults:
             told = {"allowed": each.allowed, "remedy": each.remedy}
-            faults.add(refusal(each.problem, origin, f"{key}.{each.key}", **told, grade=each.grade))
+            faults.add(refusal(each.problem, origin, f"scene.document.{each.key}", **told, grade=each.grade))
         raise faults.told() from None
+
+
+def resumed(given: DesignGiven, scene: Scene, later: Call, origin: str) -> Scene:
+    """Return a scene with what an answer's call changed in its own, then a later call. Raises BadInput.
+
+    All else is as `scene` has it; a path that the answer's call has set is bound as one that a scene file names.
+    """
+    if given.document is not None:
+        check_job(looked_up(given.document, ("problem", "job")), scene, origin)
+    try:
+        return scene.called(given.call.then(later), later.set)
+    except BadInput as error:
+        scene.called(later, later.set)  # which raises its own fault
+        remedy = f"{error.remedy.rstrip('.')}; or give its design object alone"
+        raise refusal(
+            f"what the answer's call changed cannot be: {error.problem}",
+            origin,
+            f"scene.call: {error.key}",
+            allowed=error.allowed,
+            remedy=remedy,
+        ) from None
 
 
 def check_job(job: object, scene: Scene, origin: str) -> None:
@@ -258,18 +329,63 @@ def check_job(job: object, scene: Scene, origin: str) -> None:
         raise refusal(f"the answer is one of job {told}, the scene one of {scene.job}", origin, remedy=remedy)
 
 
-def scene_changes(scene: Scene, own: Scene) -> list[str]:
-    """Return what an answer's own scene has otherwise than `scene`, in words; nothing where both are the same."""
-    told = [f"{name} on" for name in own.effects if name not in scene.effects]
-    told += [f"{name} off" for name in scene.effects if name not in own.effects]
-    before, after = dict(document_values(scene.document)), dict(document_values(own.document))
+def scene_changes(scene: Scene, given: DesignGiven, origin: str, besides: Call) -> list[str]:
+    """Return what a scene has otherwise than an answer's own, in words; nothing where both are the same.
+
+    origin: what the answer's file is called; besides: what a call has changed in the scene, which is not told.
+    """
+    if given.document is None:
+        return []
+    here, there = _on(scene.document, scene), _on(given.document, scene)
+    told = [f"{name} on" for name in here if name not in (*there, *besides.on)]
+    told += [f"{name} off" for name in there if name not in (*here, *besides.off)]
+    after, before = dict(document_values(scene.document)), dict(document_values(given.document))
     for key in dict.fromkeys([*before, *after]):
-        if before.get(key) == after.get(key):
+        if before.get(key) == after.get(key) or _is_of(besides, key):
             continue
-        was = f" ({clean(scene.origin, 80)}: {_text(before[key])})" if key in before else ""
+        was = f" ({clean(origin, 80)}: {_text(before[key])})" if key in before else ""
         told.append(f"{key} = {_text(after[key])}{was}" if key in after else f"{key} left out{was}")
+    if given.files:
+        from loomopt.scenes.numbers import tables
+
+        now = {key: text for key, text in tables(scene).items() if not _is_of(besides, key)}
+        told += [f"{key} with other rows" for key, text in given.files.items() if now.get(key, text) != text]
+    return _shortened(told)
+
+
+def _shortened(told: Sequence[str]) -> list[str]:
     short = [clean(each, LONGEST_TOLD) for each in told[:MOST_TOLD]]
     return short if len(told) <= MOST_TOLD else [*short, f"and {len(told) - MOST_TOLD} more"]
+
+
+def _is_of(call: Call, key: str) -> bool:
+    """Say whether a call has set a key, or a table in which it stands, or has freed its bound."""
+    return any(f"{key}.".startswith(f"{each}.") for each in (*call.set, *(f"bounds.{name}.free" for name in call.free)))
+
+
+def _on(document: Mapping[str, Any], scene: Scene) -> list[str]:
+    """Return the effects that raw tables have on, each instance by its own name."""
+    found: list[str] = []
+    table = document.get("effects")
+    for name, own in table.items() if isinstance(table, Mapping) else ():
+        effect = scene.schema.effects.get(name)
+        many = effect is not None and effect.many and isinstance(own, Mapping)
+        found += [f"{name}.{each}" for each in own] if many else [str(name)]
+    return found
+
+
+def remark(scene: Scene, given: DesignGiven, later: Call, changes: Sequence[str], origin: str) -> str:
+    """Return in words what an answer brings to a scene beside its design, and what of its own does not count; or "".
+
+    later: what this call changes, which is not told; changes: what `scene_changes` tells.
+    """
+    kept = given.call.then(later).said
+    brought = [text for text in given.call.said if text in kept]
+    told = [f"{origin} brings what its call changed: {', '.join(_shortened(brought))}"] if brought else []
+    told += (
+        [f"{scene.origin} counts where {origin} was found in another scene: {', '.join(changes)}"] if changes else []
+    )
+    return "; ".join(told)
 
 
 def _text(value: object) -> str:

@@ -4,11 +4,12 @@ import functools
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from loomopt.base.errors import BadInput, near_file, refusal, shown
+from loomopt.base.records import Frozen
 
 _LARGEST_FILE = 1_000_000
 _DEEPEST = 8
@@ -154,14 +155,23 @@ def removed(document: Mapping[str, Any], parts: Sequence[str]) -> dict[str, Any]
 
 @dataclass(frozen=True)
 class Paths:
-    """folder: of the scene's file, absolute; None where there is none. own: dotted keys that the caller has set."""
+    """folder: of the scene's file, absolute; None where there is none. own: dotted keys that the caller has set.
+
+    texts: of files that came with the scene, by the dotted key under which it names them.
+    """
 
     folder: Path | None = None
     own: frozenset[str] = frozenset()
+    texts: Mapping[str, str] = field(default_factory=Frozen)
 
     def set_by_caller(self, keys: Iterable[str]) -> "Paths":
         """Return the same with more keys that the caller has set."""
-        return Paths(self.folder, self.own | {_on(key) for key in keys})
+        own = self.own | {_on(key) for key in keys}
+        return Paths(self.folder, own, self.texts)
+
+    def text(self, key: str) -> str | None:
+        """Return the text of a file that came with the scene; None where it did not, or the caller names another."""
+        return None if self._is_own(_on(key)) else self.texts.get(_on(key))
 
     def located(self, given: str, key: str, origin: str) -> Path:
         """Return where a file lies that stands under a dotted key. Raises BadInput for one that a scene may not name.

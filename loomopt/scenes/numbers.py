@@ -68,13 +68,30 @@ def files(scene: Scene) -> dict[str, str]:
     """Return the SHA-256 of every file that a scene names, by the dotted key of its name."""
     import hashlib
 
-    found = {}
-    for key, text in _texts({name: own for name, own in scene.document.items() if name not in WITHOUT_FILES}):
-        with contextlib.suppress(BadInput, OSError, ValueError):  # what can be no file's name is none
-            path = scene.paths.located(text, key, scene.origin)
-            if path.is_file():
-                found[key] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return {key: hashlib.sha256(raw).hexdigest() for key, raw in _contents(scene)}
+
+
+def tables(scene: Scene) -> dict[str, str]:
+    """Return the text of every table in a CSV file that a scene names, by the dotted key of its name; no huge one's."""
+    found: dict[str, str] = {}
+    for key, raw in _contents(scene, ".csv"):
+        with contextlib.suppress(UnicodeDecodeError):
+            found |= {key: raw.decode("utf-8-sig")} if len(raw) <= LARGEST_TABLE else {}
     return found
+
+
+def _contents(scene: Scene, ending: str = "") -> Iterator[tuple[str, bytes]]:
+    """Yield what stands in every file that a scene names, or that came with it, by the dotted key of its name."""
+    for key, text in _texts({name: own for name, own in scene.document.items() if name not in WITHOUT_FILES}):
+        if not text.lower().endswith(ending):
+            continue
+        with contextlib.suppress(BadInput, OSError, ValueError):  # what can be no file's name is none
+            held = scene.paths.text(key)
+            path = None if held is not None else scene.paths.located(text, key, scene.origin)
+            if held is not None:
+                yield key, held.encode()
+            elif path and path.is_file():
+                yield key, path.read_bytes()
 
 
 def _texts(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
@@ -85,6 +102,8 @@ def _texts(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tup
             yield ".".join((*path, name)), value
 
 
+LARGEST_TABLE = 200_000
+"""Bytes of a table that goes with an answer: of as many rows as are read, each as long as a row is."""
 MOST_VALUES = 20_000
 """Points of a study."""
 _RANGE = re.compile(r"([^:\s]+) *: *([^:\s]+) *: *([^:\s]+)(?: +(\S.*))?")

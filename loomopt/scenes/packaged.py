@@ -78,7 +78,7 @@ def results_path() -> Path:
 
 
 def is_path(name_or_path: str | os.PathLike[str]) -> bool:
-    """Say whether text is a path: with a separator, or ending in .toml; else it is a packaged name."""
+    """Say whether text is a path: with a separator, or ending in .toml or .json; else it is a packaged name."""
     text = os.fspath(name_or_path)
     separators = {os.sep, os.altsep or os.sep}
-    return isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or bool(separators & set(text))
+    return isinstance(name_or_path, os.PathLike) or text.endswith((".toml", ".json")) or bool(separators & set(text))

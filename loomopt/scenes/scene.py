@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
 from loomopt.base import arguments
 from loomopt.base.errors import MACHINE, SAME, BadInput, Faults, clean, misread, nearest, refusal, shown, unknown
 from loomopt.base.quantities import quantity_of
-from loomopt.base.records import Shown, freeze, lazy
+from loomopt.base.records import Frozen, Shown, freeze, lazy
 from loomopt.base.units import QuantityError, show
 from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
@@ -60,6 +60,50 @@ class Jobs(JobNames, Protocol):
         """Return the equations that a scene really uses."""
 
 
+@dataclass(frozen=True)
+class Call:
+    """What a call changes in a scene: dotted keys set, effects put on, then off, bounds freed; target: as it names."""
+
+    set: Mapping[str, Any] = field(default_factory=Frozen)
+    on: tuple[str, ...] = ()
+    off: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
+    target: str | None = None
+
+    @property
+    def said(self) -> list[str]:
+        """What it changes, in words."""
+        told = [*(f"{name} on" for name in self.on), *(f"{name} off" for name in self.off)]
+        told += [f"{key} = {value if isinstance(value, str) else shown(value)}" for key, value in self.set.items()]
+        return told + [f"{name} free" for name in self.free]
+
+    def then(self, later: "Call") -> "Call":
+        """Return the one call that comes to the same as this one and then a later one."""
+        earlier = {key: value for key, value in self.set.items() if key not in later.set}
+        off = tuple(name for name in self.off if name not in later.on and not later.sets(f"effects.{name}"))
+        free = tuple(name for name in self.free if not {f"bounds.{name}", f"bounds.{name}.free"} & set(later.set))
+        return Call(
+            Frozen({**earlier, **later.set}),
+            _once(*(name for name in self.on if name not in later.off), *later.on),
+            _once(*off, *later.off),
+            _once(*free, *later.free),
+            later.target or self.target,
+        )
+
+    def sets(self, key: str) -> bool:
+        """Say whether it sets a dotted key, or one inside it."""
+        return any(f"{each}.".startswith(f"{key}.") for each in self.set)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        told = {"with": list(self.on), "without": list(self.off), "free": list(self.free), "target": self.target}
+        return {"set": copied(self.set, ""), **told}
+
+
+def _once(*names: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))
+
+
 @dataclass(frozen=True, repr=False)
 class Scene(Shown):
     """One job with all its numbers, SI; whatever changes it returns a new scene or raises BadInput.
@@ -68,7 +112,7 @@ class Scene(Shown):
     operation, mechanism: numbers given or defaulted; tables: both as their models, words and lists too.
     effects: tables of those that are on, in the order of the job, by name; active: the effects themselves.
     bounds: by label of number; limits: by name of figure; targets: every target of the job.
-    paths: where the files lie that it names.
+    paths: where the files lie that it names. call: what was changed since it was read.
     """
 
     document: Mapping[str, Any]
@@ -87,14 +131,15 @@ class Scene(Shown):
     limits: Mapping[str, LimitRange]
     targets: Mapping[str, Table]
     paths: Paths = field(compare=False)
+    call: Call = field(default_factory=Call, compare=False)
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
         freeze(self, "operation", "mechanism", "tables", "effects", "bounds", "limits", "targets")
 
-    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths]]:
+    def __reduce__(self) -> tuple[Callable[..., "Scene"], tuple[Mapping[str, Any], Jobs, str, Paths, Call]]:
         """Return how to make it again: from its tables, for formulas do not pickle."""
-        return build, (self.document, self.jobs, self.origin, self.paths)
+        return build, (self.document, self.jobs, self.origin, self.paths, self.call)
 
     def __repr__(self) -> str:
         on = ", ".join(self.effects) or "none"
@@ -179,10 +224,18 @@ class Scene(Shown):
         """Return the scene with keys set, then effects put on, then effects taken off: only the outcome has to hold."""
         values = arguments.table(values, "values", "key of the scene → its value", 'Write {"operation.M0": "800 N*m"}')
         on, off = (arguments.names(each, "effects", ", ".join(self.schema.effects), _NAMES) for each in (on, off))
-        document = self._off(self._on(self._set(values), on), off)
-        if document is self.document:
-            return self
-        return build(document, self.jobs, self.origin, self.paths.set_by_caller(values))
+        changed = self.called(Call(values, tuple(on), tuple(off)), values)
+        return self if changed.document is self.document else changed
+
+    def called(self, call: Call, own: Iterable[str] = ()) -> "Scene":
+        """Return the scene with what a call changes; own: keys whose paths are the caller's, not the scene's."""
+        document = self._off(self._on(self._set(call.set), call.on), call.off)
+        told = self.call.then(replace(call, set=Frozen(copied(call.set, self.origin)), free=()))
+        if document is not self.document:
+            changed = build(document, self.jobs, self.origin, self.paths.set_by_caller(own), told)
+        else:
+            changed = self if told == self.call else replace(self, call=told)
+        return changed.free(call.free) if call.free else changed
 
     def _set(self, values: Mapping[str, object]) -> Mapping[str, Any]:
         document, faults = self.document, Faults()
@@ -257,7 +310,8 @@ class Scene(Shown):
                 near = nearest(name, [*ranges, *(group for group, of in groups.items() if of)], least=SAME)
                 remedy = f'Perhaps "{near}" is meant' if near else "Give it min and max in [bounds]"
                 raise refusal(f"{name} cannot be freed", self.origin, f"bounds.{name}", allowed=allowed, remedy=remedy)
-        return self.update({f"bounds.{name}.free": True for name in asked})
+        document = self._set({f"bounds.{name}.free": True for name in asked})
+        return build(document, self.jobs, self.origin, self.paths, self.call.then(Call(free=tuple(named))))
 
     def equations(self) -> tuple[Equation, ...]:
         """Return the equations the scene really uses: `name`, `text` and `latex` of each, which Jupyter shows."""
@@ -335,11 +389,13 @@ def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:
     return on if own is None else removed(on, ("available", *effect))
 
 
-def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None) -> Scene:
+def build(
+    document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | None = None, call: Call | None = None
+) -> Scene:
     """Return the scene that raw tables describe; jobs: those it may name; origin: file name, for messages.
 
-    paths: where the files lie that it names; without, they are the caller's own. Raises BadInput that names all that is
-    wrong, the worst first.
+    paths: where the files lie that it names; without, they are the caller's own. call: what made these tables of those
+    that were read. Raises BadInput that names all that is wrong, the worst first.
     """
     original, faults = copied(document, origin), Faults()
     raw: dict[str, Any] = {name: {} for name in TABLES} | original
@@ -384,6 +440,7 @@ def build(document: Mapping[str, Any], jobs: Jobs, origin: str, paths: Paths | N
         limits=read.limits(raw["limits"], schema, tuple(active), origin, faults),
         targets=read.named(raw["targets"], targets, "target", origin, "targets", faults),
         paths=paths or Paths(),
+        call=call or Call(),
     )
     if _judged(scene, faults):
         try:

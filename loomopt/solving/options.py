@@ -66,10 +66,10 @@ def check_global_proof(proof: GlobalProof | None) -> None:
 
 
 def target_name(scene: Scene, target: str | None) -> str:
-    """Return the target's name, the job's default without one."""
+    """Return the target's name; without one that of the answer that the scene is of, else the job's default."""
     if target is not None:
         arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
-    name = target or scene.schema.default_target
+    name = target or scene.call.target or scene.schema.default_target
     if name not in scene.schema.targets:
         near = nearest(name, scene.schema.targets)
         raise BadInput(

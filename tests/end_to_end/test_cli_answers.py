@@ -1,10 +1,13 @@
 """Answers handed from command to command: the machine that was solved, judged by what it was solved for."""
 
+import io
 import json
+import re
 
 import pytest
 
 from loomopt.interface.cli.app import run
+from loomopt.scenes import packaged
 
 GRAVITY = ("--with", "gravity", "--set", "operation.M0=700 N*m")
 TABLED = ("evaluate", "simulate", "prove", "export")
@@ -70,24 +73,121 @@ def test_an_answer_is_read_as_it_was_solved(cli, solved, problem, changes):
     assert found["limits"] == answer["limits"], "judged by what it was solved for"
     for name, value in answer["figures"].items():
         assert found["figures"][name] == (None if value is None else pytest.approx(value, rel=1e-12, abs=1e-9)), name
-    told = any(word.startswith("--") and word != "--target" for word in changes)
-    assert err.count("Remark: the scene is that of a.json: ") == told
+    told = any(word.startswith("--") and word not in ("--target", "--starts") for word in changes)
+    assert err.count("Remark: a.json brings what its call changed: ") == told
+    assert "another scene" not in err
+    alone, err = evaluated(cli, "a.json")
+    assert (alone, "Remark: a.json" in err) == (found, False)
     status, out, _ = cli("prove", problem, "--design", "a.json", "--json")
     assert (status, json.loads(out)["target"]) == (0, answer["target"])
 
 
-def test_the_calls_own_changes_come_last_and_one_remark_lists_both(cli, solved):
+@pytest.fixture
+def file(tmp_path):
+    """Return a call that writes a packaged scene to a file of one's own, with texts in it replaced."""
+
+    def write(name="beatup", place="my.toml", **changes):
+        text = packaged.problems()[name].read_text()
+        for key, value in changes.items():
+            text, count = re.subn(f"^{key} = .*", f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
+            assert count
+        (tmp_path / place).write_text(text)
+        return place
+
+    return write
+
+
+def test_the_file_on_the_command_line_wins_over_the_scene_of_an_answer(cli, solved, file):
+    answer = solved(file())
+    file(M0="600 N*m")
+    found, err = evaluated(cli, "my.toml", "--design", "a.json")
+    assert found["design"] == answer["design"]
+    assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] - 145, abs=1e-6)
+    told = "Remark: my.toml counts where a.json was found in another scene: operation.M0 = 600 N*m (a.json: 745 N*m).\n"
+    assert err == told
+    own, err = evaluated(cli, "a.json")
+    assert (own["figures"], err) == (answer["figures"], "")
+
+
+def test_the_file_of_another_loom_wins_too(cli, solved):
+    solved("beatup")
+    found, err = evaluated(cli, "beatup-light", "--design", "a.json")
+    assert found["problem"] == "beatup-light"
+    assert found["figures"]["M3_fdc"] == pytest.approx(-145, abs=1e-6)
+    assert "problem.name = beatup-light (a.json: beatup)" in err
+    assert "operation.M0 = 600 N*m (a.json: 745 N*m)" in err
+
+
+def test_an_answer_brings_to_another_file_what_its_call_changed_and_nothing_else(cli, solved, file):
+    solved(file(), *GRAVITY, "--target", "torque")
+    file(M0="600 N*m", speed="500 rpm")
+    found, err = evaluated(cli, "my.toml", "--design", "a.json")
+    same, _ = evaluated(cli, "my.toml", "--design", "a.json", "--set", "operation.M0=700 N*m", "--target", "torque")
+    assert found == same
+    assert "gravity" in found["effects"]
+    assert err == (
+        "Remark: a.json brings what its call changed: gravity on, operation.M0 = 700 N*m; "
+        "my.toml counts where a.json was found in another scene: operation.speed = 500 rpm (a.json: 600 rpm).\n"
+    )
+
+
+def test_the_calls_own_changes_come_last(cli, solved):
     answer = solved("beatup", *GRAVITY)
     found, err = evaluated(
         cli, "beatup", "--design", "a.json", "--set", "operation.M0=800 N*m", "--with", "centrifugal"
     )
     assert found["effects"] == [*answer["effects"], "centrifugal"]
     assert found["figures"]["M3_fdc"] == pytest.approx(answer["figures"]["M3_fdc"] + 100, abs=1e-6)
-    (remark,) = [line for line in err.splitlines() if "the scene is that of" in line]
-    assert remark == (
-        "Remark: the scene is that of a.json: gravity on, operation.M0 = 700 N*m (beatup.toml: 745 N*m); "
-        "then, of this call: operation.M0=800 N*m, centrifugal on."
-    )
+    assert err == "Remark: a.json brings what its call changed: gravity on.\n"
+
+
+def test_a_design_comes_through_a_pipe(cli, solved, monkeypatch):
+    answer = solved("beatup", *GRAVITY)
+    for given in (answer, answer["design"]):
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(json.dumps(given).encode())))
+        found, err = evaluated(cli, "beatup", "--design", "-")
+        assert found["design"] == answer["design"]
+        assert err.startswith("Remark: standard input brings") == (given is answer)
+    for stdin in (io.TextIOWrapper(io.BytesIO(b"\n")), None):
+        monkeypatch.setattr("sys.stdin", stdin)
+        status, out, err = cli("evaluate", "beatup", "--design", "-")
+        assert (status, out) == (2, "")
+        assert err.startswith("loomopt: standard input: nothing came through the pipe.")
+
+
+def test_an_answer_stands_in_place_of_a_problem(cli, solved, file, tmp_path):
+    answer = solved(file(), *GRAVITY, "--target", "torque")
+    (tmp_path / "my.toml").unlink()
+    status, out, err = cli("prove", "a.json", "--json")
+    assert (status, json.loads(out)["target"], err) == (0, "torque", "")
+    assert cli("simulate", "a.json", "--out", "c.csv")[0] == 0
+    assert f"# scene_hash: {answer['scene']['hash']}" in (tmp_path / "c.csv").read_text()
+    assert cli("export", "a.json", "--out", "x.svg")[0] == 0
+    assert "best design for torque" in (tmp_path / "x.svg").read_text()
+    status, out, _ = cli("show", "a.json", "--figure", "f.svg", "--equations")
+    assert (status, "gravity" in out) == (0, True)
+    again = solved("a.json", name="b.json")
+    assert (again["target"], again["scene"]["call"]) == ("torque", answer["scene"]["call"])
+    assert again["design"] == pytest.approx(answer["design"], rel=1e-9)
+
+
+def test_show_draws_a_given_design(cli, solved, tmp_path):
+    solved("beatup")
+    for place, design in (("today.svg", ()), ("best.svg", ("--design", "a.json"))):
+        assert cli("show", "beatup", "--figure", place, *design)[0] == 0
+    today, best = ((tmp_path / place).read_text() for place in ("today.svg", "best.svg"))
+    assert "best design for balance" in best
+    assert "best design" not in today
+
+
+def test_bounds_are_freed_on_every_command_of_a_design(cli, solved):
+    scene = ("beatup", "--set", "bounds.l1.free=false")
+    for more, held in (((), True), (("--free", "l1"), False)):
+        found, _ = evaluated(cli, *scene, *more)
+        assert any(limit["name"] == "l1" and limit["min"] == limit["max"] for limit in found["limits"]) == held
+    answer = solved(*scene, "--free", "l1")
+    assert answer["scene"]["call"]["free"] == ["l1"]
+    assert evaluated(cli, "beatup", "--design", "a.json")[0]["limits"] == answer["limits"]
 
 
 def test_setting_an_effects_value_changes_it_and_only_without_takes_the_effect_off(cli, solved):
@@ -99,7 +199,7 @@ def test_setting_an_effects_value_changes_it_and_only_without_takes_the_effect_o
     assert other["effects"] == answer["effects"]
     off, err = evaluated(cli, "beatup", "--design", "a.json", "--without", "gravity")
     assert off["effects"] == ["inertia", "resistance"]
-    assert err.endswith("then, of this call: gravity off.\n")
+    assert err == "Remark: a.json brings what its call changed: operation.M0 = 700 N*m.\n"
 
 
 def test_an_unchanged_answer_needs_no_remark(cli, solved):
@@ -107,10 +207,10 @@ def test_an_unchanged_answer_needs_no_remark(cli, solved):
     assert evaluated(cli, "beatup", "--design", "a.json", "--set", "operation.speed=500 rpm")[1] == ""
 
 
-@pytest.mark.parametrize("command", TABLED)
+@pytest.mark.parametrize("command", [*TABLED, "show"])
 def test_an_answer_of_another_job_is_refused(cli, solved, command, tmp_path):
     solved("shedding-static")
-    out = ("--out", "x.svg") if command == "export" else ()
+    out = {"export": ("--out", "x.svg"), "show": ("--figure", "x.svg")}.get(command, ())
     status, shown, err = cli(command, "beatup", "--design", "a.json", *out)
     assert (status, shown) == (2, "")
     assert err.startswith("loomopt: a.json: the answer is one of job shedding, the scene one of beatup.")

@@ -128,6 +128,7 @@ def accuracy(
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
     full: Annotated[bool, typer.Option("--full", help="More settings, more repeats: minutes.")] = False,
     as_json: Json = False,
     out: Annotated[
@@ -142,7 +143,7 @@ def accuracy(
 
     for path in out or ():
         accuracy.check(path)
-    scene = read_scene(problem, sets, on, off)
+    scene = read_scene(problem, sets, on, off, free)
     climbs: list[study.Climb] = []
     try:
         with Progress() as progress:

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from loomopt.base.errors import BadInput
-from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_request, read_scene, remark
+from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_request, remark
 
 if TYPE_CHECKING:
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Evaluated
 
-Problem = Annotated[str, typer.Argument(help="A packaged scene (see `loomopt list`) or the path of a TOML scene.")]
+Problem = Annotated[
+    str, typer.Argument(help="A packaged scene (see `loomopt list`), the path of a TOML scene, or an answer's JSON.")
+]
 Set = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Set a scene key by its dotted path.")
 ]
@@ -22,7 +24,9 @@ With = Annotated[list[str] | None, typer.Option("--with", metavar="EFFECT", help
 Without = Annotated[list[str] | None, typer.Option("--without", metavar="EFFECT", help="Take an effect off.")]
 Free = Annotated[list[str] | None, typer.Option("--free", metavar="NAMES", help="Free bounds that are held.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Design = Annotated[Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON.")]
+Design = Annotated[
+    Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
+]
 
 Target = Annotated[
     str | None, typer.Option(help="Whose limits count; the answer's own, or the job's default, without it.")
@@ -108,17 +112,21 @@ def show(
     symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
     sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
     figure: Annotated[list[Path] | None, typer.Option(metavar="F", help="Draw it: .png, .svg or .pdf.")] = None,
+    design: Design = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
 ) -> None:
     """Show a scene: as read, its equations, symbols, sources; draw it."""
+    from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.text import glossary, layout, scenes
 
-    scene = read_scene(problem, sets, on, off)
+    scene, given, name, status = read_request(problem, design, None, sets, on, off, free)
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and figure else None
     for path in figure or ():
-        outputs.picture(path, scene, {})
+        outputs.picture(path, scene, given, said)
         remark(f"Wrote {path}")
     shown: list[str | layout.Grid] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
@@ -134,12 +142,13 @@ def evaluate(
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
     as_json: Json = False,
 ) -> None:
     """Show the figures of a design (today's without one)."""
     from loomopt.interface import api
 
-    scene, given, name, _ = read_request(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
     found = api.evaluate(scene, given, name)
     remarked(scene, given)
     if as_json:
@@ -158,6 +167,7 @@ def prove(
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
     as_json: Json = False,
 ) -> None:
     """Prove limits and peaks at every crank angle, or show where not."""
@@ -165,7 +175,7 @@ def prove(
     from loomopt.interface.files import outputs
     from loomopt.interface.text import answers, layout
 
-    scene, given, name, _ = read_request(problem, design, target, sets, on, off)
+    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
     with Progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
@@ -190,6 +200,7 @@ def simulate(
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
     from loomopt.interface import api
@@ -197,7 +208,7 @@ def simulate(
     from loomopt.interface.text import layout, scenes
     from loomopt.solving.options import check_numbers
 
-    scene, given, name, status = read_request(problem, design, target, sets, on, off)
+    scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
@@ -220,12 +231,13 @@ def export(
     sets: Set = None,
     on: With = None,
     off: Without = None,
+    free: Free = None,
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs
 
-    scene, given, name, status = read_request(problem, design, target, sets, on, off)
+    scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
     for path in out:
         outputs.linkage(path, scene, given, said)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from loomopt.base.errors import BadInput, clean
 
 if TYPE_CHECKING:
-    from loomopt.scenes.scene import Scene
+    from loomopt.scenes.scene import Call, Scene
 
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
@@ -178,13 +178,17 @@ def read_scene(
     """Return a scene with what the command line changes in it."""
     from loomopt.jobs.registry import load
 
-    scene = changed(load(problem), sets, on, off)
-    return scene.free([name for names in free for name in names.replace(",", " ").split()]) if free else scene
+    scene = load(problem)
+    call = read_call(scene, sets, on, off, free)
+    return scene.called(call, call.set)
 
 
-def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None) -> "Scene":
-    """Return a scene with what the command line changes in it: numbers set, then effects on, then effects off."""
+def read_call(
+    scene: "Scene", sets: list[str] | None, on: list[str] | None, off: list[str] | None, free: list[str] | None
+) -> "Call":
+    """Return what the command line changes in a scene: numbers set, then effects on, then off, then bounds freed."""
     from loomopt.base.errors import refusal
+    from loomopt.scenes.scene import Call
 
     values: dict[str, object] = {}
     for item in sets or ():
@@ -196,7 +200,8 @@ def changed(scene: "Scene", sets: list[str] | None, on: list[str] | None, off: l
         if len(value) > 1 and value[0] == value[-1] and value[0] in "\"'":  # quotes that the shell has kept
             value = value[1:-1]
         values[key.strip()] = value
-    return scene.change(values, on or (), off or ())
+    freed = (name for names in free or () for name in names.replace(",", " ").split())
+    return Call(values, tuple(on or ()), tuple(off or ()), tuple(freed))
 
 
 class DesignRequest(NamedTuple):
@@ -218,31 +223,38 @@ def read_request(
     sets: list[str] | None,
     on: list[str] | None,
     off: list[str] | None,
+    free: list[str] | None,
 ) -> DesignRequest:
-    """Return the scene of the file, as an answer given as the design has it, with what the command line changes.
+    """Return the scene of the file, as an answer's own call has changed it, with what the command line changes.
 
-    A remark names what is otherwise than in the file, where an answer brings any of it.
+    An answer in place of the file is judged in its own scene. A remark names what is otherwise than in the file, and
+    what the answer was found in that does not count.
     """
-    from loomopt.jobs.registry import load
+    from loomopt.jobs import registry
+    from loomopt.scenes import designs
     from loomopt.solving.options import target_name
 
-    scene = load(problem)
-    if design is None:
-        scene, given, name, status = changed(scene, sets, on, off), dict[str, float](), target, None
+    handed, changes = designs.DesignGiven({}), list[str]()
+    if path := registry.answer_path(problem):
+        scene, found = registry.answered(path)
+        handed = found if design is None else handed
     else:
-        from loomopt.base.errors import clean
-        from loomopt.scenes import designs
-
-        handed = designs.read_given(design, scene)
-        own = designs.scene_changes(scene, handed.scene)
-        scene = changed(handed.scene, sets, on, off)
-        given, name = designs.checked(handed.design, scene, str(design)), target or handed.target
-        status = handed.status if name == handed.target and not (sets or on or off) else None
-        if own:
-            here = [*(sets or ()), *(f"{each} on" for each in on or ()), *(f"{each} off" for each in off or ())]
-            then = f"; then, of this call: {', '.join(clean(each, 80) for each in here)}" if here else ""
-            remark(f"Remark: the scene is that of {clean(str(design))}: {', '.join(own)}{then}.")
-    return DesignRequest(scene, given, target_name(scene, name) if name else None, status)
+        scene = registry.load(problem)
+    call = read_call(scene, sets, on, off, free)
+    if design is None:
+        origin, scene = scene.origin, scene.called(call, call.set)
+    else:
+        handed, origin = designs.read_given(design), designs.named(design)
+        scene = designs.resumed(handed, scene, call, origin)
+        changes = designs.scene_changes(scene, handed, origin, call)
+        if told := designs.remark(scene, handed, call, changes, origin):
+            remark(f"Remark: {told}.")
+    given = designs.checked(handed.design, scene, origin) if design or handed.design else {}
+    name = target_name(scene, target)
+    own = name == handed.target
+    as_found = own and not call.said and not changes
+    known = target or scene.call.target or own
+    return DesignRequest(scene, given, name if known else None, handed.status if as_found else None)
 
 
 def only(option: str, given: list[Path] | None) -> Path | None:

@@ -245,6 +245,8 @@ class Solution(Evaluated):
     """What was proven at every crank angle, where that was asked for."""
     global_bound: GlobalBound | None = None
     """What is proven of all admissible designs, where that was asked for."""
+    asked: str | None = None
+    """The target as the call named it; None where it is the default."""
     today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -281,7 +283,7 @@ class Solution(Evaluated):
             "effects": base["effects"],
         }
         if self.scene:
-            head["scene"] = _scene_dict(self.scene)
+            head["scene"] = _scene_dict(self.scene, self.asked)
         head["reached"] = base["reached"]
         tail: dict[str, Any] = {
             "binding": [
@@ -327,9 +329,13 @@ def certificate_dict(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def _scene_dict(scene: "Scene") -> dict[str, Any]:
-    """Return a scene as JSON data from which it can be made again."""
-    return {"hash": scene.hash, "document": copied(scene.document, scene.origin)}
+def _scene_dict(scene: "Scene", target: str | None) -> dict[str, Any]:
+    """Return a scene as JSON data from which it can be made again, its tables with it; target: as the call named it."""
+    from loomopt.scenes.numbers import tables
+
+    call, files = scene.call.as_dict() | {"target": target}, tables(scene)
+    told = {"hash": scene.hash, "document": copied(scene.document, scene.origin), "call": call}
+    return told | ({"files": files} if files else {})
 
 
 def _finite(value: float | None) -> float | None:
