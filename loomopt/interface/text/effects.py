@@ -99,6 +99,7 @@ def verdict(found: Found) -> list[str]:
         if len(found.left_out) > 1 and abs(found.largest_omission.value) > SHOWN_AS_ZERO:
             by, of, value = found.largest_omission.by, found.largest_omission.of, found.largest_omission.value
             lines[-1] += f" Most comes from {found.largest_omission.effect}: {_moved(by, of, value)}."
+    lines += omitted(found)
     alone = [row.effect for row in found.rows if row.may_go and row.effect not in found.left_out]
     if alone:
         lines.append(f"By itself {listed(alone)} may go, but not together with what else is left out.")
@@ -108,6 +109,25 @@ def verdict(found: Found) -> list[str]:
     if found.judged:
         lines.append(f"Evaluate the design with {listed(found.judged)}, which solve does not take.")
     return lines
+
+
+def omitted(found: Found) -> list[str]:
+    """Return which figures are gone or others without what is left out, and which of them the target reads."""
+    rows = [row for row in found.rows if row.effect in found.left_out]
+    told, names = list[str](), dict[str, None]()
+    for row in (*rows, *([found.together] if found.together and len(rows) > 1 else [])):
+        single = row in rows
+        parts = [f"{listed(row.lost)} {'is' if len(row.lost) == 1 else 'are'} gone"] if row.lost else []
+        parts += (
+            [f"{listed(row.moved)} {'changes' if len(row.moved) == 1 else 'change'}"] if row.moved and single else []
+        )
+        told += [f"{f'without {row.effect}' if single else 'without them all'} {' and '.join(parts)}"] if parts else []
+        names |= dict.fromkeys((*row.lost, *row.moved))
+    if not told:
+        return []
+    read = [name for name in names if name in found.reference.reads]
+    which = f"reads {listed(read)} of them" if read else "reads none of these figures"
+    return [f"Of the other figures: {'; '.join(told)}. Target {found.target} {which}."]
 
 
 def _largest_change(largest: tuple[str, str, float]) -> str:
@@ -156,6 +176,7 @@ def frame(found: Found, si: bool = False) -> "pd.DataFrame":
             cells[f"{name} {what} [%]"] = [math.nan if v is None else 100 * v for v in shares]
     cells["limits exceeded [%]"] = [math.nan if row.excess is None else 100 * row.excess for row in rows]
     cells["may go"] = [row.may_go for row in rows]
+    cells |= {"takes away": [", ".join(r.lost) for r in rows], "changes": [", ".join(r.moved) for r in rows]}
     cells["nodes"] = pd.array([row.nodes for row in rows], dtype="Int64")
     for column, values in (("build [s]", [r.build_s for r in rows]), ("solve [s]", [r.solve_s for r in rows])):
         cells[column] = [math.nan if value is None else value for value in values]

@@ -375,7 +375,8 @@ class EffectsCourse:
 class Reference:
     """All effects that combine, on and solved; figures of the objectives and their natural sizes, SI.
 
-    status, why: of its solve; nodes, build_s, solve_s: of its expression graph, s.
+    status, why: of its solve; nodes, build_s, solve_s: of its expression graph, s. reads: what the target reads,
+    figures and design variables.
     """
 
     effects: tuple[str, ...]
@@ -386,6 +387,7 @@ class Reference:
     nodes: int | None
     build_s: float | None
     solve_s: float | None
+    reads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -456,7 +458,8 @@ class Found:
         return {
             "problem": self.scene.name,
             "target": self.target,
-            "reference": vars(self.reference) | {"effects": list(self.reference.effects)},
+            "reference": vars(self.reference)
+            | {"effects": list(self.reference.effects), "reads": list(self.reference.reads)},
             "units": self.units,
             "rows": [row.as_dict() for row in self.rows],
             "tolerance": self.tolerance,
@@ -504,7 +507,8 @@ def concluded(study: Effects, rows: Sequence[Row]) -> Found:
 
 def _reference(course: EffectsCourse, row: Row, on: tuple[str, ...]) -> Reference:
     figures, scales = (course.judge.figures, course.judge.scales) if course.judge else ({}, {})
-    return Reference(on, figures, scales, row.status, row.reason, **row.warm)
+    reads = course.judge.reads if course.judge else ()
+    return Reference(on, figures, scales, row.status, row.reason, **row.warm, reads=reads)
 
 
 def _unmeasured(course: EffectsCourse) -> tuple[Worth, ...]:

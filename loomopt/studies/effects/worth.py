@@ -10,6 +10,7 @@ from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
+from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report
@@ -29,7 +30,9 @@ class Worth:
     shift: change of each objective's figure at the reference design, without minus with; regret: by how much each is
     worse, in the reference, of the design that is found without the effect; excess: the worst by which that design
     exceeds a limit of the reference; may_go: whether all of these are within the tolerance. nodes, build_s, solve_s: of
-    the expression graph, s, without the effect. status: of that solve; why: what is to be said of it.
+    the expression graph, s, without the effect. status: of that solve; why: what is to be said of it. lost: figures
+    that the reference design has no more without the effect; moved: those that the target does not read and that are
+    others by more than the tolerance.
     """
 
     effect: str
@@ -42,6 +45,8 @@ class Worth:
     nodes: int | None = None
     build_s: float | None = None
     solve_s: float | None = None
+    lost: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
@@ -76,6 +81,8 @@ class Worth:
             "solve_s": self.solve_s,
             "status": self.status,
             "why": self.why,
+            "takes_away": list(self.lost),
+            "changes": list(self.moved),
         }
 
 
@@ -106,7 +113,8 @@ class Judge:
         nothing = dict.fromkeys(self.objectives)
         told = {"status": row.status, "why": row.reason or why} | dict(row.warm)
         try:
-            shift = self._changes(_evaluated(scene, self.row.design, self.target), _plain)
+            here = _evaluated(scene, self.row.design, self.target)
+            shift = self._changes(here, _plain)
             found = row.status in ("optimal", "uncertified")
             there = _evaluated(self.scene, {**self.row.design, **row.design}, self.target) if found else None
         except (BadInput, ValueError, ZeroDivisionError, FloatingPointError) as error:
@@ -114,7 +122,8 @@ class Judge:
         regret = self._changes(there, self._worse) if there else nothing
         excess = self._excess(there) if there else None
         may_go = row.certified and _within(shift, regret, excess, tolerance)
-        return Worth(name, shift, regret, excess, may_go, **told)
+        lost, moved = self._other(self.here.figures, here.figures, tolerance)
+        return Worth(name, shift, regret, excess, may_go, **told, lost=lost, moved=moved)
 
     def beside(self, name: str, scene: Scene, tolerance: float) -> Worth:
         """Return what an effect that solve does not take does to the reference's design; scene: with it on."""
@@ -126,7 +135,9 @@ class Judge:
             return Worth(name, nothing, nothing, None, False, "failed", str(error))
         shift = {figure: _negative(value) for figure, value in self._changes(there, _plain).items()}
         excess = self._excess(there)
-        return Worth(name, shift, nothing, excess, _within(shift, {}, excess, tolerance), EVALUATED, why)
+        lost, moved = self._other(there.figures, self.here.figures, tolerance)
+        may_go = _within(shift, {}, excess, tolerance)
+        return Worth(name, shift, nothing, excess, may_go, EVALUATED, why, lost=lost, moved=moved)
 
     def with_beside(self, found: Worth, scene: Scene, row: Row, tolerance: float) -> Worth:
         """Return the worth of effects beside which others are left out that solve does not take.
@@ -144,12 +155,34 @@ class Judge:
             return dataclasses.replace(found, may_go=False, why=str(error))
         excess = None if found.excess is None else max(found.excess, self._excess(there))
         may_go = found.may_go and _within(shift, found.regret, excess, tolerance)
-        return dataclasses.replace(found, shift=shift, excess=excess, may_go=may_go)
+        lost, moved = (tuple(dict.fromkeys(each)) for each in (found.lost + alone.lost, found.moved + alone.moved))
+        return dataclasses.replace(found, shift=shift, excess=excess, may_go=may_go, lost=lost, moved=moved)
 
     def needed(self, name: str, why: str) -> Worth:
         """Return that an effect cannot be left out, and why."""
         nothing = dict.fromkeys(self.objectives)
         return Worth(name, nothing, nothing, None, False, NEEDED, why)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The figures and design variables that the target reads: of its objectives, its limits and its goals."""
+        names = [*self.objectives, *(limit.name for limit in self.program.limits)]
+        return tuple(dict.fromkeys([*names, *(goal.figure for goal in self.program.goals)]))
+
+    def _other(
+        self, on: Mapping[str, float | None], off: Mapping[str, float | None], tolerance: float
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return the figures that are there with effects on alone, and those that are others with them off."""
+        lost, moved = [], []
+        for name, value in on.items():
+            other = off.get(name)
+            if value is None:
+                continue
+            if other is None:
+                lost.append(name)
+            elif name not in self.reads and abs(other - value) > max(tolerance * abs(value), SHOWN_AS_ZERO):
+                moved.append(name)
+        return tuple(lost), tuple(moved)
 
     def _changes(self, there: Evaluated, change: Callable[[Objective, float, float], float]) -> dict[str, float | None]:
         found: dict[str, float | None] = {}

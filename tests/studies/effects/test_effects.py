@@ -1,5 +1,6 @@
 """What each effect is worth: the table of the reference, the traps in it, and what is verified of leaving some out."""
 
+import dataclasses
 import json
 import pickle
 from concurrent.futures import ThreadPoolExecutor
@@ -11,6 +12,7 @@ from support import inch, uncoiled
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface import finished
+from loomopt.interface.text import effects as effects_text
 from loomopt.solving import engine
 from loomopt.studies.effects import study
 from loomopt.studies.run import run
@@ -292,3 +294,49 @@ def test_the_table_has_shares_and_units_and_says_where_it_comes_from(beatup):
     assert set(table.index[table["may go"]]) == {*beatup.left_out, "speed_fluctuation"}
     assert table.attrs["study"] == "effects"
     assert table.attrs["tolerance"] == "0.01"
+
+
+@pytest.fixture(scope="module")
+def kinematic():
+    """What effects are worth for a target of the geometry alone."""
+    return lo.effects("rapier")
+
+
+def test_what_an_omitted_effect_takes_away_is_told_though_the_target_reads_none(kinematic):
+    assert kinematic.left_out == ("head_inertia", "tape_friction", "tape_stretch")
+    inertia, friction, stretch = kinematic.rows
+    assert (inertia.lost, inertia.moved) == (("head_overrun",), ("tape_force", "peak_torque", "peak_power"))
+    assert (friction.lost, friction.moved) == ((), ("tape_force", "peak_torque", "peak_power"))
+    assert (stretch.lost, stretch.moved) == (("head_overrun",), ())
+    assert kinematic.together.lost == ("tape_force", "peak_torque", "peak_power", "head_overrun")
+    without = lo.evaluate(kinematic.scene.without_effect(*kinematic.scene.effects))
+    assert all(without.figures[name] is None for name in kinematic.together.lost)
+    reads = kinematic.reference.reads
+    assert {"peak_acceleration", "stroke", "dwell_after"} <= set(reads)
+    assert not set(kinematic.together.lost) & set(reads)
+    (told,) = [line for line in effects_text.verdict(kinematic) if line.startswith("Of the other figures: ")]
+    assert "without tape_stretch head_overrun is gone; " in told
+    assert "without them all tape_force, peak_torque, peak_power and head_overrun are gone" in told
+    assert told.endswith("Target stroke-dwell reads none of these figures.")
+    table = kinematic.table()
+    assert table.loc["head_inertia", "takes away"] == "head_overrun"
+    assert table.loc["tape_friction", "changes"] == "tape_force, peak_torque, peak_power"
+    row = kinematic.as_dict()["rows"][0]
+    assert (row["takes_away"], row["changes"][0]) == (["head_overrun"], "tape_force")
+    assert kinematic.as_dict()["reference"]["reads"] == list(reads)
+
+
+def test_what_the_target_reads_and_an_effect_takes_away_is_told_as_such(kinematic):
+    lost = dataclasses.replace(kinematic.rows[0], lost=("stroke", "tape_force"))
+    (told,) = effects_text.omitted(dataclasses.replace(kinematic, rows=(lost,)))
+    assert told.endswith("Target stroke-dwell reads stroke of them.")
+    none = dataclasses.replace(lost, lost=(), moved=())
+    assert effects_text.omitted(dataclasses.replace(kinematic, rows=(none,))) == []
+
+
+def test_figures_of_an_effect_that_may_go_are_named_for_a_target_of_forces_too(beatup):
+    centrifugal = next(row for row in beatup.rows if row.effect == "centrifugal")
+    assert set(centrifugal.lost) == {"bearing_force", "shaking_force"}
+    assert any(
+        "without centrifugal bearing_force and shaking_force are gone" in line for line in effects_text.verdict(beatup)
+    )
