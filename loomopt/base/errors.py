@@ -68,6 +68,10 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
     def __str__(self) -> str:
         return self.text
 
+    def _render_traceback_(self) -> list[str]:
+        """Return what Jupyter and IPython show in place of a traceback: the sentence."""
+        return [f"{type(self).__name__}: {self}"]
+
     @property
     def faults(self) -> "tuple[BadInput, ...]":
         """Each mistake as an error of its own, the worst first."""
@@ -117,10 +121,6 @@ class Faults:
         """Raise BadInput where there is any mistake."""
         if self.found:
             raise self.told()
-
-    def _render_traceback_(self) -> list[str]:
-        """Return what Jupyter and IPython show in place of a traceback: the sentence."""
-        return [f"{type(self).__name__}: {self}"]
 
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450

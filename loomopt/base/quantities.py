@@ -262,7 +262,9 @@ class Quantity(NamedTuple):
         elif isinstance(raw, bool) or not isinstance(raw, int | float):
             raise _refusal(self.kind, "it is not a quantity")
         elif self.kind != "number":
-            written = f'"{str(raw)[:_MOST_DIGITS]} {DISPLAY_UNIT[self.kind]}"'
+            # Python writes no whole number of thousands of digits.
+            long = isinstance(raw, int) and raw.bit_length() > 3 * _MOST_DIGITS
+            written = f'"{"NUMBER" if long else str(raw)[:_MOST_DIGITS]} {DISPLAY_UNIT[self.kind]}"'
             raise _refusal(self.kind, "the unit is missing", f"Write number and unit as text, in quotes: {written}")
         elif isinstance(raw, float) and not math.isfinite(raw):
             raise _refusal(self.kind, "it is not a finite number")

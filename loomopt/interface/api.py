@@ -110,7 +110,7 @@ def solve(
             on_start=on_start,
             on_step=told,
         )
-    return results.solved(found, own, target or own.call.target)
+    return results.solved(found, own, own.call.target if target is None else target)
 
 
 def evaluate(scene: Given, design: Design | solution.Evaluated | None = None, target: str | None = None) -> Evaluation:
@@ -160,7 +160,7 @@ def simulate(
     if accuracy is not None:
         check_numbers(accuracy, 1)
     own, given = _request(scene, design)
-    name = target_name(own, target) if target or own.call.target else None
+    name = None if target is None and own.call.target is None else target_name(own, target)
     return tables.curves(own, given, accuracy, name)
 
 

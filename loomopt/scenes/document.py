@@ -74,7 +74,7 @@ def _read_text(path: Path, origin: str) -> str:
 def copied(table: Mapping[Any, Any], origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return a copy of nested tables. Raises BadInput for a name that is not text and for endless nesting."""
     if not isinstance(table, Mapping):
-        remedy = 'Give a scene\'s tables, such as {"problem": {"job": "beatup"}}'
+        remedy = 'Give a scene\'s tables, such as {"problem": {"job": "…"}}'
         raise refusal("it is not a mapping", origin, value=table, remedy=remedy)
     if len(path) > _DEEPEST:
         remedy = "Write a scene as `loomopt new` does"
