@@ -152,3 +152,87 @@ def test_harmonics_of_what_is_known_in_closed_form():
     assert [harmonic.enough(weigh(b), systems.FLOAT) for b in (0.3, 0.5, 0.85)] == [32, 64, 256]
     with pytest.raises(ArithmeticError, match="512 harmonics are too few"):
         harmonic.enough(weigh(0.97), systems.FLOAT)
+
+
+def periodic(phi):
+    """Return a smooth load, N·m, with a mean."""
+    return 40 + 300 / (1.5 - math.cos(phi - 0.7)) - 120 * math.sin(2 * phi)
+
+
+def weighed(angles, weights):
+    return (np.array(weights) @ np.array([periodic(angle) for angle in angles])).tolist()
+
+
+def answered(damped):
+    """Return an oscillator, the load's harmonics, and those of z and of k z + c z˙."""
+    of = oscillator(systems.FLOAT, damped)
+    force = harmonic.harmonics(systems.FLOAT, 64, weighed)
+    return of, force, *harmonic.answered(of, force)
+
+
+def slopes(series):
+    """Return the derivative of a series with respect to φ."""
+    cosines = [n * b for n, b in enumerate(series.sines)]
+    return harmonic.FourierSeries(cosines, [-n * a for n, a in enumerate(series.cosines)])
+
+
+@pytest.mark.parametrize("damped", ["lightly", "critically", "beyond"])
+def test_the_answer_to_harmonics_is_where_an_integrator_comes_back_to(damped):
+    k, c, _ = DAMPED[damped]
+    _, _, z, torque = answered(damped)
+    rate = slopes(z)
+
+    def slope(phi, state):
+        return [state[1] / OMEGA, (periodic(phi) - c * state[1] - k * state[0]) / J / OMEGA]
+
+    angles = np.linspace(0, 2 * math.pi, 33)
+    begun = [z.at(systems.FLOAT, 0.0), OMEGA * rate.at(systems.FLOAT, 0.0)]
+    done = solve_ivp(slope, (0, angles[-1]), begun, "DOP853", t_eval=angles, rtol=1e-12, atol=1e-16)
+    exact = np.array([[z.at(systems.FLOAT, phi), OMEGA * rate.at(systems.FLOAT, phi)] for phi in angles]).T
+    sizes = np.abs(exact).max(axis=1)[:, None]
+    assert np.abs((done.y - exact) / sizes).max() < 1e-8
+    held = k * done.y[0] + c * done.y[1]
+    assert [torque.at(systems.FLOAT, phi) for phi in angles] == pytest.approx(held, abs=1e-7 * np.abs(held).max())
+
+
+@every
+def test_what_the_load_gives_in_a_turn_the_damping_takes(damped):
+    _, force, z, torque = answered(damped)
+    rate = slopes(z)
+    phi = np.arange(512) * 2 * math.pi / 512
+    load, held, speed = ([series.at(systems.FLOAT, angle) for angle in phi] for series in (force, torque, rate))
+    given, taken = np.mean(np.multiply(load, speed)), DAMPED[damped][1] * OMEGA * np.mean(np.square(speed))
+    assert given == pytest.approx(taken, rel=1e-9)
+    assert np.mean(np.multiply(held, speed)) == pytest.approx(taken, rel=1e-9), "the inertia takes nothing"
+    assert torque.cosines[0] == pytest.approx(force.cosines[0], rel=1e-14), "nor the mean"
+
+
+def test_a_stiff_shaft_hands_its_load_on_and_a_soft_one_only_its_mean():
+    """k z + c z˙ → F as J Ω²/k → 0, at first order in it, and → the mean of F far above resonance."""
+    force = harmonic.harmonics(systems.FLOAT, 64, weighed)
+
+    def missing(k, wanted):
+        constants = harmonic.constants(systems.FLOAT, "under", J, 1e-6 * k, k, OMEGA)
+        torque = harmonic.answered(harmonic.Oscillator(systems.FLOAT, "under", constants), force)[1]
+        return max(abs(torque.at(systems.FLOAT, phi) - wanted(phi)) for phi in (0.0, 1.0, 2.5, 4.0))
+
+    stiff = [missing(k, periodic) for k in (1e9, 1e10)]
+    assert stiff[0] / stiff[1] == pytest.approx(10.0, rel=0.01)
+    assert stiff[1] < 1e-3
+    soft = [missing(k, lambda phi: force.cosines[0]) for k in (1.0, 0.1)]
+    assert soft[0] / soft[1] == pytest.approx(10.0, rel=0.01)
+    assert soft[1] < 0.05
+
+
+def test_numbers_by_name_are_found_again():
+    of, force, *_ = answered("lightly")
+    known = (
+        harmonic.named("a", of.of)
+        | harmonic.named("b", force)
+        | harmonic.named("c", harmonic.FourierSeries([1.0], [0]))
+    )
+    assert len(known) == len(of.of) + 2 * 64 - 1 + 1
+    assert harmonic.read_constants("a", known) == of.of
+    again = harmonic.read_series("b", known, 64)
+    assert (list(again.cosines), list(again.sines)) == (list(force.cosines), list(force.sines))
+    assert harmonic.read_series("b", known, 3).cosines == force.cosines[:3]

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from loomopt.physics.motion import turning
 from loomopt.physics.motion.turning import NoTurn, solved
@@ -164,3 +165,35 @@ def test_a_crank_that_nearly_stands_still_has_no_turn(push):
 def test_a_load_without_a_number_has_no_turn():
     with pytest.raises(NoTurn):
         turn(lambda phi, omega, change: np.full(phi.shape, np.nan))
+
+
+def test_an_integrator_that_begins_with_it_comes_back_after_a_turn():
+    """φ¨ = (motor − load)/J in time, by scipy, corner by corner: the same speeds, and 2π/mean seconds."""
+    found = turn(pushed)
+
+    def slope(phi, state):
+        """Return dω/dφ and dt/dφ."""
+        omega = state[0]
+        own, slope_of = inertia(phi)
+        pulse = 30 * np.sin(math.pi * (phi - 0.4) / 0.7) if 0.4 < phi < 1.1 else 0.0
+        taken = slope_of * omega**2 / 2 + dragged(omega) + pulse
+        return [(SLOPE * (found.no_load - omega) - taken) / own / omega, 1 / omega]
+
+    state, speeds = np.array([found.speed(0.4), 0.0]), []
+    for low, high in zip(found.starts, found.starts[1:], strict=False):
+        angles = np.linspace(low, high, 9)
+        done = solve_ivp(slope, (low, high), state, "DOP853", t_eval=angles, rtol=1e-12, atol=1e-14)
+        speeds += [(angle, omega) for angle, omega in zip(angles[1:-1], done.y[0][1:-1], strict=True)]
+        state = done.y[:, -1]
+    assert [found.speed(angle) for angle, _ in speeds] == pytest.approx([omega for _, omega in speeds], rel=1e-10)
+    assert state[0] == pytest.approx(found.speed(0.4), rel=1e-10)
+    assert state[1] == pytest.approx(TURN / MEAN, rel=1e-10)
+
+
+def test_a_heavier_flywheel_evens_the_speed_out_in_proportion():
+    """With J constant, J ω² / 2 takes up the work of the load: Δω ω J is the largest fall of it, to first order."""
+    spreads = []
+    for wheel in (1e2, 1e3):
+        found = turn(lambda phi, omega, change, wheel=wheel: wheel * change + 40 * np.cos(phi), slope=1e-6)
+        spreads.append((found.range[1] - found.range[0]) * wheel * MEAN)
+    assert spreads == pytest.approx([80.0, 80.0], rel=1e-4)
