@@ -59,7 +59,7 @@ def place(labels: Sequence[Label], strokes: Sequence[Primitive], height: float) 
         shapes.LabelWish((label.near, *label.also), label.side, size.right - size.left, size.top - size.bottom)
         for label, size in zip(labels, sizes, strict=True)
     ]
-    drawn = np.concatenate([shapes.marks(stroke, height) for stroke in strokes])
+    drawn = np.concatenate([np.empty((0, 2)), *(shapes.marks(stroke, height) for stroke in strokes)])
     spots = shapes.place(wishes, drawn, height, LEADER)
     return [part for label, spot in zip(labels, spots, strict=True) for part in _written(label, spot, height)]
 
