@@ -3,11 +3,15 @@
 import math
 
 import pytest
+from support import toy
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.model.axes import Traded, requested_of, with_axes
+from loomopt.model.objectives import Magnitude, Peak, Value, Worst
 from loomopt.model.sampling import sampled
+from loomopt.physics.schema import Axis
 
 
 def traded(name, target, **asked):
@@ -118,3 +122,82 @@ def test_structures_do_not_depend_on_the_number_that_is_held():
 def test_an_end_that_is_not_smooth_is_not_offered(axis, sense):
     with pytest.raises(BadInput, match=f"of {axis} the .* can be sought, not the {sense}"):
         traded("beatup", None, **{axis: sense}, l2="least")
+
+
+@pytest.mark.parametrize("sense", ["least", "most"])
+@pytest.mark.parametrize(("sign", "offset", "power"), [(1, 0.0, 1), (1, 2.0, -1), (1, -0.5, 2), (1, 0.25, -2)])
+def test_value_and_figure_are_inverse_and_the_slope_is_theirs(sense, sign, offset, power):
+    axis = Traded(Axis("a", "number", sign=sign, offset=offset, power=power), sense, Value("a", "a", 1.0, power=power))
+    for root in (0.3, 1.0, 4.0):
+        figure = offset + axis.sign * root
+        assert axis.value(figure) == pytest.approx(root**power, rel=1e-14)
+        assert axis.figure(axis.value(figure)) == pytest.approx(figure, rel=1e-14)
+        step = 1e-6
+        slope = (axis.value(figure + step) - axis.value(figure - step)) / (2 * step)
+        assert axis.slope(figure) == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_root_of_what_rounding_left_below_0_is_0():
+    assert Traded(Axis("a", "number", power=2), "least", Value("a", "a", 1.0, power=2)).figure(-1e-18) == 0.0
+    assert Traded(Axis("a", "number"), "least", Value("a", "a", 1.0)).figure(-3.0) == -3.0
+
+
+ROWS = {"area": lambda v: v["p"] * v["q"], "sum": lambda v: v["p"] + v["q"]}
+WAVES = {"wave": lambda m, v, phi: v["p"] * m.cos(phi) + v["q"]}
+AXES = {
+    "area": Axis("area", "number"),
+    "size": Axis("size", "number", ("sum",), "magnitude", ("least",)),
+    "lesser": Axis("lesser", "number", ("p", "q"), "value", ("most",), -1),
+    "larger": Axis("larger", "number", ("p", "q"), "value", ("least",)),
+    "wave": Axis("wave", "number", senses=("least",)),
+}
+AT = {"p": 3.0, "q": -1.5}
+
+
+def toy_axes(**asked):
+    program = toy.program(("p", "q"), ROWS, WAVES, objectives=("sum",))
+    known = requested_of(AXES, ("q",), asked, "toy.toml")
+    return program, *with_axes(program, known, asked, lambda name: name, lambda name: 2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "sense", "kind", "merit", "figure"),
+    [
+        ("area", "least", Value, -4.5, -4.5),
+        ("area", "most", Value, 4.5, -4.5),
+        ("size", "least", Magnitude, 1.5, 1.5),
+        ("larger", "least", Worst, 3.0, 3.0),
+        ("wave", "least", Peak, 4.5, 4.5),
+        ("q", "most", Value, 1.5, -1.5),
+    ],
+)
+def test_an_axis_becomes_the_last_level_and_reads_what_it_is_named_for(name, sense, kind, merit, figure):
+    own, program, (axis,) = toy_axes(**{name: sense})
+    assert program.objectives == (*own.objectives, axis.objective)
+    assert type(axis.objective) is kind
+    assert axis.objective.scale == 2.0
+    found = axis.objective.merit(sampled(program.model, AT))
+    assert found == pytest.approx(merit)
+    assert axis.figure(found) == pytest.approx(figure)
+    assert axis.called == ("|size|" if kind is Magnitude else name)
+    assert program.objectives[0].merit(sampled(program.model, AT)) == pytest.approx(1.5), "what is held is as it was"
+    assert (program.model is own.model) == (sense == "least"), "opposites stand beside the model's own rows"
+
+
+def test_axes_stand_in_the_order_asked_for_and_opposites_are_made_once():
+    _, first, axes = toy_axes(area="most", q="least")
+    _, again, _ = toy_axes(q="least", area="most")
+    assert [axis.axis.name for axis in axes] == ["area", "q"]
+    assert [each.figure for each in again.objectives] == ["sum", "q", "area"]
+    assert set(first.model.own_rows) - set(ROWS) >= {"-area"}
+
+
+def test_an_axis_that_is_not_there_is_told_with_what_is():
+    with pytest.raises(BadInput, match='unknown axis "are"') as told:
+        toy_axes(are="least")
+    assert "area" in str(told.value)
+    with pytest.raises(BadInput, match="of wave the least can be sought, not the most"):
+        toy_axes(wave="most")
+    program = toy.program(("p",), objectives=("p",))
+    with pytest.raises(BadInput, match="nothing in the scene gives gone"):
+        with_axes(program, {"gone": Axis("gone", "number")}, {"gone": "least"}, lambda name: name, lambda name: 1.0)
