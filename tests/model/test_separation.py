@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from loomopt.physics.effects.shedding import separation as shedding
 
 RPM = math.pi / 30
 SCENE = lo.load("shedding").with_effect("separation", "damping", "dry_friction").set("operation.speed", "300 rpm")
-HELD = SCENE.tables["mechanism"]
+HELD: Any = SCENE.tables["mechanism"]
 
 
 def sampler(scene=SCENE, design=None):
@@ -37,7 +38,7 @@ def test_the_sizes_are_those_of_the_cycloidal_law():
 def test_each_load_has_the_form_of_its_law_in_both_zones():
     found = forms(sampler(), shedding.EFFECT)
     k, x0, h = HELD.K1, HELD.X0, HELD.travel
-    tension = SCENE.effects["warp_tension"]
+    tension: Any = SCENE.effects["warp_tension"]
     expected = {
         "return_spring": [Linear(0, 0, k, k * x0, 0)] * 2,
         "weight": [Linear(0, 0, 0, -own(SCENE, "weight", "G"), 0)] * 2,
@@ -62,7 +63,7 @@ def test_the_body_is_the_sum_of_its_loads_and_goes_on_at_its_corner():
     assert found.mass == pytest.approx(own(SCENE, "inertia", "M"), rel=1e-12)
     assert found.damping == pytest.approx(own(SCENE, "damping", "C"), rel=1e-12)
     assert found.friction == pytest.approx(own(SCENE, "dry_friction", "F"), rel=1e-12)
-    assert found.corners == (pytest.approx(HELD.travel / 2, rel=1e-12),)
+    assert list(found.corners) == pytest.approx([HELD.travel / 2], rel=1e-12)
     assert found.rest(0, found.corners[0]) == pytest.approx(found.rest(1, found.corners[0]), rel=1e-12)
 
 
