@@ -1,4 +1,4 @@
-"""The one error a user can cause.
+"""The one error a user can cause, and which other distribution's code has failed.
 
 Text from outside is shortened, and stripped of whatever a terminal would obey.
 """
@@ -8,7 +8,8 @@ import copy
 import difflib
 import itertools
 import re
-from collections.abc import Collection, Iterable, Sequence
+import traceback
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -121,6 +122,53 @@ class Faults:
         """Raise BadInput where there is any mistake."""
         if self.found:
             raise self.told()
+
+
+class Broken(BadInput):
+    """The code of another distribution has failed."""
+
+
+BROUGHT: dict[str, str] = {}
+"""Module that an entry point names → what it brings, and whose it is: "effect beatup.wind of loomopt-wind"."""
+
+
+def blamed(error: BaseException) -> BaseException:
+    """Return an error that ran through the code of another distribution as one message that names it.
+
+    Any other is returned as it is, with a note of what other distributions bring.
+    """
+    if isinstance(error, BadInput | KeyboardInterrupt | GeneratorExit) or not BROUGHT:
+        return error
+    told = " ".join(f"{type(error).__name__}: {error}".rstrip(": ").split())
+    for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+        module = str(frame.f_globals.get("__name__"))
+        owners = [each for each in BROUGHT if _is_of(module, each)]
+        if owners:
+            owner = module if module in owners else owners[0]
+            where = f"{frame.f_code.co_name}, line {line} of {module}"
+            return Broken(f"{BROUGHT[owner]} fails in {where}: {told}", remedy="Mend it, or go without it")
+    note = f"other distributions take part: {', '.join(sorted(set(BROUGHT.values())))}"
+    if note not in getattr(error, "__notes__", ()):
+        error.add_note(note)
+    return error
+
+
+def _is_of(module: str, brought: str) -> bool:
+    """Say whether a module is that of an entry point, or of the same package."""
+    package = brought.partition(".")[0]
+    return module == brought or (package != __name__.partition(".")[0] and module.partition(".")[0] == package)
+
+
+@contextlib.contextmanager
+def naming() -> Iterator[None]:
+    """Name the distribution whose code fails in what is done inside. Raises Broken."""
+    try:
+        yield
+    except BaseException as error:
+        told = blamed(error)
+        if told is error:
+            raise
+        raise told from error
 
 
 _LONGEST_VALUE, _LONGEST_PART = 80, 450

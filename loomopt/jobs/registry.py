@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, unknown
+from loomopt.base.errors import BROUGHT, BadInput, naming, unknown
 from loomopt.jobs.base import Job
 from loomopt.model.numbers import words
 from loomopt.physics.effects.kinds import Effect, ranked
@@ -54,9 +54,12 @@ def _single(group: str, name: str, what: str) -> "EntryPoint | None":
 
 def _loaded(point: "EntryPoint", what: str, kind: type, name: str) -> Any:
     """Return what an entry point names. Raises BadInput, naming its distribution, where that fails or is another."""
+    BROUGHT[point.module] = f"{what} {point.name} of {_distribution(point)}"
     try:
         found = point.load()
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # SystemExit too, which would end the process without a word
         told = f"{type(error).__name__}: {error}"
         raise _useless(point, what, "cannot be imported: " + " ".join(told.split())) from error
     if not isinstance(found, kind):
@@ -109,19 +112,21 @@ class _Registered:
 
     def schema(self, job: str, document: Mapping[str, Any], effects: Collection[str]) -> SceneSchema:
         """Return what a scene of a job may hold; effects: those it names, which another distribution may bring."""
-        schema = find(job).schema(document)
-        if schema.name != job:
-            raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
-        for name in dict.fromkeys(name for name in effects if name not in schema.effects):
-            effect = _brought(schema, name)
-            if effect is not None:
-                schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
-        return schema
+        with naming():
+            schema = find(job).schema(document)
+            if schema.name != job:
+                raise BadInput(f"job {job} describes scenes of {schema.name}", key=job, remedy="Mend its schema")
+            for name in dict.fromkeys(name for name in effects if name not in schema.effects):
+                effect = _brought(schema, name)
+                if effect is not None:
+                    schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
+            return schema
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
-        words(scene)  # what loads read of files is a curve, or bad input
-        of(scene).check(scene)
+        with naming():
+            words(scene)  # what loads read of files is a curve, or bad input
+            of(scene).check(scene)
 
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations that a scene really uses; SymPy is imported for them."""

@@ -11,6 +11,8 @@ from collections.abc import Callable, Hashable, Iterator
 from contextvars import ContextVar
 from typing import TypeVar, cast
 
+from loomopt.base.errors import naming
+
 Made = TypeVar("Made")
 
 LOCK = threading.RLock()
@@ -71,9 +73,10 @@ def current() -> Session:
 def working(session: Session | None = None) -> Iterator[Session]:
     """Compute in a session, the current one where none is given, while no other thread does; yields the session.
 
-    A thread that has begun may begin again, as a solve within a solve does.
+    A thread that has begun may begin again, as a solve within a solve does. Where the code of another distribution
+    fails meanwhile, BadInput says whose it is.
     """
-    with LOCK:
+    with LOCK, naming():
         token = _CURRENT.set(session or current())
         try:
             yield current()

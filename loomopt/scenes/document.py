@@ -71,7 +71,7 @@ def _read_text(path: Path, origin: str) -> str:
     raise refusal(problem, origin, allowed=allowed, remedy=remedy)
 
 
-def copied(table: Mapping[Any, Any], origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
+def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return a copy of nested tables. Raises BadInput for a name that is not text and for endless nesting."""
     if not isinstance(table, Mapping):
         remedy = 'Give a scene\'s tables, such as {"problem": {"job": "…"}}'

@@ -149,8 +149,8 @@ OF_SCENE = ["set", "update", "change", "with_effect", "without_effect", "free", 
 OF_SCENE += ["shown_in", "unit_for", "filed_in"]
 OF_ANSWER = ["plot", "export", "to_frame", "simulate", "prove"]
 OF_STUDY = ["table", "answer", "plot"]
-ENGINES = "loomopt.solving.engine.solve", "loomopt.studies.run.run.run", "loomopt.solving.proof.whole_cycle._readings"
-ENGINES += "loomopt.interface.tables.curves", "loomopt.interface.figures.study.plot"
+ENGINES = ["loomopt.solving.engine.solve", "loomopt.studies.run.run.run", "loomopt.solving.proof.whole_cycle._readings"]
+ENGINES += ["loomopt.interface.tables.curves", "loomopt.interface.figures.study.plot"]
 
 
 @pytest.fixture(scope="module")
@@ -232,6 +232,6 @@ def test_an_error_in_a_hook_is_that_error(error, hook):
         raise error
 
     with pytest.raises(type(error)) as caught:
-        lo.solve(SCENE, **{hook: raising})
+        lo.solve(SCENE, **{hook: raising})  # type: ignore[arg-type]
     assert caught.value is error
     assert lo.solve(SCENE).status == "optimal"

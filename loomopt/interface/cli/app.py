@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from loomopt.base import __version__, interrupts
-from loomopt.base.errors import BadInput
+from loomopt.base.errors import BadInput, blamed, clean
 from loomopt.interface.cli import commands, studies
 from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without, printed, remarked
 from loomopt.interface.cli.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
@@ -228,14 +228,38 @@ def run(arguments: list[str] | None = None) -> int:
         return BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         status = interrupts.INTERRUPTED
-    except (BrokenPipeError, SystemExit):  # nobody reads on: Click leaves by SystemExit
+    except BrokenPipeError:  # nobody reads on
         return 0
     except OSError as error:
-        remark(f"loomopt: the output cannot be written: {error.strerror or error}")
+        told = blamed(error)
+        what = told if isinstance(told, BadInput) else f"the output cannot be written: {error.strerror or error}"
+        remark(f"loomopt: {what}")
+        return BAD_INPUT
+    except BaseException as error:
+        if isinstance(error, SystemExit) and isinstance(error.__context__, BrokenPipeError):
+            return 0  # so Click leaves where nobody reads on
+        from concurrent.futures import BrokenExecutor
+
+        if isinstance(error, BrokenExecutor):
+            remark(f"loomopt: {error}")
+            return UNPROVEN
+        failed = not_ours(error)
+        if not failed:
+            raise
+        remark(f"loomopt: {failed}")
         return BAD_INPUT
     if status == interrupts.INTERRUPTED:
         remark(interrupts.STOPPED)
     return status
+
+
+def not_ours(error: BaseException) -> str:
+    """Return an error as one line where another distribution's code takes part; "" where loomopt itself has failed."""
+    told = blamed(error)
+    if isinstance(told, BadInput):
+        return str(told)
+    notes = getattr(error, "__notes__", ())
+    return clean("; ".join([f"it fails: {type(error).__name__}: {error}", *notes])) + "." if notes else ""
 
 
 def main() -> None:

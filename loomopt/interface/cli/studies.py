@@ -151,6 +151,8 @@ def _parted(items: list[str], option: str, example: str, form: str) -> dict[str,
 
 def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
+    from concurrent.futures import BrokenExecutor
+
     from loomopt.interface.finished import DesignStudy, conducted
     from loomopt.interface.text import studies
     from loomopt.studies.run.rows import counted
@@ -171,7 +173,7 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
         with _executor(how.dask, count) as executor, Progress() as progress:
             progress.say(counted(study, 0))
             found = conducted(study, executor, count, how.store, how.resume, kept)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, BrokenExecutor):
         if rows:
             done = DesignStudy(study, tuple(rows[point] for point in sorted(rows)))
             _print(done, how)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from loomopt.base.errors import BadInput, blamed
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
@@ -81,7 +82,9 @@ def certified(
         cycle = WholeCycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
         return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
-        reason = f"a value or a slope is no number here ({type(error).__name__})"
+        told = blamed(error)
+        why = f": {told.problem}" if isinstance(told, BadInput) else f" ({type(error).__name__})"
+        reason = f"a value or a slope is no number here{why}"
         by, clear = derivatives.by, derivatives.last
         return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
 

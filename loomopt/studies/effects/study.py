@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, Faults, refusal
+from loomopt.base.errors import BadInput, Broken, Faults, refusal
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
 from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, required
@@ -208,6 +208,8 @@ class Effects:
         scene = self.without(frozenset(task.place))
         try:
             answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed)
+        except Broken:
+            raise
         except BadInput as error:
             return Row(task.point, task.place, None, REFUSED, str(error))
         job = registry.of(scene)
@@ -384,9 +386,9 @@ class Reference:
     scales: Mapping[str, float]
     status: str
     why: str | None
-    nodes: int | None
-    build_s: float | None
-    solve_s: float | None
+    nodes: int | None = None
+    build_s: float | None = None
+    solve_s: float | None = None
     reads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

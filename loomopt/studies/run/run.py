@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from loomopt.base import arguments
-from loomopt.base.errors import BadInput, refusal, shown
+from loomopt.base.errors import BadInput, blamed, refusal, shown
 from loomopt.model.session import working
 from loomopt.studies.run.rows import Row, Study, StudyTask, agree
 
@@ -29,6 +29,8 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VEC
 NEEDED = "casadi", "loomopt.studies.front.trade", "loomopt.studies.sweep"
 """What a worker imports while it starts."""
 MOST_WORKERS = 1024
+MOST_DEATHS = 3
+"""Worker processes that may die of one point, or one after the other while they start."""
 RETRIES = 3
 """How often Dask gives a task to another worker when one is lost."""
 
@@ -50,19 +52,34 @@ def workers(count: int) -> Callable[[], Executor]:
 class Processes(Executor):
     """Spawned processes that end with whoever made them, however that ends, and leave Ctrl-C to it.
 
-    in_flight: how many tasks it should have at a time. Raises BadInput where processes cannot start.
+    in_flight: how many tasks it should have at a time. Raises BadInput where processes cannot start, BrokenExecutor
+    where they are killed again and again while they do.
     """
 
     def __init__(self, count: int) -> None:
         self.in_flight = 2 * count
+        for _ in range(MOST_DEATHS):
+            if self._started(count):
+                return
+        raise BrokenExecutor(f"worker processes were killed {MOST_DEATHS} times while they started: out of memory?")
+
+    def _started(self, count: int) -> bool:
+        """Start a pool; say whether its first process is ready, not killed from outside. Raises BadInput."""
         context = multiprocessing.get_context("spawn")
         theirs, self._lifeline = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(count, context, _begin, (theirs,))
+        others = set(multiprocessing.active_children())
         try:
-            self.submit(os.getpid).result()
+            ready = self.submit(os.getpid)
+            own = set(multiprocessing.active_children()) - others
+            ready.result()
         except BrokenExecutor:
+            self.shutdown()
+            if any((process.exitcode or 0) < 0 for process in own):
+                return False
             remedy = 'In a script, make the call below `if __name__ == "__main__":`, as Python\'s multiprocessing asks'
             raise BadInput("worker processes cannot start here", key="workers", remedy=remedy) from None
+        return True
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Return the future of a call, as any executor does."""
@@ -215,8 +232,6 @@ def tasks(study: Study, rows: Sequence[Row]) -> Iterator[tuple[StudyTask, Row | 
         done = dict(sorted({**done, **{task.point: known[task.point] for task in batch}}.items()))
 
 
-MOST_DEATHS = 3
-"""Worker processes that may die of one point."""
 IN_FLIGHT = 256
 """Tasks that an executor is given at a time, where it does not say how many it wants (`in_flight`)."""
 KILLED = "KilledWorker"
@@ -232,8 +247,10 @@ def solved(study: bytes, task: "StudyTask", parent: "Row | None") -> str:
         began = time.perf_counter()
         try:
             row = _unpickled(study).solved(task, parent)
-        except Exception as error:
-            row = _failed(task, " ".join(f"{error}".split()) or type(error).__name__, time.perf_counter() - began)
+        except (Exception, SystemExit) as error:
+            told = blamed(error)
+            why = "; ".join([f"{told}" or type(told).__name__, *getattr(told, "__notes__", ())])
+            row = _failed(task, " ".join(why.split()), time.perf_counter() - began)
         return json.dumps(row.as_dict())
 
 

@@ -1,10 +1,14 @@
 """Running studies: the same rows whoever computes them, whatever dies; nothing finished is lost or done twice."""
 
 import json
+import os
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from multiprocessing import get_context
+from pathlib import Path
 
 import pytest
 from made_up_study import Chain
@@ -81,6 +85,53 @@ def test_a_point_that_kills_three_workers_is_a_failed_row(chain):
     assert lethal.solves().count(5) == 3
     assert (rows[5].status, rows[5].reason) == ("failed", run.DIED)
     assert {row.status for row in rows if row.point != 5} == {"optimal"}
+
+
+DYING = """
+import os, signal, sys
+from pathlib import Path
+from loomopt.base.errors import BadInput
+from loomopt.studies.run import executors
+
+log, most = Path(sys.argv[1]), int(sys.argv[2])
+
+def dies(lifeline, begin=executors._begin):
+    with log.open("a") as file:
+        file.write("x")
+    if len(log.read_text()) <= most:
+        os.kill(os.getpid(), signal.SIGKILL)
+    begin(lifeline)
+
+executors._begin = dies
+if __name__ == "__main__":
+    try:
+        pool = executors.workers(2)()
+        print(pool.submit(int, 7).result())
+        pool.shutdown()
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+@pytest.mark.parametrize(("deaths", "said"), [(1, "7"), (2, "7"), (9, "BrokenExecutor worker processes were killed 3")])
+def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deaths, said):
+    script = tmp_path / "dying.py"
+    script.write_text(DYING)
+    folder = {"PYTHONPATH": str(Path(run.__file__).parents[3])}
+    command = [sys.executable, script, tmp_path / "log", str(deaths)]
+    done = subprocess.run(command, env=os.environ | folder, capture_output=True, text=True, timeout=120)
+    assert done.stdout.startswith(said), done.stderr
+    assert len((tmp_path / "log").read_text()) >= min(deaths, 2) + 1
+
+
+def test_a_call_that_the_script_itself_repeats_is_bad_input(tmp_path):
+    script = tmp_path / "bare.py"
+    script.write_text("from loomopt.studies.run import executors\nexecutors.workers(2)()\n")
+    folder = {"PYTHONPATH": str(Path(run.__file__).parents[3])}
+    done = subprocess.run(
+        [sys.executable, script], env=os.environ | folder, capture_output=True, text=True, timeout=120
+    )
+    assert "BadInput: workers: worker processes cannot start here. In a script" in done.stderr
 
 
 def test_a_broken_executor_of_the_callers_is_told(chain):
