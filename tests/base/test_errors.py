@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 import loomopt as lo
-from loomopt.base.errors import BadInput, clean
+from loomopt.base.errors import BROUGHT, BadInput, Broken, blamed, clean, naming
 from loomopt.interface.cli.app import run
 
 LONGEST_MESSAGE = 2000
@@ -66,3 +66,41 @@ def test_a_scene_of_any_names_is_answered_shortly():
         with pytest.raises(BadInput) as refused:
             lo.scene({**document, table: {"x" * 5000: "y" * 5000}})
         assert len(str(refused.value)) <= LONGEST_MESSAGE
+
+
+def brought(monkeypatch, body):
+    """Return a function of a module that an entry point names."""
+    monkeypatch.setitem(BROUGHT, "windy.drag", "effect beatup.wind of loomopt-wind")
+    module = {"__name__": "windy.formulas"}
+    exec(f"def force(given):\n    {body}", module)
+    return module["force"]
+
+
+@pytest.mark.parametrize("body", ["raise SystemExit(0)", "return 1 / 0", "return given['k']", "return force(given)"])
+def test_code_of_another_distribution_that_fails_is_named(monkeypatch, body):
+    force = brought(monkeypatch, body)
+    said = r"effect beatup\.wind of loomopt-wind fails in force, line 2 of windy"
+    with pytest.raises(Broken, match=said) as told, naming():
+        force({})
+    assert str(told.value).isprintable()
+    assert told.value.__cause__ is not None
+
+
+def test_what_is_told_or_stopped_already_stays_as_it_is(monkeypatch):
+    for name in ("BadInput", "KeyboardInterrupt"):
+        force = brought(monkeypatch, f"raise given['{name}']")
+        error = {"BadInput": BadInput("ask"), "KeyboardInterrupt": KeyboardInterrupt()}[name]
+        with pytest.raises(type(error)) as caught, naming():
+            force({name: error})
+        assert caught.value is error
+
+
+def test_an_error_elsewhere_keeps_its_kind_and_says_once_who_takes_part(monkeypatch):
+    force = brought(monkeypatch, "return None")
+    for _ in range(2):
+        with pytest.raises(TypeError) as caught, naming(), naming():
+            len(force({}))
+        assert caught.value.__notes__ == ["other distributions take part: effect beatup.wind of loomopt-wind"]
+    monkeypatch.delitem(BROUGHT, "windy.drag")
+    assert blamed(error := ValueError("x")) is error
+    assert not hasattr(error, "__notes__")

@@ -4,11 +4,14 @@ import csv
 import io
 import json
 import math
+import re
+from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.slow
 
+PRESS = Path(__file__).parent / "press"
 OPTIMUM = {"crank": 0.1, "rod": 0.5}
 """Stroke of 200 mm, reach of 600 mm: both bind."""
 
@@ -133,6 +136,8 @@ def test_two_distributions_with_one_job_are_named_and_other_scenes_still_run(loo
     [
         ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError: No module named"),
         ("JOB = 1 / 0", "cannot be imported: ZeroDivisionError"),
+        ("raise SystemExit(0)", "cannot be imported: SystemExit: 0"),
+        ("import sys; sys.exit()", "cannot be imported: SystemExit"),
         ("", "cannot be imported: AttributeError"),
         ("JOB = 7", "is no job"),
         ("from loomopt_press.job import Press as JOB", "is no job"),
@@ -156,6 +161,7 @@ def test_a_job_that_is_none_is_named_with_its_distribution(loomopt, distribution
     ("code", "said"),
     [
         ("import nothing_of_this_name", "cannot be imported: ModuleNotFoundError"),
+        ("raise SystemExit(0)", "cannot be imported: SystemExit: 0"),
         ("EFFECT = 7", "is no effect"),
         ("from loomopt_press.slide import EFFECT", "calls itself slide"),
     ],
@@ -165,6 +171,96 @@ def test_an_effect_that_is_none_is_named_with_its_distribution(loomopt, distribu
     told = loomopt("show", "beatup", "--set", "effects.wind.v=1 m", status=2, folders=broken).stderr
     assert f"effect beatup.wind of broken-effect {said}" in told
     assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
+
+
+WIND = """
+from typing import Annotated
+from loomopt.base.quantities import Quantity
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.schema import Table
+
+class Own(Table):
+    k: Annotated[float, Quantity("number")]
+
+def force(maths, pose, given, own, switch):
+    {}
+
+EFFECT = Load(name="wind", summary="wind", own=Own, acts="output", force=force, examples=({{"k": 1}},))
+"""
+BODIES = {
+    "raise SystemExit(0)": "fails in force, line 11 of failing_effect: SystemExit: 0",
+    "import sys; sys.exit('bye')": "SystemExit: bye",
+    "raise RuntimeError('no\\nmore')": "RuntimeError: no more",
+    "return 1.0 / 0": "ZeroDivisionError",
+    "return own['speed']": "KeyError: 'speed'",
+    "return pose.wind": "AttributeError",
+    "return force(maths, pose, given, own, switch)": "RecursionError",
+    "import nothing_of_this_name": "ModuleNotFoundError",
+    "assert False": "AssertionError",
+    "return 1.0 if pose.q > 0 else 0.0": "ValueError: The truth value",
+    "return None": "'NoneType'",
+    "return 'strong'": "it fails: ",
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_formula_that_fails_is_named_with_its_distribution(loomopt, distribution, body):
+    points = {"beatup.wind": "failing_effect:EFFECT"}
+    broken = [distribution("failing-effect", points, WIND.format(body), "loomopt.effects")]
+    for words in (("solve", "beatup", "--json"), ("evaluate", "beatup"), ("simulate", "beatup"), ("prove", "beatup")):
+        done = loomopt(*words, "--set", "effects.wind.k=1", status=2, folders=broken)
+        assert "effect beatup.wind of failing-effect" in done.stderr
+        assert BODIES[body] in done.stderr
+        assert (done.stdout, len(done.stderr.splitlines())) == ("", 1)
+    assert loomopt("evaluate", "beatup", folders=broken).stderr == ""
+
+
+@pytest.mark.parametrize("workers", [(), ("--workers", "2")])
+def test_a_formula_that_fails_in_a_study_is_named_in_its_rows(loomopt, distribution, workers):
+    code = WIND.format("raise SystemExit(0)")
+    broken = [distribution("failing-effect", {"beatup.wind": "failing_effect:EFFECT"}, code, "loomopt.effects")]
+    words = ["--set", "effects.wind.k=1", *workers, "--json"]
+    found = json.loads(loomopt("effects", "beatup", *words, status=4, folders=broken).stdout)
+    assert "effect beatup.wind of failing-effect fails in force" in found["reference"]["why"]
+
+
+PARTS = ["schema", "check", "program", "today", "views", "model", "resources"]
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("error", ["SystemExit(0)", "OSError(2, 'gone')", "TypeError('no')"])
+def test_a_part_of_a_job_that_fails_is_named_with_its_distribution(loomopt, distribution, tmp_path, part, error):
+    code = f"""
+import dataclasses
+from loomopt_press.job import Press
+from loomopt_press.scene import SCHEMA
+
+def failing(self, *_, **__):
+    raise {error}
+
+class Knit(Press):
+    name = "knit"
+    own_schema = dataclasses.replace(SCHEMA, name="knit")
+    {part} = property(failing)
+
+JOB = Knit()
+"""
+    broken = [distribution("failing-knit", {"knit": "failing_knit:JOB"}, code)]
+    press = (PRESS / "loomopt_press" / "problems" / "press.toml").read_text()
+    press = re.sub(r"\[available\.slide\]\n[^\[]*", "", press)
+    (tmp_path / "my.toml").write_text(press.replace('job = "press"', 'job = "knit"'))
+    failed = []
+    for words in (("solve", "my.toml"), ("evaluate", "my.toml"), ("show", "my.toml"), ("new", "knit", "x.toml")):
+        done = loomopt(*words, status=None, folders=broken)
+        assert "Traceback" not in done.stderr
+        if "failing-knit" in done.stderr:
+            failed.append(done.returncode)
+            assert "job knit of failing-knit" in done.stderr
+            assert len(done.stderr.splitlines()) == 1
+        else:
+            assert done.returncode == 0
+            assert done.stdout or done.stderr
+    assert set(failed) == {2}
 
 
 def test_an_effect_whose_figure_there_is_already_is_named(loomopt, distribution):
