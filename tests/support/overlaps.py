@@ -10,6 +10,19 @@ CLOSE = 0.5
 """Pixels by which boxes may touch."""
 
 
+SIZES = (6.0, 4.5), (11.0, 8.0), (16.0, 9.0)
+"""Inches: as in a paper, on a page, on a slide."""
+
+
+def found_at_every_size(figure):
+    """Return what is found in a figure as it is, and at each of SIZES, smaller and larger in turn."""
+    said = found(figure)
+    for size in (*SIZES, SIZES[0]):
+        figure.set_size_inches(*size)
+        said += [f"at {size}: {each}" for each in found(figure)]
+    return said
+
+
 def found(figure):
     """Return in words every text or legend that meets another, a line, or leaves the figure."""
     figure.draw_without_rendering()

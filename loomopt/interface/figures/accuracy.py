@@ -8,7 +8,7 @@ from typing import Any
 
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
-from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, blank, head, own_style, save
+from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, frame, head, own_style, page, save
 from loomopt.interface.files import outputs
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.scenes import provenance
@@ -81,18 +81,16 @@ def drawn(study: AccuracyStudy) -> Any:
     panels = _panels(study)
     with own_style(study.problem, *panels):
         high = math.ceil(len(panels) / COLUMNS)
-        page = blank(9.0, 2.5 * high + 0.5)
-        page.set_layout_engine("constrained")
-        page.suptitle(f"{study.problem}: what accuracy costs", fontsize=11, parse_math=False)
+        figure = page(9.0, 2.5 * high + 0.5, f"{study.problem}: what accuracy costs")
         placed = []
         for place, (quantity, ladders) in enumerate(panels.items()):
-            axes = page.add_subplot(high, COLUMNS, place + 1)
+            axes = figure.add_subplot(high, COLUMNS, place + 1)
             placed.append((axes, quantity, _panel(axes, study, quantity, ladders)))
-        page.get_layout_engine().execute(page)
+        figure.get_layout_engine().execute(figure)
         heights = [head(axes, quantity, entries) for axes, quantity, entries in placed]
         rows = [max(heights[place : place + COLUMNS]) for place in range(0, len(heights), COLUMNS)]
-        page.set_size_inches(page.get_figwidth(), 2.3 * high + sum(rows) / 72 + 0.5)
-    return page
+        figure.finish(2.3 * high + sum(rows) / 72 + 0.5)
+    return figure
 
 
 def _panels(study: AccuracyStudy) -> dict[str, list[list[LadderRow]]]:
@@ -134,8 +132,7 @@ def _panel(axes: Any, study: AccuracyStudy, quantity: str, ladders: Sequence[Seq
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("step [rad]" if alike else "time of one run [s]")
     axes.set_ylabel("relative error")
-    axes.grid(color="#e5e7eb", linewidth=0.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    frame(axes)
     return entries
 
 

@@ -1,7 +1,7 @@
-"""Figures of curves over the crank angle, on a page: every text stands above its axes, so that none hides a curve."""
+"""Figures of curves over the crank angle: every text stands above its axes, so that none hides a curve."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from loomopt.base import files
 from loomopt.base.units import factor, show
 from loomopt.interface.figures import figure
-from loomopt.interface.figures.figure import COLOURS, HEAD_LEGEND, HEAD_SIZE, STYLES, Entry, head
+from loomopt.interface.figures.figure import COLOURS, HEAD_SIZE, STYLES, Entry, head
 from loomopt.model.curves import ANGLE
 from loomopt.physics.cycle import Floats
 from loomopt.picture.job_views import Marks, Span
@@ -19,70 +19,6 @@ from loomopt.picture.shapes import plain
 
 if TYPE_CHECKING:
     import pandas as pd
-
-EDGE, TITLE, FOOT = 0.08, 0.3, 0.25
-"""Inches: around what stands on a page, of its title, of the name below its axes."""
-TICKS, ROW = 0.22, 0.1
-"""Inches below axes with numbers, and below axes without."""
-SPACE = 0.3
-"""Inches between columns."""
-
-
-class Cell(NamedTuple):
-    """Axes on a page: row, column (of `wide` ones every column), height, inches; numbered: whether numbers stand below.
-
-    first: whether they are the first of their column.
-    """
-
-    axes: Any
-    row: int
-    column: int
-    high: float
-    wide: bool
-    numbered: bool
-    first: bool
-
-
-def widen(page: Any, cells: Sequence[Cell]) -> None:
-    """Give axes their height, and the width that numbers beside them leave."""
-    width, height = page.get_size_inches()
-    count = max(cell.column for cell in cells) + 1
-    canvas = page.canvas.get_renderer()
-    left, right = [0.0] * count, [0.0] * count
-    for cell in cells:
-        cell.axes.tick_params(labelbottom=cell.numbered)
-        cell.axes.set_position((0.2, 0.1, 0.5 / count, cell.high / height))
-    for cell in cells:
-        inner, outer = cell.axes.bbox, cell.axes.get_tightbbox(canvas)
-        last = count - 1 if cell.wide else cell.column
-        left[cell.column] = max(left[cell.column], (inner.x0 - outer.x0) / page.dpi)
-        right[last] = max(right[last], (outer.x1 - inner.x1) / page.dpi)
-    free = (width - 2 * EDGE - sum(left) - sum(right) - SPACE * (count - 1)) / count
-    begins = [EDGE + sum(left[: k + 1]) + sum(right[:k]) + k * (free + SPACE) for k in range(count)]
-    for cell in cells:
-        end = begins[-1] + free if cell.wide else begins[cell.column] + free
-        begin = begins[cell.column]
-        cell.axes.set_position((begin / width, 0.1, (end - begin) / width, cell.high / height))
-
-
-def stack(page: Any, cells: Sequence[Cell], heads: Mapping[Any, float]) -> None:
-    """Stand axes one below the other, and make the page as high; heads: of what stands above each, pt."""
-    rows: dict[int, tuple[float, float, float]] = {}
-    for cell in cells:
-        above, high, below = rows.get(cell.row, (0.0, 0.0, 0.0))
-        room = TICKS if cell.numbered else ROW
-        rows[cell.row] = max(above, heads[cell.axes] / 72), max(high, cell.high), max(below, room)
-    height = EDGE + TITLE + sum(sum(row) for row in rows.values()) + FOOT + EDGE
-    width, top, bottoms = page.get_figwidth(), height - EDGE - TITLE, dict[int, float]()
-    for row in sorted(rows):
-        above, high, below = rows[row]
-        bottoms[row] = top - above - high
-        top = bottoms[row] - below
-    page.set_size_inches(width, height)
-    for cell in cells:
-        box = cell.axes.get_position()
-        cell.axes.set_position((box.x0, bottoms[cell.row] / height, box.width, cell.high / height))
-
 
 DASHED = (0, (4, 2))
 """Today's machine beside a design: no other curve of it is drawn so."""
@@ -97,6 +33,8 @@ GRAVITY = 9.80665
 WORDS = {"peak": "peak", "most": "largest", "least": "least"}
 HIGH, HIGH_WIDE, WIDTHS = 1.15, 1.9, (7.0, 11.0)
 """Of axes, inches; widths of a figure with one column of panels and with two."""
+BETWEEN, TITLE_AND_ANGLE = 0.2, 0.8
+"""Inches below axes; of a figure's title with what stands below all axes."""
 
 
 class DrawnTurn(NamedTuple):
@@ -149,15 +87,16 @@ def curves(
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
     design, before = _turn(frame, marks or {}, unit), _turn(*today, unit) if today else None
     with figure.own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
-        page, cells = _grid(panels)
-        entries = [_panel(cell.axes, panel, design, before) for cell, panel in cells]
-        widen(page, [cell for cell, _ in cells])
-        heads = {}
-        for (cell, panel), shown in zip(cells, entries, strict=True):
+        page, cells = _grid(panels, title, f"{angle} phi [{unit}]")
+        entries = [_panel(cell.axes, cell.panel, design, before) for cell in cells]
+        foot = figure.below(page, _both()) if before else 0.0
+        page.get_layout_engine().execute(page)
+        heads = []
+        for cell, shown in zip(cells, entries, strict=True):
             names = _mark(cell.axes, design)
-            heads[cell.axes] = head(cell.axes, f"{panel.title}{_bracketed(panel)}", shown, names if cell.first else ())
-        stack(page, [cell for cell, _ in cells], heads)
-        _entitle(page, title, f"{angle} phi [{unit}]", both=before is not None)
+            said = f"{cell.panel.title}{_bracketed(cell.panel)}"
+            heads.append(head(cell.axes, said, shown, names if cell.first else ()) / 72)
+        page.finish(_height(cells, heads) + foot)
     if path:
         figure.save(page, path)
     return page
@@ -170,36 +109,52 @@ def _turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
     return DrawnTurn(np.append(angles, angles[0] + 360.0) if closes else angles, frame, marks, unit)
 
 
-def _grid(panels: Sequence[Panel]) -> tuple[Any, list[tuple[Cell, Panel]]]:
-    """Return a figure and its axes with their panels: wide ones on top, the others below in columns of their own."""
+class Cell(NamedTuple):
+    """Axes with their panel: its row; first: whether they are the first of their column."""
+
+    axes: Any
+    panel: Panel
+    row: int
+    first: bool
+
+
+def _grid(panels: Sequence[Panel], title: str, below: str) -> tuple[Any, list[Cell]]:
+    """Return a figure and its axes: wide ones on top, the others below in columns of their own; below: what phi is."""
     on_top, others = [p for p in panels if p.wide], [p for p in panels if not p.wide]
     wide = 1 if len(panels) <= 4 else 2
     rows, height = math.ceil(len(others) / wide), len(on_top)
-    page = figure.blank(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0)
+    page = figure.page(WIDTHS[wide - 1], 1.5 * (rows + height) + 1.0, title)
+    grid = page.add_gridspec(height + rows, wide, height_ratios=[HIGH_WIDE] * height + [HIGH] * rows)
     shared: Any = None
     cells = []
     for place, panel in enumerate([*on_top, *others]):
         column, row = divmod(max(place - height, 0), rows or 1)
-        shared = axes = page.add_axes((0.1, 0.1, 0.5, 0.5), sharex=shared, label=str(place))
+        where = grid[place, :] if panel.wide else grid[height + row, column]
+        shared = axes = page.add_subplot(where, sharex=shared, label=str(place))
         last = panel.wide or row == rows - 1 or place == len(panels) - 1
+        axes.tick_params(labelbottom=last)
+        if last and (place == len(panels) - 1 or not panel.wide):
+            axes.set_xlabel(below, fontsize=9)
         first = place == 0 or (row == 0 and not height)
-        where, high = (place, HIGH_WIDE) if panel.wide else (height + row, HIGH)
-        cells.append((Cell(axes, where, column, high, panel.wide, last, first), panel))
+        cells.append(Cell(axes, panel, place if panel.wide else height + row, first))
     return page, cells
 
 
-def _entitle(page: Any, title: str, below: str, both: bool) -> None:
-    """Write the title, what phi is, and once which curves are the design's and which today's, where there are both."""
+def _height(cells: Sequence[Cell], heads: Sequence[float]) -> float:
+    """Return the height of a page, inches, on which axes are as high as they are meant; heads: above each, inches."""
+    rows: dict[int, tuple[float, float]] = {}
+    for cell, head_high in zip(cells, heads, strict=True):
+        high, above = rows.get(cell.row, (0.0, 0.0))
+        rows[cell.row] = max(high, HIGH_WIDE if cell.panel.wide else HIGH), max(above, head_high)
+    return TITLE_AND_ANGLE + sum(high + above + BETWEEN for high, above in rows.values())
+
+
+def _both() -> list[Entry]:
+    """Return which curves are the design's and which today's."""
     from matplotlib.lines import Line2D
 
-    high = page.get_figheight()
-    page.suptitle(plain(title), x=0.5, y=1 - EDGE / high, va="top", fontsize=11, parse_math=False)
-    page.supxlabel(below, x=0.5, y=EDGE / high, va="bottom", fontsize=9)
-    if both:
-        design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
-        lines, texts = [design, Line2D([], [], color=TODAY, linestyle=DASHED)], ["design", "today, dashed"]
-        place = 1 - EDGE / page.get_figwidth(), 1 - EDGE / high
-        page.legend(lines, texts, loc="upper right", bbox_to_anchor=place, borderaxespad=0.0, ncols=2, **HEAD_LEGEND)
+    design = Line2D([], [], color=COLOURS[0], linewidth=1.4)
+    return [(design, "design"), (Line2D([], [], color=TODAY, linestyle=DASHED), "today, dashed")]
 
 
 def _bracketed(panel: Panel) -> str:
@@ -253,8 +208,7 @@ def _frame(axes: Any, values: Floats, turn: DrawnTurn) -> None:
     axes.xaxis.set_major_locator(MultipleLocator(45 * whole / 360))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{(x if 0 <= x <= whole else x % whole) / size:.4g}"))
     axes.yaxis.set_major_formatter(FuncFormatter(_tick))  # no common power that stands in the way
-    axes.grid(color="#e5e7eb", linewidth=0.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    figure.frame(axes)
 
 
 def _tick(value: float, _: int) -> str:
@@ -263,9 +217,12 @@ def _tick(value: float, _: int) -> str:
 
 def _in_g(axes: Any, size: float) -> None:
     """Give axes of an acceleration a second scale, in g; size: of the first one's unit, m/s²."""
+    from loomopt.interface.figures.shown_figure import TICK
+
     scale = axes.secondary_yaxis("right", functions=(lambda y: y * size / GRAVITY, lambda g: g * GRAVITY / size))
     scale.set_ylabel("[g]", fontsize=HEAD_SIZE)
     scale.yaxis.set_major_formatter(_tick)
+    scale.tick_params(**TICK)
     scale.spines["right"].set_visible(False)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, suffix
-from loomopt.interface.figures.figure import COLOURS, Entry, blank, head, own_style, save
+from loomopt.interface.figures.figure import COLOURS, Entry, head, own_style, page, save
 from loomopt.interface.files import outputs
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.picture.shapes import plain
@@ -16,9 +16,12 @@ from loomopt.studies.effects.study import Found
 
 WIDTH, BAR, ROOM = 7.0, 0.34, 1.25
 """Inches: of the page, of an effect's bars, beside those of a panel."""
-DECADES = 5
-"""How far below the larger of tolerance and largest share a bar is still seen."""
-SHIFTED = "shift at the reference's design"
+DECADES = 4
+"""Powers of ten on either side of 0, at most: below them, and below a tenth of the tolerance, the scale is linear."""
+SHIFTED, EXCEEDED = "shift at the reference's design", "worst excess of the design found without"
+ROOMY = 1.3
+"""Beyond the longest bars."""
+DASHES: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 0.9}
 SHIFT, REGRET, LIMIT = COLOURS[0], COLOURS[1], COLOURS[3]
 QUIET = "#6b7280"
 NUMBER = 7.0
@@ -49,13 +52,11 @@ def _drawn(found: Found) -> Any:
     }
     excesses = [row.excess for row in found.rows]
     if any(value is not None and value > SHOWN_AS_ZERO for value in excesses):
-        panels["limits"] = {"worst excess of the design found without": excesses}
+        panels["limits"] = {EXCEEDED: excesses}
     title = f"{found.scene.name}, {found.target}: what each effect is worth"
     with own_style(title, *names):
         high = len(panels) * (BAR * len(names) + ROOM) + 0.4
-        figure = blank(WIDTH, high)
-        figure.set_layout_engine("constrained")
-        figure.suptitle(plain(title), fontsize=11, parse_math=False)
+        figure = page(WIDTH, high, title)
         all_axes = [figure.add_subplot(len(panels), 1, place + 1) for place in range(len(panels))]
         entries = [
             _panel(axes, bars, names, found.tolerance, (LIMIT,) if name == "limits" else (SHIFT, REGRET))
@@ -63,8 +64,8 @@ def _drawn(found: Found) -> Any:
         ]
         all_axes[-1].set_xlabel("share of the natural size [%]")
         figure.get_layout_engine().execute(figure)
-        for axes, name, told in zip(all_axes, panels, entries, strict=True):
-            head(axes, name, told)
+        heads = [head(axes, name, told) for axes, name, told in zip(all_axes, panels, entries, strict=True)]
+        figure.finish(high + sum(heads) / 72 - 0.45 * len(heads))
     return figure
 
 
@@ -75,21 +76,22 @@ def _panel(
     tolerance: float,
     colours: Sequence[str],
 ) -> list[Entry]:
-    """Draw bars for each effect, logarithmic, from DECADES below the largest; return what the legend says."""
-    sizes = [abs(value) for values in bars.values() for value in values if value is not None and math.isfinite(value)]
-    largest = max([tolerance, *sizes])
-    most = 100 * largest
-    least = min(100 * tolerance / 10, most / 10**DECADES)
-    axes.set(xscale="log", xlim=(least, most * (most / least) ** 0.03), ylim=(len(names) - 0.4, -0.6))
+    """Draw bars for each effect from 0 to either side, logarithmic where they are long; return what the legend says."""
+    ends = {label: [_end(value, label) for value in values] for label, values in bars.items()}
+    known = [end for each in ends.values() for end in each]
+    signed = EXCEEDED not in bars
+    least, most = min([-100 * tolerance * signed, *known]), max([100 * tolerance, *known])
+    linear = max(100 * tolerance / 10, max(most, -least) / 10**DECADES)
+    axes.set_xscale("symlog", linthresh=linear)
+    axes.set(xlim=(ROOMY * least, ROOMY * most), ylim=(len(names) - 0.4, -0.6))
     axes.set_yticks(range(len(names)), list(map(plain, names)))
     axes.tick_params(axis="y", length=0)
     thick = 0.76 / len(bars)
     entries: list[Entry] = []
     for place, ((label, values), colour) in enumerate(zip(bars.items(), colours, strict=True)):
         middle = (place - (len(bars) - 1) / 2) * thick
-        lengths = [_length(value, label, least, most) for value in values]
         at = [k + middle for k in range(len(names))]
-        drawn = axes.barh(at, [length - least for length in lengths], 0.9 * thick, left=least, color=colour)
+        drawn = axes.barh(at, ends[label], 0.9 * thick, color=colour)
         entries.append((drawn, label))
         for y, value in zip(at, values, strict=True):
             axes.annotate(
@@ -103,17 +105,21 @@ def _panel(
                 color=colour if value is not None else QUIET,
                 parse_math=False,
             )
-    line = axes.axvline(100 * tolerance, color="#111827", linestyle=(0, (4, 2)), linewidth=0.9, zorder=0.5)
+    axes.axvline(0.0, color="#111827", linewidth=0.8)
+    either = [
+        axes.axvline(sign * 100 * tolerance, color="#111827", zorder=0.5, **DASHES) for sign in (1, -1)[: 1 + signed]
+    ]
     axes.xaxis.set_major_formatter(lambda value, place: f"{value:g}")
     axes.minorticks_off()
-    axes.spines[["top", "right"]].set_visible(False)
-    return [*entries, (line, f"tolerance {100 * tolerance:g} %")]
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    return [*entries, (either[0], f"tolerance {100 * tolerance:g} %")]
 
 
-def _length(value: float | None, label: str, least: float, most: float) -> float:
-    """Return where a bar ends, %: of a shift at its size, of what else is none the worse at the beginning."""
-    size = 0.0 if value is None else abs(value) if label == SHIFTED else value
-    return min(max(100 * size, least), most)
+def _end(value: float | None, label: str) -> float:
+    """Return where a bar ends, %: at 0 where nothing is known, where all is rounding, and where limits are held."""
+    if value is None or not math.isfinite(value) or abs(value) <= SHOWN_AS_ZERO:
+        return 0.0
+    return max(100 * value, 0.0) if label == EXCEEDED else 100 * value
 
 
 def _share_text(value: float | None) -> str:

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -159,14 +160,37 @@ def _characters(path: str) -> frozenset[str]:
 
 Entry = tuple[Any, str]
 """What a legend shows a line or a point as, and what it says of it."""
-HEAD_SIZE = 8.0
-"""Of texts, pt."""
+HEAD_SIZE, TITLE_SIZE = 8.0, 9.0
+"""Of texts, and of the title above them, pt."""
 HEAD_GAP = 4.0
 """Between rows, pt."""
+ROOMY = 0.95
+"""Share of a width that a legend of several columns may take: numbers beside axes may get wider."""
 HEAD_COLOUR = "#374151"
-HEAD_LEGEND: dict[str, Any] = {"fontsize": HEAD_SIZE, "frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
+HEAD_LEGEND: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "labelspacing": 0.25}
 HEAD_LEGEND |= {"columnspacing": 1.4, "handlelength": 2.6}
 """What every legend looks like."""
+
+
+def page(width: float, height: float, title: str) -> Any:
+    """Return an empty figure, inches, laid out by matplotlib at every size it is given; its title is wrapped to it."""
+    figure = blank(width, height)
+    figure.laid_out()
+    written = figure.suptitle("", fontsize=11, parse_math=False)
+    for characters in range(200, 20, -10):
+        written.set_text("\n".join(textwrap.wrap(plain(title), characters)))
+        if written.get_window_extent(figure.canvas.get_renderer()).width <= figure.bbox.width - 2 * HEAD_GAP:
+            break
+    return figure
+
+
+def frame(axes: Any) -> None:
+    """Give axes a grid, their ticks, and no border above and on the right."""
+    from loomopt.interface.figures.shown_figure import TICK
+
+    axes.grid(color="#e5e7eb", linewidth=0.5)
+    axes.tick_params(**TICK)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def head(axes: Any, title: str, entries: Sequence[Entry] = (), names: Sequence[tuple[float, str]] = ()) -> float:
@@ -174,46 +198,82 @@ def head(axes: Any, title: str, entries: Sequence[Entry] = (), names: Sequence[t
 
     The figure's layout must have given the axes their width.
     """
-    high = _names(axes, names)
-    if entries:
-        high += _legend(axes, entries, high) + HEAD_GAP
-    axes.set_title(plain(title), loc="left", fontsize=9.0, pad=high + HEAD_GAP, parse_math=False)
-    return high + HEAD_GAP + 12.0
+    above = _names(axes, names)
+    columns = _columns(entries, axes, axes.get_window_extent().width)
+    return float(_page(axes).write(functools.partial(_head, axes, title, entries, columns, above)))
 
 
-def _points(axes: Any) -> float:
-    """Return how many points a pixel is."""
-    return 72.0 / float(axes.figure.dpi)
-
-
-def _legend(axes: Any, entries: Sequence[Entry], above: float) -> float:
-    """Write a legend that begins so many points above the axes, in as many columns as have room; return its height."""
+def _head(axes: Any, title: str, entries: Sequence[Entry], columns: int, above: float, scale: float) -> float:
+    """Write legend and title above axes; above: of what stands there already, pt at full scale; return the height."""
     from matplotlib.transforms import ScaledTranslation
 
-    canvas, width = axes.figure.canvas.get_renderer(), axes.get_window_extent().width
-    place = axes.transAxes + ScaledTranslation(0.0, (above + HEAD_GAP) / 72.0, axes.figure.dpi_scale_trans)
-    for count in range(min(len(entries), 4), 0, -1):
-        legend = axes.legend(
-            [line for line, _ in entries],
-            [plain(text) for _, text in entries],
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            bbox_transform=place,
-            ncols=count,
-            borderaxespad=0.0,
-            **HEAD_LEGEND,
-        )
-        for text in legend.get_texts():
-            text.set_parse_math(False)
-        box = legend.get_window_extent(canvas)
-        if box.width <= width:
-            break
-    return float(box.height) * _points(axes)
+    high = scale * above
+    if entries:
+        up = ScaledTranslation(0.0, (high + scale * HEAD_GAP) / 72.0, axes.figure.dpi_scale_trans)
+        place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "bbox_transform": axes.transAxes + up}
+        legend = _legend(axes, entries, columns, scale, **place, borderaxespad=0.0)
+        high += _high(legend) + scale * HEAD_GAP
+    pad = high + scale * HEAD_GAP
+    if title:
+        axes.set_title(plain(title), loc="left", fontsize=scale * TITLE_SIZE, pad=pad, parse_math=False)
+    return pad + 12.0 * scale * bool(title)
+
+
+def below(figure: Any, entries: Sequence[Entry], title: str = "") -> float:
+    """Write a legend below all axes of a figure; return its height, inches."""
+    columns = _columns(entries, figure, figure.bbox.width - 4 * HEAD_GAP)
+    return float(_page(figure).write(functools.partial(_below, figure, entries, columns, title)))
+
+
+def _below(figure: Any, entries: Sequence[Entry], columns: int, title: str, scale: float) -> float:
+    for legend in list(figure.legends):
+        legend.remove()
+    made = _legend(figure, entries, columns, scale, loc="outside lower center", title=plain(title) or None)
+    return (_high(made) + 2 * HEAD_GAP * scale) / 72.0
+
+
+def _legend(where: Any, entries: Sequence[Entry], columns: int, scale: float, **more: Any) -> Any:
+    """Return a legend of axes or of a figure."""
+    legend = where.legend(
+        [line for line, _ in entries],
+        [plain(text) for _, text in entries],
+        ncols=columns,
+        fontsize=scale * HEAD_SIZE,
+        title_fontsize=scale * HEAD_SIZE,
+        **HEAD_LEGEND,
+        **more,
+    )
+    for text in (*legend.get_texts(), legend.get_title()):
+        text.set_parse_math(False)
+    return legend
+
+
+def _high(legend: Any) -> float:
+    """Return the height of a legend, pt."""
+    root = _page(legend)
+    return float(legend.get_window_extent(root.canvas.get_renderer()).height) * 72.0 / float(root.dpi)
+
+
+def _page(artist: Any) -> Any:
+    """Return the whole figure that something stands in."""
+    return artist.get_figure(root=True)
+
+
+def _columns(entries: Sequence[Entry], where: Any, width: float) -> int:
+    """Return how many columns of a legend have room in a width, pixels."""
+    root = _page(where)
+    for count in range(min(len(entries), 4), 1, -1):
+        legend = _legend(where, entries, count, 1.0)
+        box = legend.get_window_extent(root.canvas.get_renderer())
+        legend.remove()
+        if box.width <= ROOMY * width:
+            return count
+    return 1
 
 
 def _names(axes: Any, names: Sequence[tuple[float, str]]) -> float:
     """Write names above an axis, each in the lowest row where it meets no other; return the height of all rows, pt."""
-    canvas, box = axes.figure.canvas.get_renderer(), axes.get_window_extent()
+    canvas, box = _page(axes).canvas.get_renderer(), axes.get_window_extent()
     low, high = axes.get_xlim()
     wide = (high - low) / box.width
     ends: list[float] = []

@@ -14,13 +14,12 @@ import numpy as np
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, suffix
 from loomopt.interface import study_table
-from loomopt.interface.figures.figure import COLOURS, blank, own_style, put, save
+from loomopt.interface.figures.figure import COLOURS, STYLES, below, frame, head, own_style, page, put, save
 from loomopt.interface.files import outputs
 from loomopt.interface.study_table import Column
 from loomopt.interface.text import studies
 from loomopt.interface.text.layout import spaced
 from loomopt.jobs import registry
-from loomopt.picture import shapes
 from loomopt.picture.shapes import Drawing, Text, extent, plain
 from loomopt.studies.run.rows import Change, Findings, Row, SceneStudy
 
@@ -34,7 +33,7 @@ EDGE = 0.015
 """Least distance of a number from either side of the panel, as a share of its width."""
 SMALL = 7.0
 """Height of numbers and of the list, printer's points."""
-LETTER, PIXELS = 8.0, 72.0
+PIXELS = 72.0
 LINE = 1.45 * SMALL / PIXELS
 """Inches from one line of the list to the next."""
 LONGEST = 105
@@ -117,48 +116,19 @@ def _run(places: Sequence[float], apart: float) -> list[float]:
     return [middle - half + apart * k for k in range(len(places))]
 
 
-def lettered(figure: Any, axes: Any, points: Sequence[tuple[str, float, float]]) -> None:
-    """Name points of a curve by letters beside them, clear of what is drawn in the axes."""
-    figure.draw_without_rendering()
-    unit = LETTER * figure.dpi / PIXELS
-    step = shapes.STEP * unit
-    ways = [_drawn_mark(line) for line in axes.lines]
-    ways += [_corners(each.get_window_extent()) for each in (axes, *axes.texts)]
-    strokes = np.concatenate([_followed(way, step) for way in ways])
-    at = axes.transData.transform([(x, y) for _, x, y in points])
-    wishes = [shapes.LabelWish([(float(x), float(y))], np.pi / 4, 0.9 * unit, unit) for x, y in at]
-    for (letter, x, y), spot in zip(points, shapes.place(wishes, strokes, unit), strict=True):
-        axes.plot(x, y, "o", color="#111827", markersize=5, fillstyle="none")
-        middle = ((spot.box.left + spot.box.right) / 2, (spot.box.bottom + spot.box.top) / 2)
-        place = axes.transAxes.inverted().transform(middle)
-        axes.text(*place, letter, fontsize=LETTER, ha="center", va="center", transform=axes.transAxes, in_layout=False)
-
-
-def _drawn_mark(line: Any) -> Any:
-    """Return the points of a line, pixels."""
-    points = line.get_transform().transform(line.get_xydata())
-    return points[np.isfinite(points).all(axis=1)]
-
-
-def _corners(box: Any) -> Any:
-    """Return the corners of a box, pixels, the first one again at the end."""
-    return np.array([(box.x0, box.y0), (box.x1, box.y0), (box.x1, box.y1), (box.x0, box.y1), (box.x0, box.y0)])
-
-
-def _followed(points: Any, step: float) -> Any:
-    """Return points along the way from each point to the next, closer than a step."""
-    legs = (np.linspace(a, b, 2 + int(np.hypot(*(b - a)) / step)) for a, b in itertools.pairwise(points))
-    return np.concatenate([points, *legs])
-
-
-MOST_PANELS, MOST_LINES = 5, 7
-WIDTH, HIGH, SOUGHT, SKETCH = 10.0, 1.7, 4.2, 3.2
-"""Inches: of the page, of a panel, of one of what is sought, of the column of designs."""
+ONE_COLUMN, MOST_LINES = 5, 7
+"""Panels that stand one below the other, more in two columns; lines of a panel, of more every second, third, ..."""
+WIDTH, MORE, HIGH, SOUGHT, SKETCH = 6.8, 3.4, 1.15, 4.0, 3.2
+"""Inches: of the panels, more of two columns; heights of a panel, of what is sought; of the column of designs."""
+ABOVE, FOOT = 0.4, 0.9
+"""Inches: above each panel, for its name; of the title with what stands below all panels."""
 FINE = 28.0
 """Text heights across a sketch: how fine its lines are, as in a drawing with texts of that height."""
 LEFT_OUT = ("dimensions", "leaders", "notes")
 """Layers that are nothing without their texts."""
 LETTERS = "ABC"
+NAMED = 42
+"""Characters of a line above a design, or of an axis' name."""
 
 
 def plot(study: SceneStudy, rows: Sequence[Row], path: Path | None = None) -> Any:
@@ -193,74 +163,144 @@ def _drawn(study: SceneStudy, findings: Findings, chosen: Sequence[Row]) -> Any:
     rows = findings.rows
     columns = study_table.columns(study, rows)
     places, sought = columns["place"], columns["sought"]
-    panels = sought or studies.shown_columns(study, rows)[:MOST_PANELS]
+    panels = sought or studies.shown_columns(study, rows)
     sketches = [] if registry.of(study.scene).views.missing(study.scene) else [_sketch(study, row) for row in chosen]
     changes = named(findings)
     said = lines(study, changes)
-    high = [(SOUGHT if sought else HIGH)] * len(panels) + [LINE * len(said)] * bool(said)
+    wide = 1 if len(panels) <= ONE_COLUMN else 2
+    count = math.ceil(len(panels) / wide)
+    high = [(SOUGHT if sought else HIGH)] * count + [LINE * len(said)] * bool(said)
+    spots = [(letter, rows.index(row)) for letter, row in zip(LETTERS, chosen, strict=False)]
+    width = WIDTH + (wide - 1) * MORE
     with own_style(study.heading, *(panel.heading for panel in panels), *said):
-        figure = blank(WIDTH if sketches else WIDTH - SKETCH, max(sum(high), 3 * HIGH) + 1.0)
-        figure.set_layout_engine("constrained")
-        ratios = (WIDTH - SKETCH, SKETCH) if sketches else (1.0,)
+        figure = page(width + SKETCH * bool(sketches), sum(high) + count * ABOVE + FOOT, study.heading)
+        ratios = (width, SKETCH) if sketches else (1.0,)
         left, *right = figure.subfigures(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
-        figure.suptitle(plain(study.heading), fontsize=11, parse_math=False)
-        grid = left.add_gridspec(len(high), 1, height_ratios=high)
+        grid = left.add_gridspec(len(high), wide, height_ratios=high)
         shared: Any = None
+        told: dict[str, Any] = {}
         for place, panel in enumerate(panels):
-            shared = axes = left.add_subplot(grid[place], sharex=shared)
-            _panel(axes, panel, places, findings, COLOURS[place % len(COLOURS)])
-            axes.tick_params(labelbottom=place == len(panels) - 1)
-        axes.set_xlabel(places[0].heading, parse_math=False)
-        if len(places) > 1:
-            handles, labels = axes.get_legend_handles_labels()
-            left.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7, frameon=False)
+            column, row = divmod(place, count)
+            shared = axes = left.add_subplot(grid[row, :] if wide == 1 else grid[row, column], sharex=shared)
+            told |= _panel(axes, panel, places, findings, COLOURS[place % len(COLOURS)], spots, bool(sought))
+            last = row == count - 1 or place == len(panels) - 1
+            axes.tick_params(labelbottom=last)
+            if last:
+                axes.set_xlabel(places[0].heading, parse_math=False, fontsize=9)
         if said:
-            listed(left.add_subplot(grid[len(panels)]), said)
+            listed(left.add_subplot(grid[count, :]), said)
+        foot = below(left, [(line, name) for name, line in told.items()], _left_out(rows, places)) if told else 0.0
         size = max((_size(sketch) for sketch in sketches), default=0.0)
-        for place, (letter, row, sketch) in enumerate(zip(LETTERS, chosen, sketches, strict=False)):
+        for place, ((letter, k), sketch) in enumerate(zip(spots, sketches, strict=False)):
             axes = right[0].add_subplot(len(sketches), 1, place + 1, aspect="equal", frame_on=False)
-            axes.set_title(_named(letter, places, sought, rows.index(row)), fontsize=8, parse_math=False)
+            axes.spines[:].set_visible(False)
+            axes.set_title(_named(letter, [*places, *sought], rows[k], k), fontsize=8, parse_math=False)
             _put(axes, sketch, size)
-        for axes, panel in zip(left.axes, panels, strict=False):
-            at = [rows.index(row) for row in chosen]
-            spots = [(letter, places[0].shown[k], panel.shown[k]) for letter, k in zip(LETTERS, at, strict=False)]
-            lettered(figure, axes, [(name, x, y) for name, x, y in spots if x is not None and y is not None])
+        figure.get_layout_engine().execute(figure)
+        for place, (axes, panel) in enumerate(zip(left.axes, panels, strict=False)):
+            letters = [(places[0].shown[k] or 0.0, letter) for letter, k in spots if panel.shown[k] is not None]
+            first = place % count == 0
+            head(axes, "" if sought else panel.heading, names=letters if first else ())
+        alone = textwrap.wrap(findings.message, 70) if len(rows) == 1 else []
+        if alone:
+            left.axes[0].set_title("\n".join(alone), fontsize=9, parse_math=False, pad=20.0)
+        figure.finish(max(figure.get_figheight() + foot, 1.6 * len(sketches) + FOOT))
     return figure
 
 
-def _named(letter: str, places: Sequence[Column], sought: Sequence[Column], at: int) -> str:
-    """Return the heading of a design: its letter and its place, and below it what is sought there."""
-    told = [plain(", ".join(_valued(column, at) for column in columns)) for columns in (places, sought) if columns]
-    return f"{letter}: " + "\n".join(told)
+def _named(letter: str, columns: Sequence[Column], row: Row, at: int) -> str:
+    """Return the heading of a design: its letter, its place, what is sought there and what it misses, a line each."""
+    told = [f"{letter}: {_valued(columns[0], at)}", *(_valued(column, at) for column in columns[1:]), row.shortfall]
+    return "\n".join(plain(line) for text in told for line in textwrap.wrap(text, NAMED))
 
 
 def _valued(column: Column, at: int) -> str:
     return f"{column.name} {column.shown[at]:.6g}{'' if column.unit == '1' else ' ' + column.unit}"
 
 
-def _panel(axes: Any, panel: Column, places: Sequence[Column], findings: Findings, colour: str) -> None:
-    """Draw a number over the first that varies, a line for each combination of the others; no answer leaves a gap."""
+def _parted(rows: Sequence[Row], places: Sequence[Column]) -> dict[tuple[float, ...], list[int]]:
+    """Return the rows over the first number that varies, for each combination of the others."""
+    first, others = places[0], places[1:]
+    found: dict[tuple[float, ...], list[int]] = {}
+    for k in (k for k in range(len(rows)) if first.shown[k] is not None):
+        found.setdefault(tuple(column.shown[k] or 0.0 for column in others), []).append(k)
+    return found
+
+
+def _step(count: int) -> int:
+    """Return which of so many lines are drawn: all of them, every second, ..."""
+    return max(1, -(-count // MOST_LINES))
+
+
+def _left_out(rows: Sequence[Row], places: Sequence[Column]) -> str:
+    """Say how many lines are not drawn; "" where all are."""
+    count = len(_parted(rows, places))
+    step = _step(count)
+    return "" if step == 1 else f"{-(-count // step)} of {count} lines are drawn, one in {step}; the table has all"
+
+
+def _panel(
+    axes: Any,
+    panel: Column,
+    places: Sequence[Column],
+    findings: Findings,
+    colour: str,
+    spots: Sequence[tuple[str, int]],
+    beside: bool,
+) -> dict[str, Any]:
+    """Draw a number over the first that varies, a line for each combination of the others; no answer leaves a gap.
+
+    spots: rows that have a letter; beside: whether the number's name stands beside its axis. Returns what the legend
+    says → what stands for it.
+    """
     first, others, rows = places[0], places[1:], findings.rows
     gaps = [(low / first.size, high / first.size) for low, high in findings.gaps]
-    lines: dict[tuple[float, ...], list[int]] = {}
-    for k in (k for k in range(len(rows)) if first.shown[k] is not None):
-        lines.setdefault(tuple(column.shown[k] or 0.0 for column in others), []).append(k)
-    step = max(1, -(-len(lines) // MOST_LINES))
-    for place, (key, own) in enumerate(itertools.islice(sorted(lines.items()), 0, None, step)):
-        label = plain(", ".join(f"{c.name} {v:.6g} {c.unit}" for c, v in zip(others, key, strict=True)))
+    lines, told = _parted(rows, places), dict[str, Any]()
+    for place, (key, own) in enumerate(itertools.islice(sorted(lines.items()), 0, None, _step(len(lines)))):
+        label = ", ".join(f"{c.name} {v:.6g} {c.unit}" for c, v in zip(others, key, strict=True))
         own.sort(key=lambda k: first.shown[k] or 0.0)
         x = [first.shown[k] or 0.0 for k in own]
         y = [value if rows[k].certified and (value := panel.shown[k]) is not None else math.nan for k in own]
-        own_colour = COLOURS[place % len(COLOURS)] if others else colour
+        own_colour, style = (COLOURS[place % len(COLOURS)], STYLES[place % len(STYLES)]) if others else (colour, "-")
         curve = broken(x, y, gaps)
-        axes.plot(*curve, ".-", color=own_colour, linewidth=1.2, markersize=4, label=label)
-    axes.set_ylabel(panel.name if panel.unit == "1" else f"{panel.name} [{panel.unit}]", parse_math=False)
+        (line,) = axes.plot(*curve, marker=".", linestyle=style, color=own_colour, linewidth=1.2, markersize=5)
+        told |= {label: line} if others else {}
+        missed = [k for k in range(len(own)) if rows[own[k]].shortfall]
+        if missed:
+            (point,) = axes.plot([x[k] for k in missed], [y[k] for k in missed], "s", color=MISSED, **HOLLOW)
+            told |= {" and ".join(dict.fromkeys(rows[own[k]].shortfall for k in missed)): point}
+    if beside:
+        axes.set_ylabel("\n".join(textwrap.wrap(panel.heading, NAMED)), parse_math=False, fontsize=9)
     axes.margins(y=0.18)
+    frame(axes)
     if not others:
         marked(axes, *curve, named(findings), gaps, first.size)
-    axes.ticklabel_format(useOffset=False)
-    axes.grid(color="#e5e7eb", linewidth=0.5)
-    axes.spines[["top", "right"]].set_visible(False)
+    if len({x for x in first.shown if x is not None}) == 1:
+        _alone(axes, first, panel)
+    else:
+        axes.ticklabel_format(useOffset=False)
+    for k in (k for _, k in spots if panel.shown[k] is not None):
+        axes.axvline(
+            first.shown[k] or 0.0, ymax=BELOW - 0.05, color=INK, linewidth=0.5, linestyle=(0, (1, 3)), zorder=0.5
+        )
+        at = first.shown[k] or 0.0, panel.shown[k]
+        axes.plot(*at, "o", color="#111827", markersize=8, fillstyle="none")
+    return told
+
+
+MISSED, HOLLOW = "#b91c1c", {"markersize": 6.0, "fillstyle": "none"}
+"""Of points where a goal of the target is not reached."""
+
+
+def _alone(axes: Any, first: Column, panel: Column) -> None:
+    """Mark on both axes where one point stands, and nothing beside it."""
+    values = sorted({round(value, 12) for value in panel.shown if value is not None})
+    place = next(value for value in first.shown if value is not None)
+    axes.set_xticks([place])
+    axes.set_xlim(place - (0.1 * abs(place) or 1.0), place + (0.1 * abs(place) or 1.0))
+    axes.set_yticks(values if len(values) == 1 else [values[0], values[-1]])
+    axes.xaxis.set_major_formatter(lambda value, place: f"{value:.6g}")
+    axes.yaxis.set_major_formatter(lambda value, place: f"{value:.6g}")
 
 
 def _sketch(study: SceneStudy, row: Row) -> Drawing:

@@ -26,19 +26,30 @@ def test_bars_end_at_the_shares_beside_the_tolerance(shedding):
     marked = [name.removesuffix(" (may go)") for name in names if name.endswith("(may go)")]
     assert marked == list(shedding.left_out)
     assert [name.split()[0] for name in names] == [row.effect for row in shedding.rows]
-    assert first.get_xscale() == "log"
-    assert first.lines[0].get_xdata() == [1.0, 1.0], "the tolerance, %"
+    assert first.get_xscale() == "symlog"
+    assert [line.get_xdata()[0] for line in first.lines] == [0.0, 1.0, -1.0], "zero and the tolerance, %"
     for row, end in zip(shedding.rows, ends(limits, 0), strict=True):
-        assert end == pytest.approx(max(100 * row.excess, limits.get_xlim()[0]), rel=1e-9)
+        assert end == pytest.approx(max(100 * row.excess, 0.0), rel=1e-9, abs=1e-9)
     warp = next(k for k, row in enumerate(shedding.rows) if row.effect == "warp_tension")
     assert ends(first, 1)[warp] == pytest.approx(100 * shedding.rows[warp].regret["K1"], rel=1e-9)
-    assert set(ends(first, 0)) == {first.get_xlim()[0]}, "no shift"
+    assert set(ends(first, 0)) == {0.0}, "no shift"
     told = [text.get_text() for text in limits.texts]
     assert f"{100 * shedding.rows[0].excess:+.3g} %" in told
 
 
+def test_what_gets_less_has_a_bar_to_the_other_side(shedding):
+    axes = shedding.plot().axes[0]
+    regrets = [row.regret["K1"] for row in shedding.rows]
+    assert min(regrets) < -0.1
+    for value, bar in zip(regrets, axes.containers[1], strict=True):
+        assert bar.get_width() == pytest.approx(100 * value, rel=1e-9, abs=1e-9)
+    low, high = axes.get_xlim()
+    assert low < 100 * min(regrets)
+    assert high > 100 * max(regrets)
+
+
 def test_nothing_meets(shedding):
-    assert overlaps.found(shedding.plot()) == []
+    assert overlaps.found_at_every_size(shedding.plot()) == []
     long = replace(shedding, rows=tuple(replace(row, effect=row.effect * 3) for row in shedding.rows[:2]))
     assert overlaps.found(long.plot()) == []
 

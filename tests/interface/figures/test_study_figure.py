@@ -5,11 +5,14 @@ import math
 from dataclasses import replace
 
 import pytest
+from matplotlib.text import Text
 from support import inch, overlaps
 
 import loomopt as lo
 from loomopt.base.errors import BadInput
 from loomopt.interface.figures import study
+from loomopt.interface.text import studies
+from loomopt.jobs import registry
 from loomopt.studies import sweep
 from loomopt.studies.front import front
 from loomopt.studies.front.plan import sloped
@@ -31,7 +34,7 @@ def row(point, certified=True):
 def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs():
     figure = study.plot(PLAN, [row(0), row(1), row(2, certified=False), row(3), row(4)])
     axes = figure.axes
-    assert [each.get_ylabel() for each in axes[:2]] == ["peak_torque [N*m]", "l2 [mm]"]
+    assert [each.get_title("left") for each in axes[:2]] == ["peak_torque [N*m]", "l2 [mm]"]
     curve = axes[0].get_lines()[0].get_ydata()
     assert [math.isnan(value) for value in curve] == [False, False, True, False, False]
     titles = [each.get_title() for each in axes[2:]]
@@ -40,7 +43,7 @@ def test_panels_show_the_objective_and_what_differs_with_gaps_and_three_designs(
     assert axes[1].get_xlabel() == "operation.M0 [N*m]"
     sizes = {round(each.get_xlim()[1] - each.get_xlim()[0], 12) for each in axes[2:]}
     assert len(sizes) == 1, "designs are of one scale"
-    assert overlaps.found(figure) == []
+    assert overlaps.found_at_every_size(figure) == []
 
 
 def test_without_a_certified_row_there_is_nothing_to_draw():
@@ -98,12 +101,13 @@ def test_a_front_is_one_panel_with_its_changes_named_and_a_jump_left_open():
         "2  m4e 1.6 kg to 1.60001 kg: jump, swing max",
     ]
     assert [text.get_text() for text in panel.texts] == ["1", "2", "A", "B", "C"]
+    assert all(text.xyann[1] > 0 for text in panel.texts[2:]), "letters stand above the curve"
     assert [each.get_title() for each in designs] == [
         "A: m4e 0 kg\npeak_torque 96 N*m",
         "B: m4e 0.8 kg\npeak_torque 95.2 N*m",
         "C: m4e 2 kg\npeak_torque 90 N*m",
     ]
-    assert overlaps.found(figure) == []
+    assert overlaps.found_at_every_size(figure) == []
 
 
 def test_many_changes_close_together_are_numbered_without_meeting():
@@ -120,18 +124,98 @@ def test_many_changes_close_together_are_numbered_without_meeting():
     assert len(numbers) >= 23
     assert all(one.get_position()[0] < other.get_position()[0] for one, other in itertools.pairwise(numbers))
     assert len(listed.texts[0].get_text().splitlines()) >= len(numbers)
-    assert overlaps.found(figure) == []
+    assert overlaps.found_at_every_size(figure) == []
 
 
 def test_one_design_that_is_best_in_both_is_drawn():
     alone = (replace(JUMPING[0], point=0), replace(JUMPING[0], point=1))
     figure = study.plot(FRONT, alone)
     assert [each.get_title() for each in figure.axes[1:]] == ["A: m4e 2 kg\npeak_torque 90 N*m"]
-    assert overlaps.found(figure) == []
+    panel = figure.axes[0]
+    assert panel.get_title() == "peak_torque and m4e do not conflict: one design is best in both."
+    figure.draw_without_rendering()
+    told = [[label.get_text() for label in axis.get_ticklabels()] for axis in (panel.xaxis, panel.yaxis)]
+    assert told == [["2"], ["90"]], "the point's own values, and nothing beside them"
+    assert overlaps.found_at_every_size(figure) == []
 
 
 def test_a_front_of_an_inch_machine_is_drawn_in_inches():
     scene = inch.scene("beatup", operation__speed="350 rpm")
     figure = study.plot(replace(FRONT, scene=front.trade(scene, FRONT.axes, ranges=RANGES).scene), JUMPING)
     assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == ("m4e [lb]", "peak_torque [lbf*in]")
-    assert overlaps.found(figure) == []
+    assert overlaps.found_at_every_size(figure) == []
+
+
+def test_a_sweep_of_all_that_a_rapier_has_shows_all_of_it():
+    scene = lo.load("rapier")
+    plan = sweep.planned(scene, {"operation.s_dwell": "4:8:2 mm"})
+    today = registry.of(scene).today(scene)
+    rows = [
+        replace(
+            row(k),
+            place={"operation.s_dwell": 0.004 + 0.002 * k},
+            design={name: value * (1 + 0.01 * k) for name, value in today.items()},
+            figures={"peak_acceleration": 0.7 + k},
+        )
+        for k in range(3)
+    ]
+    figure = study.plot(plan, rows)
+    shown = [column.heading for column in studies.shown_columns(plan, rows)]
+    assert len(shown) > 5
+    assert [axes.get_title("left") for axes in figure.axes[: len(shown)]] == shown
+    assert overlaps.found_at_every_size(figure) == []
+
+
+def two_ways(first, second):
+    """Return the figure of a sweep over two numbers, so many values each."""
+    over = {
+        "operation.M0": [f"{700 + 5 * k} N*m" for k in range(first)],
+        "bounds.l2.max": [f"{84 + 0.125 * k} mm" for k in range(second)],
+    }
+    plan = sweep.planned(lo.load("beatup"), over, "torque")
+    rows = []
+    for k in range(first * second):
+        one, other = divmod(k, second)
+        place = {"operation.M0": 700.0 + 5 * one, "bounds.l2.max": 0.084 + 0.000125 * other}
+        figures = {"peak_torque": 90.0 + one + 0.3 * other}
+        rows.append(replace(row(k), place=place, figures=figures, design=dict(TODAY.design) | {"l2": 0.07 + 0.001 * k}))
+    return study.plot(plan, rows)
+
+
+@pytest.mark.parametrize(("first", "second"), [(2, 2), (5, 7), (3, 17), (1, 4)])
+def test_nothing_of_a_two_way_sweep_runs_into_anything(first, second):
+    figure = two_ways(first, second)
+    assert overlaps.found_at_every_size(figure) == []
+    (legend,) = figure.subfigs[0].legends
+    drawn = [text.get_text() for text in legend.get_texts()]
+    if second <= study.MOST_LINES:
+        assert len(drawn) == second
+        assert legend.get_title().get_text() in ("", "None")
+    else:
+        assert len(drawn) == 6
+        assert legend.get_title().get_text() == "6 of 17 lines are drawn, one in 3; the table has all"
+
+
+def test_a_row_that_misses_its_goal_is_marked_and_named():
+    rows = [replace(row(k), reached={"M3_fdc": k > 1}) for k in range(4)]
+    figure = study.plot(PLAN, rows)
+    (legend,) = figure.subfigs[0].legends
+    assert [text.get_text() for text in legend.get_texts()] == ["M3_fdc not reached"]
+    for axes in figure.axes[:2]:
+        (marks,) = [line for line in axes.lines if line.get_color() == study.MISSED]
+        assert list(marks.get_xdata()) == [700.0, 710.0]
+    titles = [axes.get_title() for axes in figure.axes[2:]]
+    assert titles[0] == "A: operation.M0 700 N*m\nM3_fdc not reached"
+    assert "not reached" not in titles[-1]
+    assert overlaps.found_at_every_size(figure) == []
+
+
+def test_a_size_that_is_given_is_the_figures_size_and_texts_are_as_large_as_there_is_room():
+    figure = study.plot(PLAN, [row(k) for k in range(4)])
+    own = figure.get_size_inches()
+    sizes = sorted({text.get_fontsize() for text in figure.findobj(Text)})
+    figure.set_size_inches(*(own / 2))
+    assert list(figure.get_size_inches()) == list(own / 2)
+    assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx([s / 2 for s in sizes])
+    figure.set_size_inches(*(own * 2))
+    assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx(sizes)
