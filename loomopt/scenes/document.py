@@ -74,11 +74,7 @@ def _read_text(path: Path, origin: str) -> str:
 def copied(table: object, origin: str, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return a copy of nested tables. Raises BadInput for a name that is not text and for endless nesting."""
     if not isinstance(table, Mapping):
-<<<<<<< HEAD
-        remedy = 'Give a scene\'s tables, such as {"problem": {"job": "…"}}'
-=======
         remedy = "Give the tables of a scene: names and their values"
->>>>>>> 3605581 (Plug-ins that fail are tested; the changelog tells of stores, arguments, plug-ins and workers)
         raise refusal("it is not a mapping", origin, value=table, remedy=remedy)
     if len(path) > _DEEPEST:
         remedy = "Write a scene as `loomopt new` does"

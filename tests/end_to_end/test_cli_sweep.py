@@ -55,7 +55,7 @@ def test_tables_and_figures_are_written_with_their_provenance(cli, tmp_path):
     assert table["l2 [mm]"].iloc[0] == pytest.approx(77.0038, rel=1e-6)
     assert other.attrs["study"] == "sweep"
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "f.svg").read_text().count("operation.M0") == 4, "the axis and three designs"
+    assert (tmp_path / "f.svg").read_text().count("operation.M0") == 5, "two columns of panels and three designs"
     _, _, _ = cli("beatup", *M0, "--si", "--out", "si.csv")
     assert "l2 [m]" in (tmp_path / "si.csv").read_text()
 

@@ -1,6 +1,7 @@
 """A figure that shows itself in Jupyter, and whose texts stay clear of each other at any size it is given."""
 
 from collections.abc import Callable
+from io import BytesIO
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -9,9 +10,9 @@ from matplotlib.text import Annotation, Text
 
 DOTS = 110
 """Per inch of a figure on a page of a notebook."""
-PADS = {"w_pad": 0.06, "h_pad": 0.05}
+PADS: dict[str, Any] = {"w_pad": 0.06, "h_pad": 0.05}
 """Around axes, inches."""
-TICK = {"pad": 3.5, "length": 3.5, "labelsize": 9.0}
+TICK: dict[str, Any] = {"pad": 3.5, "length": 3.5, "labelsize": 9.0}
 """Of ticks and their numbers, pt."""
 LABEL = 4.0
 """From the numbers of an axis to its name, pt."""
@@ -51,6 +52,11 @@ class ShownFigure(Figure):
             if 0.0 < scale != self.scale:
                 self._shrink(scale)
 
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        self.savefig(picture, format="png", dpi=DOTS)
+        return picture.getvalue()
+
     def _shrink(self, scale: float) -> None:
         """Have all texts, and what stands between them, at a scale of the size that they were made in."""
         ratio, self.scale = scale / self.scale, scale
@@ -58,9 +64,10 @@ class ShownFigure(Figure):
         if isinstance(engine, ConstrainedLayoutEngine):
             engine.set(**{name: scale * size for name, size in PADS.items()})
         for text in self.findobj(Text):
-            text.set_fontsize(text.get_fontsize() * ratio)
+            text.set_fontsize(float(text.get_fontsize()) * ratio)
             if isinstance(text, Annotation):
-                text.xyann = tuple(ratio * each for each in text.xyann)
+                x, y = map(float, text.xyann)
+                text.xyann = ratio * x, ratio * y
         for axes in self.axes:
             for each in (axes, *axes.child_axes):
                 each.tick_params(**{name: scale * size for name, size in TICK.items()})
