@@ -93,7 +93,7 @@ def test_sigterm_stops_as_ctrl_c_does_and_workers_leave_nothing_behind(tmp_path)
     done = called(sys.executable, str(script), "sweep", "beatup", *over, cwd=tmp_path)
     assert done.returncode == 130
     assert done.stdout.startswith("beatup, balance: 2 of 7 points")
-    wrote, stopped = done.stderr.splitlines()
+    *_, wrote, stopped = done.stderr.splitlines()  # after lines of progress, on a slow machine
     assert wrote == "Wrote t.csv, 2 of the 7 points, as far as they were finished"
     assert stopped == "loomopt: stopped; nothing was left half-written."
     assert (tmp_path / "t.csv").exists()

@@ -14,6 +14,7 @@ from nbclient import NotebookClient
 from loomopt.interface.cli import shell as told
 
 CLEARED = "\x1b[K"
+APART = told.APART
 
 
 class Terminal:
@@ -85,7 +86,7 @@ def test_in_a_pipe_a_line_every_few_seconds_says_what_is_being_done(capsys, paus
 
 
 def test_what_takes_a_few_seconds_says_nothing_in_a_pipe(capsys):
-    assert 3.0 <= told.APART <= 10.0
+    assert 3.0 <= APART <= 10.0
     with told.Progress() as progress:
         for step in range(3):
             progress.say(f"start {step} of 3")
