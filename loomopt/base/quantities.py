@@ -32,7 +32,7 @@ _RATIO_PATTERN = rf"^[ \t]*{NUMBER_PATTERN}(?: */ *{NUMBER_PATTERN})?[ \t]*$"
 def pattern_schema(kind: str, least: float, above: float, below: float, allowed: str) -> dict[str, Any]:
     """Return the JSON Schema of a quantity's raw value; least, above, below: its range, SI; allowed: it in words.
 
-    Under the key `QUANTITY` stands a name that equal ones share.
+    Under the key `QUANTITY` stands a name that equal ones share. What fails is told by a sentence: see `told`.
     """
     refused = [_NEGATIVE] if max(least, above) >= 0 else []
     refused += [_ZERO] if above >= 0 else []
@@ -44,10 +44,18 @@ def pattern_schema(kind: str, least: float, above: float, below: float, allowed:
         text["not"] = {"anyOf": [{"pattern": pattern} for pattern in refused]}
     head = {QUANTITY_PATTERN: _name(kind, least, above, below), "description": allowed}
     if kind != "number":
-        return {**head, **text}
+        return {**head, **told(text, allowed)}
     ends = {"minimum": least, "exclusiveMinimum": above, "exclusiveMaximum": below}
     number = {"type": "number"} | {name: end for name, end in ends.items() if math.isfinite(end)}
-    return {**head, "anyOf": [number, text]}
+    return {**head, **told({"anyOf": [number, text]}, allowed)}
+
+
+def told(check: dict[str, Any], allowed: str) -> dict[str, Any]:
+    """Return a JSON Schema that takes what `check` takes, and of anything else says what is allowed.
+
+    Editors repeat the part that fails: a pattern says nothing to a person, the one value that would be taken does.
+    """
+    return {"if": check, "else": {"const": allowed}}
 
 
 def _name(kind: str, least: float, above: float, below: float) -> str:

@@ -101,7 +101,8 @@ class DesignStudy:
 
     def __repr__(self) -> str:
         certified = sum(row.certified for row in self.rows)
-        count = counted(self.study, len(self.rows))
+        narrowing = sum(row.narrows for row in self.rows)
+        count = counted(self.study, len(self.rows) - narrowing) + (f" and {narrowing} that narrow" if narrowing else "")
         return f"<DesignStudy {self.study.name} of {self.study.heading}: {count}, {certified} certified>"
 
     def _repr_html_(self) -> str | None:

@@ -1,6 +1,7 @@
 """What a designer works with in Python: a design that was evaluated or found, as tables, curves, figures and files."""
 
 import dataclasses
+import inspect
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -153,6 +154,12 @@ class Answer(Evaluation, solution.Solution):
     @property
     def _summary(self) -> str:
         return f"limits that clash: {', '.join(self.clash)}" if self.clash else super()._summary
+
+
+for _shown in (Answer, Evaluation):  # names alone: whoever reads `help` looks for what is in it, and makes none
+    _signature = inspect.signature(_shown)
+    _named = [each.replace(annotation=each.empty, default=each.empty) for each in _signature.parameters.values()]
+    _shown.__signature__ = _signature.replace(parameters=_named, return_annotation=_signature.empty)  # type: ignore[attr-defined]
 
 
 def _html(thing: records.Shown) -> str:

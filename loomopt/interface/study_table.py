@@ -107,6 +107,8 @@ def frame(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> "pd.DataF
         cells |= {column.heading: _floats(column) for column in made[part]}
     for name in dict.fromkeys(name for row in rows for name in row.reached):
         cells[f"{name} reached"] = pd.array([row.reached.get(name) for row in rows], dtype="boolean")
+    if any(row.narrows for row in rows):
+        cells["narrows"] = [row.narrows for row in rows]
     cells["parent"] = pd.array([row.parent for row in rows], dtype="Int64")
     cells |= {"time [s]": [row.seconds for row in rows], "reason": [row.reason for row in rows]}
     found = TableFrame(cells, index=pd.Index([row.point for row in rows], name="point"))

@@ -10,7 +10,7 @@ from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.model.session import working
 from loomopt.physics.effects.kinds import Event
-from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.physics.tolerances import ACCURACY, SHOWN_AS_ZERO
 from loomopt.scenes import designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
@@ -99,14 +99,20 @@ def _per_second(row: dict[str, Any], kind: str, scene: Scene, speed: Any) -> lis
 
 def _without_rounding(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return rows whose numbers are 0 where they are only rounding beside the largest one of their unit."""
-    sizes: dict[str, float] = {}
-    for row in found:
-        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
+    sizes = largest(found)
     for row in found:
         for column in ("today", "design"):
             if row[column] is not None and abs(row[column]) <= SHOWN_AS_ZERO * sizes[row["unit"]]:
                 row[column] = 0.0
     return found
+
+
+def largest(found: list[dict[str, Any]]) -> dict[str, float]:
+    """Return the largest magnitude in rows of each unit."""
+    sizes: dict[str, float] = {}
+    for row in found:
+        sizes[row["unit"]] = max(sizes.get(row["unit"], 0.0), abs(row["design"]), abs(row["today"] or 0.0))
+    return sizes
 
 
 def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: bool = False) -> "pd.DataFrame":
@@ -129,20 +135,40 @@ def row(solution: Evaluated, scene: Scene, target: str, outcome: str, *, si: boo
     return frame
 
 
-def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
-    """Return curves, SI, as a file has them.
+SHAFT = "omega"
+"""The column of curves that is the shaft's speed, told in the unit of the scene's own; what swings is in rad/s."""
+EVALUATED = 14
+"""Significant digits of what is computed of a given design: two less than float64 has."""
 
-    In the units that [display] chooses, in inches and pounds where these are the scene's, else in SI.
-    """
+
+def filed(frame: "pd.DataFrame", scene: Scene) -> "pd.DataFrame":
+    """Return curves, SI, as a file has them: in the units of the scene's tables, in digits that mean something."""
     from loomopt.model.curves import split
 
     found, names = frame.copy(), {}
     for column in frame.columns:
         name, si = split(column)
-        unit = scene.filed_in(si)
+        unit = scene.shown_in("angular speed") if name == SHAFT else scene.unit_for(si)
         if unit != si:
             found[column], names[column] = frame[column] / factor(unit), f"{name} [{unit}]"
-    return found.rename(columns=names)
+    return meaningful(found.rename(columns=names), EVALUATED)
+
+
+def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFrame":
+    """Return a table whose numbers have the digits that mean something, and no -0 or what is only rounding beside a 0.
+
+    digits: significant ones; without, two more than the accuracy that the table says it was found with.
+    """
+    if digits is None:
+        digits = 2 + math.ceil(-math.log10(float(frame.attrs.get("accuracy", ACCURACY))))
+    found = frame.copy()
+    for place, column in enumerate(frame.columns):
+        values = frame[column]
+        if values.dtype.kind == "f":
+            tiny = 10.0**-digits * values.abs().max()
+            kept = [v if math.isnan(v) else 0.0 if abs(v) <= tiny else float(f"{v:.{digits}g}") for v in values]
+            found.isetitem(place, kept)
+    return found
 
 
 @working()

@@ -185,6 +185,12 @@ def problems() -> dict[str, Path]:
     return dict(sorted((brought()[0] | packaged.problems()).items()))
 
 
+def is_packaged(scene: Scene) -> bool:
+    """Say whether a scene was read from the file of a packaged one, whatever the call changed in it."""
+    folder = scene.paths.folder
+    return folder is not None and (folder / Path(scene.origin).name).resolve() in map(Path.resolve, problems().values())
+
+
 def results(scene: Scene) -> Path:
     """Return the folder of the reference results of a scene's job."""
     return packaged.results_path() if scene.job in own_names() else _folder(scene.job, "results")

@@ -217,15 +217,15 @@ class Sampler:
         """Return the extremes beside singular positions that even samples may miss."""
 
         def heights(angles: Floats) -> Floats:
-            return self.heights(name, self._at_angles(name, angles))
+            return self.heights(name, self.at_angles(name, angles))
 
         found = []
         for angle in (peak for centre in self.singular for peak in turning_points.spike_peaks(heights, centre)):
-            value = float(self._at_angles(name, np.array([angle]))[0])
+            value = float(self.at_angles(name, np.array([angle]))[0])
             found.append(Extreme(*self.cycle.place(angle), value, signed=name in self.model.signed))
         return found
 
-    def _at_angles(self, name: str, angles: Floats) -> Floats:
+    def at_angles(self, name: str, angles: Floats) -> Floats:
         """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
         self.session.positions += len(angles)
         node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))

@@ -76,16 +76,6 @@ def unit_for(si: str, known: Mapping[str, str]) -> str:
     return known[kind] if kind else _composed(si, {letter: known[base] for letter, base in _BASES.items()}) or si
 
 
-def filed_in(si: str, known: Mapping[str, str], chosen: bool) -> str:
-    """Return the unit in which a file of curves has what has an SI unit; known: unit of every kind of quantity.
-
-    chosen: whether the scene's [display] chooses units. Without it lengths and forces are the SI's unless the scene's
-    are no decimal multiples of them (inches, pounds), and angles are in rad.
-    """
-    unit = unit_for(si, known)
-    return unit if chosen or not (_is_decimal(unit) or fits(unit, "angle")) else si
-
-
 def _written(
     document: Mapping[str, Any],
     schema: SceneSchema,

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
 from loomopt.base import arguments
-from loomopt.base.errors import MACHINE, SAME, BadInput, Faults, clean, misread, nearest, refusal, shown, unknown
+from loomopt.base.errors import MACHINE, SAME, BadInput, Faults, clean, nearest, refusal, shown, unknown
 from loomopt.base.quantities import quantity_of
 from loomopt.base.records import Frozen, Shown, freeze, lazy
-from loomopt.base.units import QuantityError, show
+from loomopt.base.units import show
 from loomopt.physics.effects.kinds import Effect, Load, label, owned, required
 from loomopt.physics.schema import Table
 from loomopt.scenes import display
@@ -192,14 +192,6 @@ class Scene(Shown):
     def unit_for(self, si: str) -> str:
         """Return the unit in which a person sees what has an SI unit, such as a curve in m/rad."""
         return display.unit_for(arguments.text(si, "si", *_SI), self.units)
-
-    def filed_in(self, si: str) -> str:
-        """Return the unit in which a file of curves has what has an SI unit."""
-        chosen = bool(self.document.get("display"))
-        try:
-            return display.filed_in(arguments.text(si, "si", *_SI), self.units, chosen)
-        except QuantityError as error:
-            raise misread(error, "", "si", si) from None
 
     def show(self, value: float, kind: str, digits: int = 6) -> str:
         """Return an SI value as text with the unit in which a person sees its kind; digits: significant ones."""

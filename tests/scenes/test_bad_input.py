@@ -6,6 +6,7 @@ import math
 import os
 import pickle
 import re
+from typing import Any
 
 import pytest
 
@@ -342,7 +343,7 @@ def test_a_scene_with_eight_mistakes_names_eight_the_worst_first():
     document, keys = copy.deepcopy(dict(BEATUP.document)), []
     del document["mechanism"]["l4"]
     del document["effects"]["resistance"]
-    values: dict[str, object]
+    values: Any
     for table, values, wrong in EIGHT:
         document[table] = {**document[table], **values}
         keys += wrong

@@ -92,7 +92,7 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
 
     contents = {
         "answer.json": document(solution) + "\n",
-        "table.csv": provenance.csv(tables.answer(solution, scene)),
+        "table.csv": provenance.csv(tables.meaningful(tables.answer(solution, scene))),
         "curves.csv": provenance.csv(
             tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
         ),

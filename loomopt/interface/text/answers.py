@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.quantities import shortest_text
 from loomopt.base.units import factor
-from loomopt.interface.tables import rows
+from loomopt.interface.tables import largest, rows
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
-from loomopt.physics.tolerances import SLACK
+from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, Words, remedies
 from loomopt.solving.certificate.verdict import GlobalBound
@@ -70,11 +70,18 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
         unit = "" if row["unit"] == "1" else row["unit"]
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
     shown = {row["name"] for row in table}
-    lines += [
-        (limit.name, *([""] if before else []), "", "", joined(f"<- {missed[limit.name]}"), *([""] * len(marked)))
-        for limit in found.limits
-        if limit.name not in shown and not limit.ok
-    ]
+    words, pads, sizes = Words(scene), [""] * len(marked), largest(table)
+    for limit in found.limits:
+        # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
+        if limit.name not in shown and (not limit.ok or limit.name not in scene.schema.margins):
+            unit = words.unit(limit.name)
+            size = factor(unit)
+            ends = (None if end is None else end / size for end in (limit.min, limit.max))
+            told = joined(_limit(*ends) + ("" if limit.ok else f"  <- {missed[limit.name]}"))
+            value = limit.value / size
+            value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
+            cells = (f"{value:.6g}", "" if unit == "1" else unit, told, *pads)
+            lines.append((limit.name, *([""] if before else []), *cells))
     first = ("", "today") if before else ("",)
     return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right=tuple(range(1, len(first) + 1)))
 
@@ -197,8 +204,7 @@ def proofs(found: "Proofs") -> list[str | Grid]:
         unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
-        shown = "" if unit == "1" else unit
-        lines.append((joined(proof.text), proof.status, *sizes, shown, str(proof.boxes), place))
+        lines.append((joined(proof.text), proof.status, *sizes, unit, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
     table = Grid("", head, tuple(lines), right=(2, 3, 5, 6))
     uncovered = (f"Not covered: {text}." for text in found.uncovered)

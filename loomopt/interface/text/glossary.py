@@ -176,7 +176,13 @@ def labels(scene: Scene) -> frozenset[str]:
 
 
 def printed(scene: Scene) -> list[str | Grid]:
-    """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why."""
+    """Return the tables of `loomopt show --sources`: what is printed, what is computed, the verdict and why.
+
+    Of a scene that is not packaged, whose machine no source prints, it is what the scene itself says.
+    """
+    if not registry.is_packaged(scene):
+        said = f"source: {scene.source}" if scene.source else "source: not given"
+        return [f"{scene.name}: a scene of one's own; no printed figures are known of its machine", said]
     source = read(scene.job)
     lines = tuple(
         (each.key, each.printed or "not printed", each.computed, "" if each.unit == "-" else each.unit, each.verdict)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
-from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of
+from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of, told
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
@@ -48,13 +48,16 @@ def display(schema: SceneSchema) -> Json:
 
 def _unit(kind: str) -> Json:
     said = f'a unit of {kind} such as "{DISPLAY_UNIT[kind]}"'
-    return {"type": "string", "description": said, "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
+    known = {"type": "string", "not": {"pattern": rf"^[ \t]*(?:{foreign(kind)})[ \t]*$"}}
+    return {"description": said, **told(known, said)}
 
 
 def _problem(schema: SceneSchema) -> Json:
     found = _model(Problem)
     found["properties"] |= {"job": {"const": schema.name}}
-    found["properties"]["name"] |= {"pattern": _NAME}
+    name = found["properties"]["name"]
+    del name["type"]
+    name |= told({"type": "string", "pattern": _NAME}, "a name of letters, digits, - and _, as of a file")
     return found
 
 
@@ -84,7 +87,8 @@ def _bounds(schema: SceneSchema) -> Json:
 
 def _bound(value: Json) -> Json:
     free = {"enum": [True, False, "true", "false"], "description": "false: held at today's value until it is freed"}
-    return {"anyOf": [value, _closed({"min": value, "max": value, "free": free}, ["min", "max"])]}
+    ends = _closed({"min": value, "max": value, "free": free}, ["min", "max"])
+    return {"if": {"type": "object"}, "then": ends, "else": value}
 
 
 def _limits(schema: SceneSchema) -> Json:

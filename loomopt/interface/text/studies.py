@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from loomopt.base.files import atomically, check, suffix
 from loomopt.base.units import show
-from loomopt.interface import study_table
+from loomopt.interface import study_table, tables
 from loomopt.interface.files import outputs
 from loomopt.interface.study_table import Column
 from loomopt.interface.text.layout import Grid, joined
@@ -23,6 +23,8 @@ SAME = 1e-9
 
 KINDS = {"jump": "jump", "kink": "kink", "active set": "what binds changes"}
 """Kind of a change, as it is told."""
+NARROWS = "*"
+"""What marks a point that was not asked for, but narrows a change down."""
 MOST_REASONS = 5
 """Reasons that are told below a table."""
 
@@ -42,7 +44,7 @@ def check_figure(path: Path) -> None:
 def table(path: Path, frame: "pd.DataFrame") -> None:
     """Write a table as CSV or Parquet, its provenance in it. Raises BadInput."""
     if suffix(path, TABLES) == ".csv":
-        outputs.text(path, csv(frame))
+        outputs.text(path, csv(tables.meaningful(frame)))
     else:
         atomically(path, frame.to_parquet)
 
@@ -72,12 +74,15 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     lines = []
     for place, row in enumerate(found.rows):
         cells = ["" if each is None else f"{each:.6g}" for each in (column.shown[place] for column in columns)]
-        lines.append((str(row.point), *cells, row.shortfall or ("" if row.status == "optimal" else row.status)))
+        mark = f"{row.point}{NARROWS}" if row.narrows else str(row.point)
+        lines.append((mark, *cells, row.shortfall or ("" if row.status == "optimal" else row.status)))
     counts = Counter(row.outcome for row in found.rows)
     outcome = ", ".join(f"{count} {status}" for status, count in counts.items())
     whole = study.size is None or len(rows) == study.size
-    number = len(found.rows)
+    narrowing = sum(row.narrows for row in found.rows)
+    number = len(found.rows) - narrowing
     count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
+    count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
     grid = Grid("", (*heads, "status"), tuple(lines), right=tuple(range(len(heads))))
     reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []

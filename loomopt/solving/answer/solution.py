@@ -22,8 +22,8 @@ class Proof:
     """What is shown of one limit, SI.
 
     name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
-    the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: a crank angle,
-    rad, where the limit fails.
+    the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: the crank angle,
+    rad, of that value where the limit fails.
     """
 
     name: str

@@ -133,8 +133,22 @@ def _over_cycle(read: _Read, claim: _Claim) -> Proof:
     found = [read.boxes.bound(claim.quantity, sign, claim.bound + slack, claim.where) for sign in signs]
     worst = max(found, key=lambda each: RANK[each.status])
     count = sum(each.boxes for each in found)
-    angle = None if worst.angle is None else worst.angle % (2 * math.pi)
-    return Proof(claim.name, claim.text, worst.status, claim.bound - claim.peak, slack, count, angle, claim.kind)
+    most, angle = claim.peak, None
+    if worst.angle is not None:
+        most, angle = _highest(read.sampler, claim, worst.angle)
+    return Proof(claim.name, claim.text, worst.status, claim.bound - most, slack, count, angle, claim.kind)
+
+
+def _highest(sampler: Sampler, claim: _Claim, angle: float) -> tuple[float, float]:
+    """Return where a quantity exceeds its bound most, as far as is known: how high it is there, and the angle, rad.
+
+    angle: where the boxes ended, which may be anywhere beyond the bound, or at a peak that the samples miss.
+    """
+    height = float(sampler.heights(claim.quantity, sampler.at_angles(claim.quantity, np.array([angle])))[0])
+    known = max(sampler.extremes(claim.quantity, claim.where), key=lambda each: each.height, default=None)
+    if known is not None and not height > known.height:
+        height, angle = known.height, sampler.angle(known)
+    return height, angle % (2 * math.pi)
 
 
 def _single(read: _Read, limit: Limit, text: str) -> Proof:

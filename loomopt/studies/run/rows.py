@@ -97,6 +97,11 @@ class Row:
         """What came of it, for people: its status, and the goals that it misses."""
         return f"{self.status} but {self.shortfall}" if self.shortfall else self.status
 
+    @property
+    def narrows(self) -> bool:
+        """Whether it is none of the points that were asked for: it narrows down where something changes."""
+        return bool(self.warm.get("fine"))
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON data from which `from_dict` makes the same row, bit by bit."""
         told = {each.text: value for each, value in self.multipliers.items()}
@@ -109,7 +114,8 @@ class Row:
 
     def row_json(self) -> dict[str, Any]:
         """Return what `--json` prints of it: all but what only a neighbour needs."""
-        return {name: value for name, value in self.as_dict().items() if name != "warm"}
+        told = {name: value for name, value in self.as_dict().items() if name != "warm"}
+        return told | ({"narrows": True} if self.narrows else {})
 
 
 def digest(rows: Iterable[Row]) -> str:

@@ -25,7 +25,7 @@ KNOWN = {
         "not",
         "anyOf",
     ),
-    *("allOf", "if", "then", "properties", "required", "additionalProperties", "items", "minItems", "maxItems"),
+    *("allOf", "if", "then", "else", "properties", "required", "additionalProperties", "items", "minItems", "maxItems"),
     *("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minProperties"),
 }
 
@@ -54,7 +54,7 @@ def valid(schema, data, root=None):
         return False
     if "anyOf" in schema and not any(map(keeps, schema["anyOf"])):
         return False
-    if "if" in schema and keeps(schema["if"]) and not keeps(schema["then"]):
+    if "if" in schema and not keeps(schema.get("then" if keeps(schema["if"]) else "else", {})):
         return False
     return _inside(schema, data, root)
 

@@ -116,6 +116,22 @@ def test_what_the_program_refuses_and_a_schema_can_see_is_not_valid(key, value):
         assert not judged(data)
 
 
+@pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in BAD.items() for value in values])
+def test_what_an_editor_says_is_a_sentence(key, value):
+    jsonschema = pytest.importorskip("jsonschema")
+    data = changed(SCENES["beatup"], key, value)
+    for error in jsonschema.Draft202012Validator(of("beatup")).iter_errors(data):
+        assert len(error.message) < 600, error.message
+        assert not {"[0-9]", "(?:"} & {error.message[k : k + n] for n in (5, 3) for k in range(len(error.message))}
+
+
+def test_what_an_editor_says_of_a_quantity_names_an_example():
+    jsonschema = pytest.importorskip("jsonschema")
+    data = changed(SCENES["beatup"], "mechanism.l1", "31 kg")
+    (error,) = jsonschema.Draft202012Validator(of("beatup")).iter_errors(data)
+    assert error.message == "'a length such as \"31 mm\", more than 0 mm' was expected"
+
+
 def test_an_effect_asks_for_what_it_needs():
     short = changed(SCENES["beatup"], "effects.centrifugal", {})
     assert judged(short)
