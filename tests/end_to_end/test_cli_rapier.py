@@ -137,9 +137,9 @@ def test_simulate_writes_curves_that_say_their_units(cli, tmp_path):
     status, out, _ = cli("simulate", "rapier", "--with", "head_inertia", "--out", file)
     assert (status, out) == (0, "")
     curves = pd.read_csv(file, comment="#")
-    assert str(next(iter(curves))).endswith("[rad]")
-    assert {"S [m]", "S_1 [m/rad]", "S_2 [m/rad^2]"} <= set(curves)
-    assert curves["S [m]"].max() == pytest.approx(0.84923, abs=1e-4)
+    assert str(next(iter(curves))).endswith("[deg]")
+    assert {"S [mm]", "S_1 [m/rad]", "S_2 [m/rad^2]"} <= set(curves)
+    assert curves["S [mm]"].max() == pytest.approx(849.23, abs=0.1)
     assert curves.notna().all(axis=None)
 
 

@@ -151,14 +151,20 @@ def test_simulate_writes_curves_that_say_their_units(cli, tmp_path):
     status, out, _ = cli("simulate", "shedding", *arguments, "--out", file)
     assert (status, out) == (0, "")
     curves = pd.read_csv(file, comment="#")
-    assert next(iter(curves)) == "phi [rad]"
+    assert next(iter(curves)) == "phi [deg]"
     terms = [
         f"{name} [N]" for name in ("return_spring", "weight", "warp_tension", "inertia", "damping", "dry_friction")
     ]
-    assert {"X [m]", "X_1 [m/rad]", "X_2 [m/rad^2]", "N [N]", "pressure_angle [rad]", "curvature [1/m]", *terms} <= set(
-        curves
-    )
-    assert curves["X [m]"].max() == pytest.approx(0.0656, rel=1e-14)
+    assert {
+        "X [mm]",
+        "X_1 [m/rad]",
+        "X_2 [m/rad^2]",
+        "N [N]",
+        "pressure_angle [deg]",
+        "curvature [1/m]",
+        *terms,
+    } <= set(curves)
+    assert curves["X [mm]"].max() == pytest.approx(65.6, rel=1e-14)
     assert (curves[terms].sum(axis=1) - curves["N [N]"]).abs().max() <= 1e-12 * curves["N [N]"].abs().max()
     assert curves.notna().all(axis=None)
 
@@ -166,9 +172,9 @@ def test_simulate_writes_curves_that_say_their_units(cli, tmp_path):
 def test_the_cam_angle_of_the_curves_never_goes_back(cli, tmp_path):
     file = tmp_path / "curves.csv"
     assert cli("simulate", "shedding", "--out", file)[0] == 0
-    angles = pd.read_csv(file, comment="#")["phi [rad]"]
+    angles = pd.read_csv(file, comment="#")["phi [deg]"]
     assert angles.is_monotonic_increasing
-    assert [angles.iloc[0], angles.iloc[-1]] == pytest.approx([0, 2 * math.pi], abs=1e-15)
+    assert [angles.iloc[0], angles.iloc[-1]] == pytest.approx([0, 360], abs=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -206,3 +206,12 @@ def test_the_methods_that_an_editor_completes_are_there():
     assert {"plot", "draw", "export", "to_frame", "table", "curves", "evaluate", "simulate", "prove"} <= names
     assert (Path(lo.__file__).parent / "py.typed").is_file()
     assert all(inspect.getdoc(kind) for kind in CLASSES)
+
+
+@pytest.mark.parametrize("shown", [lo.Answer, lo.Evaluation])
+def test_a_signature_is_names_that_can_be_read(shown):
+    text = str(inspect.signature(shown))
+    assert text.startswith("(problem, effects, design, figures, units, limits")
+    assert "loomopt" not in text
+    assert "<factory>" not in text
+    assert ("certificate" in text) == (shown is lo.Answer)

@@ -105,8 +105,8 @@ def test_bounds_come_back_as_they_were_given():
 @pytest.mark.parametrize(
     ("scene", "units"),
     [
-        (SCENE, ("rad", "N*m")),
-        (inch.scene("beatup"), ("rad", "lbf*in")),
+        (SCENE, ("deg", "N*m")),
+        (inch.scene("beatup"), ("deg", "lbf*in")),
         (SCENE.set("display.torque", "kN*m"), ("deg", "kN*m")),
     ],
     ids=["metric", "inches", "chosen"],
@@ -119,6 +119,31 @@ def test_a_file_of_curves_has_the_scenes_units(scene, units, tmp_path):
     assert filed[f"Md [{torque}]"].to_numpy() * factor(torque) == pytest.approx(plain["Md [N*m]"].to_numpy(), rel=1e-12)
     assert [str(column).split(" [")[0] for column in filed] == [str(column).split(" [")[0] for column in plain]
     assert "psi_t [rad/s]" in filed
+
+
+def test_a_file_of_curves_has_the_units_of_the_tables_and_no_rounding(tmp_path):
+    outputs.curves(tmp_path / "curves.csv", lo.load("shedding").with_effect("separation"), {})
+    text = (tmp_path / "curves.csv").read_text()
+    assert {"phi [deg]", "X [mm]", "N [N]"} <= set(read_back(text))
+    outputs.curves(tmp_path / "turning.csv", SCENE.with_effect("speed_fluctuation"), {})
+    turning = read_back((tmp_path / "turning.csv").read_text())
+    assert turning["omega [rpm]"].mean() == pytest.approx(600, rel=0.1)
+    assert "psi_t [rad/s]" in turning
+    cells = [cell for line in text.splitlines() if line[0].isdigit() for cell in line.split(",")]
+    assert not [cell for cell in cells if cell.startswith("-0.0") and float(cell) == 0.0]
+
+
+def test_a_table_s_digits_are_those_of_its_accuracy():
+    frame = pd.DataFrame({"l [mm]": [99.99999999980778, 1e-12, -0.0, math.nan], "n": [1, 2, 3, 4]})
+    frame.attrs["accuracy"] = "1e-08"
+    shown = tables.meaningful(frame)
+    assert shown["l [mm]"].tolist()[:3] == [100.0, 0.0, 0.0]
+    assert math.copysign(1, shown["l [mm]"][2]) == 1
+    assert math.isnan(shown["l [mm]"][3])
+    assert shown["n"].tolist() == [1, 2, 3, 4]
+    assert shown.attrs == frame.attrs
+    frame.attrs["accuracy"] = "1e-11"
+    assert tables.meaningful(frame)["l [mm]"][0] == 99.99999999981
 
 
 def test_csv_reads_back_to_the_last_digit(answer):

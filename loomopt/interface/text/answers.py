@@ -71,17 +71,17 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
     shown = {row["name"] for row in table}
     words, pads, sizes = Words(scene), [""] * len(marked), largest(table)
-    for limit in found.limits:
+    for each in found.limits:
         # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
-        if limit.name not in shown and (not limit.ok or limit.name not in scene.schema.margins):
-            unit = words.unit(limit.name)
+        if each.name not in shown and (not each.ok or each.name not in scene.schema.margins):
+            unit = words.unit(each.name)
             size = factor(unit)
-            ends = (None if end is None else end / size for end in (limit.min, limit.max))
-            told = joined(_limit(*ends) + ("" if limit.ok else f"  <- {missed[limit.name]}"))
-            value = limit.value / size
+            low, high = (None if end is None else end / size for end in (each.min, each.max))
+            told = joined(_limit(low, high) + ("" if each.ok else f"  <- {missed[each.name]}"))
+            value = each.value / size
             value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
             cells = (f"{value:.6g}", "" if unit == "1" else unit, told, *pads)
-            lines.append((limit.name, *([""] if before else []), *cells))
+            lines.append((each.name, *([""] if before else []), *cells))
     first = ("", "today") if before else ("",)
     return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right=tuple(range(1, len(first) + 1)))
 

@@ -122,7 +122,8 @@ def test_what_an_editor_says_is_a_sentence(key, value):
     data = changed(SCENES["beatup"], key, value)
     for error in jsonschema.Draft202012Validator(of("beatup")).iter_errors(data):
         assert len(error.message) < 600, error.message
-        assert not {"[0-9]", "(?:"} & {error.message[k : k + n] for n in (5, 3) for k in range(len(error.message))}
+        assert "[0-9]" not in error.message
+        assert "(?:" not in error.message
 
 
 def test_what_an_editor_says_of_a_quantity_names_an_example():

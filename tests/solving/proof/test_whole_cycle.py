@@ -5,6 +5,7 @@ import math
 import time
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from proofs import CLAIMED, DWELL, JOBS, SLACK, proofs_of, solved, violated
 
@@ -137,3 +138,13 @@ def test_solve_with_prove_says_that_the_cycle_is_proven_and_changes_nothing_else
     assert (answer.status, answer.certificate.passed, answer.certificate.whole_cycle) == ("optimal", True, "proven")
     assert before.certificate.whole_cycle in ("refined", "bounded")
     assert (answer.design, answer.figures) == (before.design, before.figures)
+
+
+@pytest.mark.parametrize("speed", ["520 rpm", "640 rpm"])
+def test_margin_and_angle_are_of_the_same_place(speed):
+    scene = lo.load("shedding").set("operation.speed", speed)
+    (proof,) = [each for each in lo.prove(scene).proofs if each.status == "violated"]
+    curves = lo.simulate(scene)
+    there = np.interp(proof.angle, curves["phi [rad]"], curves["N [N]"])
+    assert proof.margin == pytest.approx(lo.evaluate(scene).figures["contact_min"], rel=1e-9)
+    assert proof.margin == pytest.approx(there, rel=1e-4), "between rows"
