@@ -169,8 +169,7 @@ def checked(model: type[_Model], raw: object, origin: str, path: str, faults: Fa
         faults.add(error)
         return _right({}, model).model_copy(update=dict.fromkeys(fields, math.nan))
     known = {name: value for name, value in given.items() if name in fields}
-    others = [name for name in fields if name not in known]
-    meant = {nearest(name, others, least=SAME) for name in given if name not in fields} - {""}
+    meant = {nearest(name, fields, given) for name in given if name not in fields} - {"", *known}
     wrong = dict.fromkeys(meant, math.nan)
     _all_known(given, fields, "key", origin, path, faults)
     try:
@@ -299,6 +298,8 @@ def demand(
     if any(effect.beside or effect.clashes for effect in active):
         _combined(active, origin, faults)
     for effect, own in active.items():
+        if any(value != value for _, value in own):  # what it is known in is not known
+            continue
         words = {key: value for key, value in own if isinstance(value, str)}
         if isinstance(effect, Load) and effect.known_in(words) and not schema.partly_known:
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"

@@ -376,6 +376,12 @@ def test_one_mistake_is_told_once():
     document["bounds"]["M0"] = {"min": "0.5 kN*m", "max": "1 kN*m"}
     keys = [fault.key for fault in caught(scene, document).faults]
     assert sorted(keys) == ["effects.inertia.J4", "operation.M0"]
+    document = changed("mechanism", "l", "31 mm")
+    del document["mechanism"]["l4"]
+    assert len(caught(scene, document).faults) == 1
+    shedding = copy.deepcopy(dict(load("shedding").document))
+    shedding["effects"]["warp_tension"]["shape"] = "steps"
+    assert [fault.key for fault in caught(scene, shedding).faults] == ["effects.warp_tension.shape"]
     tables = {name: copy.deepcopy(table) for name, table in BEATUP.document.items()}
     tables["mechnism"] = tables.pop("mechanism")
     assert [fault.key for fault in caught(scene, tables).faults] == ["mechnism"]

@@ -23,7 +23,7 @@ class Proof:
 
     name: of the limit, or of the figure whose claimed peak it is. margin: by how much the refined value stays clear of
     the limit, negative where it exceeds it; slack: what is left open; boxes: how many it took; angle: the crank angle,
-    rad, of that value where the limit fails.
+    rad, of that value where the limit fails; unit: SI, of margin and slack.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Proof:
     boxes: int
     angle: float | None = None
     kind: Literal["limit", "assembly", "peak"] = "limit"
+    unit: str = "1"
 
     @property
     def limit(self) -> str:

@@ -55,7 +55,10 @@ def prove(
     own, asked = (scene, name) if judged_by else job.adopted(scene, full, name)
     program = judged_by or job.program(own, asked)
     reads = _readings(own, job, program, full, slack)
-    found = tuple(_merged(list(_proofs(program, job, Words(own), *reads))))
+    words = Words(own)
+    found = tuple(
+        replace(each, unit=words.si(each.name)) for each in _merged(list(_proofs(program, job, words, *reads)))
+    )
     whole = reads[1].sampler
     return Proofs(scene.name, name, found, scene, model.uncovered(whole.model.effects, whole.given.own))
 
