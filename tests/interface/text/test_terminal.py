@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import loomopt as lo
 from loomopt.base.quantities import read
 from loomopt.interface import api
 from loomopt.interface.text import answers, layout, scenes
-from loomopt.interface.text.layout import Grid
+from loomopt.interface.text.layout import Grid, spaced
 from loomopt.jobs.registry import load
 from loomopt.physics.effects import kinds
 from loomopt.solving.answer.solution import Words
@@ -231,3 +232,24 @@ def test_the_proofs_stand_in_the_json_as_prove_prints_them():
     found = api.solve(SCENE, prove=True)
     assert found.as_dict()["proofs"] == api.prove(SCENE, found).as_dict()["proofs"]
     assert "proofs" not in api.solve(SCENE).as_dict()
+
+
+def test_points_that_narrow_a_change_down_are_marked_and_counted_apart():
+    from loomopt.interface.text import studies
+
+    front = lo.pareto("beatup", ("peak_torque", "m4e"), target="balance", points=5)
+    head, _, grid, *_ = studies.parts(front.study, front.solved)
+    marked = [line[0] for line in grid.lines if line[0].endswith(studies.NARROWS)]
+    assert marked
+    assert len(grid.lines) - len(marked) <= 5
+    assert f"{len(grid.lines) - len(marked)} points and {len(marked)} that narrow" in head
+    assert front.table()["narrows"].sum() == len(marked)
+    assert [row for row in front.as_dict()["rows"] if row.get("narrows")]
+
+
+def test_an_evaluation_shows_value_and_limit_of_what_is_no_figure():
+    scene = lo.load("shedding-static").set("operation.N_min", "50 N")
+    *_, grid = (part for part in answers.evaluation(lo.evaluate(scene), scene, None) if not isinstance(part, str))
+    line = next(line for line in grid.lines if line[0] == "N_min")
+    assert line[1:3] == ("148.236", "N")
+    assert spaced(line[3]) == ">= 50"
