@@ -36,7 +36,7 @@ def parts(study: AccuracyStudy) -> list[str | Grid]:
     found = tuple((joined(name), _order(study, name), _knee(study, name)) for name in named)
     return [
         f"{study.problem}: relative errors against references at least 100 times tighter, and what they cost",
-        Grid("", head, tuple(lines), right=(2, 3, 4, 5)),
+        Grid("", head, tuple(lines), right=(2, 3, 4, 5), first=(0, 1, 2, 3, 4, 6), more="--json, --out F.csv"),
         Grid(
             "Measured orders, and the settings from which on errors stop falling", ("", "order", "knee"), found, (1, 2)
         ),

@@ -1,6 +1,7 @@
 """What a person sees of an answer: a sentence, short tables, the certificate in one line."""
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from loomopt.base.quantities import shortest_text
@@ -83,7 +84,10 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
             cells = (f"{value:.6g}", "" if unit == "1" else unit, told, *pads)
             lines.append((each.name, *([""] if before else []), *cells))
     first = ("", "today") if before else ("",)
-    return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right=tuple(range(1, len(first) + 1)))
+    count = len(first)
+    right = tuple(range(1, count + 1))
+    asked = (0, *range(count, count + 3 + len(marked)))
+    return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=asked, more="--json")
 
 
 def lists(found: Evaluated, scene: Scene) -> list[str]:
@@ -146,6 +150,8 @@ def certificate(answer: Solution) -> list[str]:
     return [line, *([f"Chosen among equals: {'; '.join(found.choices)}"] if found.choices else [])]
 
 
+COMPARED = re.compile("[<>=]")
+"""What stands in a limit that is a comparison and no sentence."""
 BEYOND = {-1: "below", 1: "above"}
 
 
@@ -204,8 +210,9 @@ def proofs(found: "Proofs") -> list[str | Grid]:
         unit = words.unit(proof.name)
         sizes = (f"{proof.margin / factor(unit) + 0.0:.3g}", f"{proof.slack / factor(unit):.1g}")
         place = "" if proof.angle is None else f"{proof.angle / factor(angle):.4f}"
-        lines.append((joined(proof.text), proof.status, *sizes, unit, str(proof.boxes), place))
+        text = joined(proof.text) if COMPARED.search(proof.text) else proof.text
+        lines.append((text, proof.status, *sizes, unit, str(proof.boxes), place))
     head = ("limit", "status", "margin", "up to", "unit", "boxes", f"fails at [{angle}]")
-    table = Grid("", head, tuple(lines), right=(2, 3, 5, 6))
+    table = Grid("", head, tuple(lines), right=(2, 3, 5, 6), first=(0, 1, 2, 4, 6), more="--json")
     uncovered = (f"Not covered: {text}." for text in found.uncovered)
     return [f"{found.problem}, {found.target}: {found.said}", table, *uncovered]

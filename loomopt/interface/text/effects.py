@@ -38,14 +38,20 @@ def _shown(found: Found, name: str) -> str:
 def _grid(found: Found, timed: bool) -> Grid:
     words, scales = Words(found.scene), found.reference.scales
     heads, times = ["without"], ["build\ns", "solve\ns"] if timed else []
+    names = ["without"]
     for name in scales:
         unit = words.unit(name)
+        names += [f"{name} shift", f"{name} shift %", f"{name} regret %"]
         heads += [f"{name}\nshift" + ("" if unit == "1" else f"\n{unit}"), "\n\n%", "\nregret\n%"]
     heads += ["limits\nexceeded\n%", "graph\nnodes", *times, "may go", ""]
     base = Worth("nothing", {}, {}, None, True, found.reference.status, **found.reference.cost)
     first = _line(found, base, timed)
     lines = ((*first[:-2], "", first[-1]), *(_line(found, row, timed) for row in found.rows))
-    return Grid("", tuple(heads), lines, right=tuple(range(1, len(heads) - 2)))
+    names += heads[len(names) :]
+    last = len(heads) - 1  # what came of the solve, where that is not an optimum
+    first = (0, last - 1, last) if any(line[-1] for line in lines) else (0, last - 1)
+    right = tuple(range(1, last - 1))
+    return Grid("", tuple(heads), lines, right, first=first, names=tuple(names), more="--json")
 
 
 def _line(found: Found, row: Worth, timed: bool) -> tuple[str, ...]:

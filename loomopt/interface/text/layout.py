@@ -1,10 +1,11 @@
 """Text for terminals and pipes: paragraphs and tables. Nothing is wrapped in a pipe, by Rich what a terminal needs."""
 
+import itertools
 import os
 import re
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import zip_longest
@@ -15,6 +16,8 @@ JOINED = "\ue000"
 """A space at which no line breaks: it is printed as a space, but no white space to Rich."""
 RULED = "    \n    \n -- \n    \n    \n    \n    \n    \n"
 """One rule under the heading and no other line, in Rich's terms."""
+LONGEST_WORD = 30
+"""Characters of a word beyond which it is broken where it must be, such as an address."""
 UNWRAPPED = 10_000
 """Columns of a pipe or a file."""
 ONE_CELL = re.compile(
@@ -25,12 +28,22 @@ ONE_CELL = re.compile(
 
 @dataclass(frozen=True)
 class Grid:
-    """A table; right: places of right-aligned columns, the others may be wrapped; a heading may have lines."""
+    """A table; right: places of right-aligned columns, the others may be wrapped; a heading may have lines.
+
+    Where a terminal is too narrow columns go, the last of what is asked for first. first: places in the order in which
+    they are asked for, those that it does not name after them, from the left; units: places of columns that are the
+    unit of the one before, and go with it; names: what columns are called that have gone, their headings without; more:
+    where else all columns are.
+    """
 
     title: str
     columns: tuple[str, ...]
     lines: tuple[tuple[str, ...], ...]
     right: tuple[int, ...] = ()
+    first: tuple[int, ...] = ()
+    units: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+    more: str = ""
 
 
 def joined(text: str) -> str:
@@ -89,6 +102,71 @@ def _spread(grid: Grid) -> list[str]:
     return ["", *([grid.title] if grid.title else []), *lines[:below], "-" * len(lines[0]), *lines[below:], ""]
 
 
+def narrowed(grid: Grid, columns: int) -> tuple[Grid, str]:
+    """Return a table with as many of its columns as fit without cutting a word, and which are not among them; or ""."""
+    least = _least(grid, columns)
+    rank = [*grid.first, *(place for place in range(len(least)) if place not in grid.first)]
+    kept = {place for place in rank if place not in grid.units}
+    while len(kept) > 1 and _total(least[place] for place in _with_units(grid, kept)) > columns:
+        kept.remove(max(kept, key=rank.index))
+    places = _with_units(grid, kept)
+    if len(places) == len(least):
+        return grid, ""
+    gone = [place for place in range(len(least)) if place not in places and place not in grid.units]
+    names = [(grid.names or grid.columns)[place] for place in gone]
+    told = ", ".join(joined(" ".join(name.split())) for name in names if name.strip())
+    there = ", ".join(
+        [f"a terminal of {_enough(grid, columns)} columns or a pipe (| cat)", *([grid.more] if grid.more else [])]
+    )
+    taken = [tuple(row[place] for place in places) for row in (grid.columns, *grid.lines)]
+    right = tuple(place for place, old in enumerate(places) if old in grid.right)
+    return Grid(grid.title, taken[0], tuple(taken[1:]), right), f"Not shown here: {told}. All columns: {there}."
+
+
+def _enough(grid: Grid, columns: int) -> int:
+    """Return how wide a terminal is, wider than `columns`, that shows all columns of a table."""
+    return next(wide for wide in itertools.count(columns + 1) if _total(_least(grid, wide)) <= wide)
+
+
+def _with_units(grid: Grid, kept: Collection[int]) -> list[int]:
+    """Return the places of columns with those of their units, from the left."""
+    return [p for p in range(len(grid.columns)) if (p - 1 if p in grid.units else p) in kept]
+
+
+def _least(grid: Grid, columns: int) -> list[int]:
+    """Return how wide each column is at least: of what may be wrapped its longest word, else its longest line.
+
+    The first column is wrapped only where not all columns fit otherwise.
+    """
+    cells = list(zip(grid.columns, *grid.lines, strict=True))
+    lines = [max(len(line) for cell in column for line in cell.split("\n")) for column in cells]
+    words = [max(map(_unbroken, " ".join(column).split()), default=0) for column in cells]
+    least = [lines[p] if p in grid.right else words[p] for p in range(len(cells))]
+    whole = [lines[0], *least[1:]]
+    return whole if _total(whole) <= columns else least
+
+
+def _unbroken(word: str) -> int:
+    """Return how many characters of a word stay on one line: all but of an address, or of what is as long as one."""
+    return len(word) if JOINED in word else min(len(word), LONGEST_WORD)
+
+
+def _total(widths: Iterable[int]) -> int:
+    return sum(width + len(GAP) for width in widths) - len(GAP)
+
+
+def _widths(grid: Grid, columns: int) -> list[int]:
+    """Return how wide columns are where not all words stand on one line: the widest that may wrap gives way first."""
+    least = _least(grid, columns)
+    widths = [
+        max(len(line) for cell in column for line in cell.split("\n"))
+        for column in zip(grid.columns, *grid.lines, strict=True)
+    ]
+    while _total(widths) > columns and (wide := [p for p in range(len(widths)) if widths[p] > least[p]]):
+        widths[max(wide, key=lambda place: widths[place])] -= 1
+    return widths
+
+
 def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
     """Return paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
@@ -96,7 +174,10 @@ def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
     console = Console(file=StringIO(), width=columns, color_system=None, highlight=False, markup=False)
     for part in parts:
         if isinstance(part, Grid):
-            console.print(_table(part), crop=False)
+            grid, gone = narrowed(part, columns)
+            console.print(_table(grid, _widths(grid, columns)), crop=False)
+            for line in [gone] if gone else []:
+                console.print(_paragraph(line), crop=False)
         else:
             for line in part.split("\n"):
                 console.print(_paragraph(line), crop=False)
@@ -112,8 +193,8 @@ def _paragraph(line: str) -> Any:
     return Padding(Text(line.strip()), (0, 0, 0, indent)) if indent else Text(line)
 
 
-def _table(grid: Grid) -> Any:
-    """Return a table in Rich's terms, a blank line before and after it."""
+def _table(grid: Grid, widths: Sequence[int]) -> Any:
+    """Return a table in Rich's terms, a blank line before and after it; widths: of its columns."""
     from rich import box
     from rich.padding import Padding
     from rich.table import Table
@@ -132,7 +213,12 @@ def _table(grid: Grid) -> Any:
     for place, column in enumerate(grid.columns):
         right = place in grid.right
         table.add_column(
-            Text(column), justify="right" if right else "left", no_wrap=right or place == 0, vertical="top"
+            Text(column),
+            justify="right" if right else "left",
+            no_wrap=right,
+            overflow="fold",
+            vertical="top",
+            width=widths[place],
         )
     for line in grid.lines:
         table.add_row(*map(Text, line))

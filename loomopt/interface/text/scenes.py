@@ -41,7 +41,7 @@ def parts(scene: Scene) -> list[str | Grid]:
         f"Job: {scene.job}, {scene.schema.title}",
         f"Source: {scene.source or 'not given'}",
         f"Tables show {', '.join(f'{key} in {scene.shown_in(kind)}' for key, kind in _kinds(scene).items())}",
-        Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2)),
+        Grid("Numbers", ("key", "as given", "SI", ""), tuple(lines), right=(1, 2), units=(3,)),
         Grid("Effects that are on", ("effect", "what it is"), effects) if effects else "No effect is on",
         *told(scene),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",

@@ -464,6 +464,9 @@ class Found:
             | {"effects": list(self.reference.effects), "reads": list(self.reference.reads)},
             "units": self.units,
             "rows": [row.as_dict() for row in self.rows],
+            "other_figures": {
+                row.effect: {"takes_away": list(row.lost), "changes": list(row.moved)} for row in self.rows
+            },
             "tolerance": self.tolerance,
             "together": self.together.as_dict() if self.together else None,
             "kept": list(self.kept),

@@ -81,8 +81,6 @@ class Worth:
             "solve_s": self.solve_s,
             "status": self.status,
             "why": self.why,
-            "takes_away": list(self.lost),
-            "changes": list(self.moved),
         }
 
 
