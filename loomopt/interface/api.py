@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 Given = Scene | solution.Evaluated | str | os.PathLike[str]
 """A scene, an answer in its own scene, or what `load` takes: a packaged name or a path."""
-Loaded = Scene | Evaluation
-"""What `load` returns; a file's name does not tell type checkers which, and most name scenes."""
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a file's name does not tell type checkers what `load` returns, and most name scenes
     Loaded = Scene | Any
+else:
+    Loaded = Scene | Evaluation
 
 __all__ = [
     "Answer",

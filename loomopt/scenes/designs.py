@@ -278,7 +278,7 @@ def _call(told: object, origin: str) -> Call:
         remedy = "Give the answer as it was printed, or its design object alone"
         allowed = "set: keys and values; with, without, free: names; target: a name"
         raise refusal("it does not say what a call changes", origin, "scene.call", allowed=allowed, remedy=remedy)
-    on, off, free = map(tuple[str, ...], names)
+    on, off, free = (tuple(each) for each in names)
     return Call(copied(values, origin), on, off, free, target)
 
 

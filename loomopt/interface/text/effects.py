@@ -49,9 +49,9 @@ def _grid(found: Found, timed: bool) -> Grid:
     lines = ((*first[:-2], "", first[-1]), *(_line(found, row, timed) for row in found.rows))
     names += heads[len(names) :]
     last = len(heads) - 1  # what came of the solve, where that is not an optimum
-    first = (0, last - 1, last) if any(line[-1] for line in lines) else (0, last - 1)
+    asked = (0, last - 1, last) if any(line[-1] for line in lines) else (0, last - 1)
     right = tuple(range(1, last - 1))
-    return Grid("", tuple(heads), lines, right, first=first, names=tuple(names), more="--json")
+    return Grid("", tuple(heads), lines, right, first=asked, names=tuple(names), more="--json")
 
 
 def _line(found: Found, row: Worth, timed: bool) -> tuple[str, ...]:

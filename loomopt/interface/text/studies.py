@@ -84,9 +84,8 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     count = f"{number} point{'' if number == 1 else 's'}" if whole else counted(study, len(rows))
     count += f" and {narrowing} that narrow{'s' * (narrowing == 1)} changes down ({NARROWS})" if narrowing else ""
     asked = range(min(len(study.kinds) + 2, len(heads)))  # the point, its place, what is sought there
-    more = "--out F.csv, --json"
     right = tuple(range(len(heads)))
-    grid = Grid("", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more=more)
+    grid = Grid("", (*heads, "status"), tuple(lines), right, first=(*asked, len(heads)), more="--out F.csv, --json")
     reasons = [f"point {row.point}, {row.status}: {row.reason}" for row in found.rows if row.reason]
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
     message = [found.message] if found.message else []
