@@ -270,7 +270,7 @@ def read_given(path: Path) -> DesignGiven:
 
 def _call(told: object, origin: str) -> Call:
     """Return what the call of an answer changed. Raises BadInput."""
-    entries = told if isinstance(told, Mapping) else {"": told}
+    entries: Mapping[str, Any] = told if isinstance(told, Mapping) else {"": told}
     names = [entries.get(name, []) for name in ("with", "without", "free")]
     values, target = entries.get("set", {}), entries.get("target")
     listed = all(isinstance(each, list) and all(isinstance(name, str) for name in each) for each in names)
