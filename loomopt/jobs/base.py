@@ -21,6 +21,7 @@ from loomopt.model.model import JobModel
 from loomopt.model.objectives import Objective, Value
 from loomopt.model.program import (
     LEAST_CHANGE,
+    Added,
     AxisMove,
     Goal,
     Move,
@@ -114,6 +115,7 @@ class Task(abc.ABC):
             self.today(),
             self.single(),
             self.goals(),
+            None if self.traded else self.added(),
         )
 
     def demand_figures(self) -> None:
@@ -303,6 +305,10 @@ class Task(abc.ABC):
     def single(self) -> str:
         """Return why every local optimum is the best there is; "" where that is not so."""
         return ""
+
+    def added(self) -> Added | None:
+        """Return what the target's designs add as mass; None where they add none, or weigh it themselves."""
+        return None
 
     # Natural sizes.
 

@@ -152,6 +152,19 @@ class Variable:
         return self.label or self.name
 
 
+class Added(NamedTuple):
+    """What a design adds as mass, and what that must be worth.
+
+    least: the level that seeks the least of it; without: the variables of a design that has none, SI, nothing where
+    some must be; share: of each figure, what less of it may cost; wholly: whether only none of it may cost that.
+    """
+
+    least: Objective
+    without: Mapping[str, float]
+    share: float
+    wholly: bool
+
+
 class Goal(NamedTuple):
     """What a target asks of a figure: from `low` to `high`, SI, met to `slack` times |another figure|, or SI."""
 
@@ -215,6 +228,8 @@ class Program:
     """Why every local optimum is the best there is, where that is so."""
     goals: tuple[Goal, ...] = ()
     """What the target asks of figures, and may find out of reach."""
+    added: Added | None = None
+    """What is added as mass, where levels may give way for less of it."""
 
     @lazy
     def structure(self) -> Hashable:

@@ -103,6 +103,9 @@ NEWTON_SHIFT = "1e-3"
 GIVES_WAY, MOVED = 1e-12, 1e-9
 """What a limit may give way to a silent level, and the least move of a variable that is told as a choice."""
 
+INDIFFERENT = 1e-3
+"""Share of a figure that no part is added for: a tenth of what machining and measuring leave of a torque."""
+
 SAME_OBJECTIVE = 1e-7
 """Objectives that agree to this are one optimum: ten times the usual accuracy."""
 

@@ -322,7 +322,7 @@ class Scene(Shown):
             "effects": {name: own.model_dump() for name, own in self.effects.items()},
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
-            "targets": {name: own.model_dump(exclude={"expected"}) for name, own in self.targets.items()},
+            "targets": {name: _deciding(own) for name, own in self.targets.items()},
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
 
@@ -372,6 +372,11 @@ def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
     if curve is None or len(key) != 1:
         return ()
     return curve.instead if key[0] == curve.key else (curve.key,) if key[0] in curve.instead else ()
+
+
+def _deciding(own: Table) -> dict[str, Any]:
+    """Return what of a target's table decides an answer; an indifference only where one is given."""
+    return own.model_dump(exclude={"expected"} | ({"indifference"} - own.model_fields_set))
 
 
 def _put_on(document: Mapping[str, Any], *effect: str) -> Mapping[str, Any]:

@@ -66,10 +66,10 @@ def solve(
 
             refused = f"{', '.join(sold)} comes in sizes, which boxes do not tell" if sold else ""
             search, bound = levels.claimed(search, global_proof, refused)
-        if search.best and search.best.certificate.level:
-            from loomopt.solving.search import least_change
+        if search.best:
+            from loomopt.solving.search import indifference
 
-            search = least_change.with_least_change(search)
+            search = indifference.settled(search)
         # Figures are read as finely for every answer: they are no part of what accuracy costs.
         evaluations = own.positions - begun
 

@@ -181,8 +181,8 @@ class Beatup(Job):
 
 
 def _masses(program: Program) -> list[float]:
-    """Return the limits of the counterweight's mass, kg."""
-    return [limit.value for limit in program.limits if limit.name == "m4e"]
+    """Return the limits of the counterweight's mass, kg; without any there is none."""
+    return [limit.value for limit in program.limits if limit.name == "m4e"] or [0.0]
 
 
 JOB = Beatup()

@@ -9,17 +9,17 @@ from loomopt.base.records import Frozen, lazy
 from loomopt.jobs.base import Ends, Task, bound_limits, distinct, ends, size_read
 from loomopt.jobs.beatup import model as beatup
 from loomopt.jobs.beatup.model import LENGTHS, today
-from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, RetrofitTarget, TorqueTarget
+from loomopt.jobs.beatup.scene import RESISTED, VARIABLES, BeatupTarget, RetrofitTarget, TorqueTarget
 from loomopt.model.drive import TORQUE
 from loomopt.model.limits import Limit, RatioLimit
 from loomopt.model.model import JobModel, with_words_fixed
 from loomopt.model.numbers import curves, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value
-from loomopt.model.program import Goal, Move, Numbers, Preference, Variable, goals
+from loomopt.model.program import Added, Goal, Move, Numbers, Preference, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Where
 from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
-from loomopt.physics.tolerances import NO_MASS
+from loomopt.physics.tolerances import INDIFFERENT, NO_MASS
 from loomopt.scenes.scene import Scene
 
 COUNTERWEIGHT = ("m4e", "r4e")
@@ -229,6 +229,17 @@ class BeatupTask(Task):
         room = [name for name in COUNTERWEIGHT if name in names and self.limited[name][0] < self.limited[name][1]]
         own = [self.move("counterweight", name, wishes[name]) for name in room]
         return [*own, self.scale_move("scale", LENGTHS), *self.axis_moves()]
+
+    def added(self) -> Added | None:
+        """Return the counterweight: by its mass, or by s, which is least where that is at the largest radius."""
+        table = self.scene.targets[self.target] if self.target else None
+        if not isinstance(table, BeatupTarget) or self.limited["m4e"][1] == 0.0:
+            return None
+        row = "m4e" if self.direct else "s"
+        size = next(v.scale for v in self.variables if v.name == row)
+        share = table.indifference
+        without = {row: 0.0} if self.limited["m4e"][0] == 0.0 else {}
+        return Added(Value("m4e", row, size), without, INDIFFERENT if share is None else share, share is None)
 
     # Natural sizes, from today's machine without the change from today.
 

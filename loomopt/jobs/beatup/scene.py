@@ -34,7 +34,17 @@ class Mechanism(Table):
     r4: Length | None = Field(None, description="centre of mass of the reed system from the rocking shaft D")
 
 
-class TorqueTarget(TargetTable):
+class BeatupTarget(TargetTable):
+    """What every target of the job may hold; a retrofit weighs what is added itself."""
+
+    indifference: PureNumber | None = Field(
+        None,
+        description="share of each figure that less counterweight may cost; without it, 0.001 for none at all, and 0 "
+        "for the least torque at any price",
+    )
+
+
+class TorqueTarget(BeatupTarget):
     """Values of the target torque."""
 
     M3_tolerance: Torque | None = Field(
@@ -83,8 +93,8 @@ AXES = {
 TARGETS = {
     target.name: target
     for target in (
-        Target("balance", "reed torque zero at front dead centre, then least peak crank torque", TargetTable),
-        Target("pulse", "least reed torque over the whole pulse", TargetTable, needs_effects=RESISTED[:1]),
+        Target("balance", "reed torque zero at front dead centre, then least peak crank torque", BeatupTarget),
+        Target("pulse", "least reed torque over the whole pulse", BeatupTarget, needs_effects=RESISTED[:1]),
         Target("torque", "least peak crank torque, reed torque within a tolerance", TorqueTarget),
         Target("retrofit", "reed torque zero with the least change from today's machine", RetrofitTarget),
     )

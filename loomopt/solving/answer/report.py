@@ -19,6 +19,7 @@ from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import (
     ADVICE,
+    Beside,
     Clash,
     Evaluated,
     Finding,
@@ -202,7 +203,13 @@ def _with(scene: Scene, target: str, search: Search, best: Candidate) -> Solutio
     today = functools.partial(evaluated, scene, job, target, {})
     here = evaluation(scene, job, program, job.design(program, best.x))
     made = with_optimum(job, scene, target, here, best.certificate, solver, today, _sought(search))
-    return replace(made, point=point, optima=_optima(search))
+    made = replace(made, point=point, optima=_optima(search))
+    if search.spared is None:
+        return made
+    other = evaluation(scene, job, program, job.design(program, search.spared.other))
+    beside = Beside(search.spared.added.least.figure, search.spared.share, search.spared.chosen, other)
+    said = _little(Words(scene), beside, made)
+    return replace(made, beside=beside, message=f"{made.message} {said}", explanation=said)
 
 
 def _without(scene: Scene, target: str, search: Search, clash: Clash) -> Solution:
@@ -300,6 +307,23 @@ def with_optimum(
         solver=solver,
         today=today,
     )
+
+
+def _little(words: Words, beside: Beside, answer: Solution) -> str:
+    """Say what another design of more or less added mass would change, and that it is little."""
+    name = beside.added
+    changed = (words.shown(figure, value, 3) for figure, value in beside.changes(answer).items())
+    changes = ", ".join(
+        f"{figure} {'' if text.startswith('-') else '+'}{text}"
+        for figure, text in zip(beside.changes(answer), changed, strict=True)
+    )
+    other = words.shown(name, beside.other.design[name])
+    little = f"{100 * beside.share:g} %"
+    if not beside.chosen:
+        return f"The {name} is worth less than {little} of each figure; {other}: {changes}."
+    none = answer.design[name] == 0.0
+    head = f"No {name}, for it is worth less than" if none else f"As little {name} as may cost"
+    return f"{head} {little} of each figure; {other}: {changes}."
 
 
 def _left_open(certificate: Certificate) -> str:

@@ -225,6 +225,32 @@ class Evaluated:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """Another design, with more or less added mass, beside which an answer makes little difference.
+
+    added: what differs; share: of each figure, what counts as little; chosen: whether the answer is the one with less.
+    """
+
+    added: str
+    share: float
+    chosen: bool
+    other: Evaluated
+
+    def changes(self, answer: "Solution") -> dict[str, float]:
+        """Return what the other design changes of each figure that is sought, SI."""
+        levels = answer.certificate.levels if answer.certificate else ()
+        names = dict.fromkeys(level.objective for level in levels if level.objective != self.added)
+        pairs = {name: (self.other.figures.get(name), answer.figures.get(name)) for name in names}
+        return {name: then - now for name, (then, now) in pairs.items() if then is not None and now is not None}
+
+    def as_dict(self, answer: "Solution") -> dict[str, Any]:
+        """Return it as JSON data."""
+        other = self.other.as_dict()
+        told = {"added": self.added, "share": self.share, "chosen": self.chosen, "changes": self.changes(answer)}
+        return told | {"design": other["design"], "figures": other["figures"]}
+
+
+@dataclass(frozen=True)
 class Solution(Evaluated):
     """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
 
@@ -248,6 +274,8 @@ class Solution(Evaluated):
     """What is proven of all admissible designs, where that was asked for."""
     asked: str | None = None
     """The target as the call named it; None where it is the default."""
+    beside: Beside | None = None
+    """The design with, or without, what makes little difference."""
     today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -298,6 +326,8 @@ class Solution(Evaluated):
         }
         if self.proofs:
             tail["proofs"] = self.proofs.as_dict()["proofs"]
+        if self.beside:
+            tail["indifference"] = self.beside.as_dict(self)
         if self.relaxation:
             tail["clash"] = list(self.clash)
             tail["relaxation"] = [vars(relaxation) for relaxation in self.relaxation]

@@ -177,7 +177,7 @@ def solve(
     sampler = calls.sampler(x)
     if sampler is None:
         return Point(x, "Not_Assembled", False)
-    result = _round(calls, _begin(calls, x, sampler, warm), 0)
+    result = _compared(calls, _round(calls, _begin(calls, x, sampler, warm), 0))
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or not result.reached:
             break
@@ -238,6 +238,16 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
     steady = sampler.stills == here.sampler.stills
     return _Round(after, nlp, answer, reached, violation, steady, iterations)
+
+
+def _compared(calls: Calls, result: _Round | Point) -> _Round | Point:
+    """Return the first round with the nodes that are known to bind for the next one.
+
+    There they tell soon whether a basin is as good; from the first they would lead every start into the known one.
+    """
+    if isinstance(result, Point):
+        return result
+    return result._replace(after=result.after._replace(nodes=calls.with_known(result.after.nodes)))
 
 
 def _ended(calls: Calls, result: _Round) -> Point:

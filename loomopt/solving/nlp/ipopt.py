@@ -176,13 +176,15 @@ class Calls:
         return value > self.known.most
 
     def first_nodes(self, loose: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
-        """Return a start's nodes: those known to bind, then its own largest extremes, as many as there is room for."""
+        """Return a start's nodes: its own largest extremes."""
+        return tuple(tuple(of[: self.leading]) for of in loose)
+
+    def with_known(self, nodes: Sequence[Sequence[Extreme]]) -> tuple[tuple[Extreme, ...], ...]:
+        """Return nodes with those known to bind after them, as many as there is room for."""
         if not self.known.nodes:
-            return tuple(tuple(of[: self.leading]) for of in loose)
-        room = [max(self.slots, len(of)) for of in self.known.nodes]
-        return tuple(
-            (*known, *of[: self.leading])[:most] for known, of, most in zip(self.known.nodes, loose, room, strict=True)
-        )
+            return tuple(map(tuple, nodes))
+        room = [max(self.slots, len(of)) for of in nodes]
+        return tuple((*of, *known)[:most] for of, known, most in zip(nodes, self.known.nodes, room, strict=True))
 
     def violation(self, peaks: Sequence[Sequence[Extreme]], extra: Floats) -> float:
         """Return the largest excess of an extreme, relative to its row's size; 0 where there is none."""

@@ -128,9 +128,9 @@ class Elastic:
 class Known(NamedTuple):
     """What other solves of a program have shown.
 
-    nodes: of each family, where its rows bind, to begin with beside a start's own: what a solve then gives is less
-    than its basin has, so that it is left as soon as it cannot come below `most`, in the NLP's objective (elastic: in
-    the sum of the excesses of cost 1).
+    nodes: of each family, where its rows bind, beside a solve's own from its second round on: what a round gives is
+    less than its basin has, so that it is left as soon as it cannot come below `most`, in the NLP's objective (elastic:
+    in the sum of the excesses of cost 1).
     """
 
     nodes: tuple[tuple[Extreme, ...], ...] = ()

@@ -24,7 +24,7 @@ from loomopt.solving.nlp.point import Known, Point, sampler_at
 from loomopt.solving.nlp.rows import chain_roots
 from loomopt.solving.search.search import Candidate, OnStart, Search, at, judged, tried
 
-SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 4
+SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
 """A search's look at many designs: nodes of a turn, designs, one in how many is moved onto its limits, in so many
 steps, and starts kept of these and of those as drawn (benchmarks/adversarial/attack.py)."""
 
@@ -234,14 +234,17 @@ class Screening:
         return [self.start(design) for design in kept]
 
     def flipped(self, x: Mapping[str, float]) -> list[Start]:
-        """Return a design with each free variable in turn at its far end, moved onto the limits it then exceeds."""
+        """Return a design with each free variable in turn at its far end.
+
+        As they are: moved onto the limits they exceed, they would come back to the basin they are to leave.
+        """
         here = np.array([x[name] for name in self.batch.names])
         designs = np.tile(here, (len(self.free), 1))
         for row, place in enumerate(self.free):
             low, high = self.low[place], self.high[place]
             inside = FAR_END * (high - low)
             designs[row, place] = low + inside if here[place] > (low + high) / 2 else high - inside
-        return [self.start(design) for design in self.projected(designs)] if len(designs) else []
+        return [self.start(design) for design in self.batch.tops(designs)] if len(designs) else []
 
     def placed(self, shares: Floats) -> Floats:
         """Return designs, (designs, variables) SI, at shares of the free variables' ranges."""
@@ -414,7 +417,7 @@ def spread(search: Search, seed: int, on_start: OnStart | None) -> Search:
     for start in own:
         search = steps.explored(search, start)
         if not search.reached and search.nearest is None:
-            search = relaxed(search, [*own, *drawn[:SCREENED_STARTS]])
+            search = relaxed(search, [*own, *drawn])
             if search.clashes:
                 return search
     for start in drawn:

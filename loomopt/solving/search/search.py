@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from loomopt.jobs.base import Job
-from loomopt.model.program import Program
+from loomopt.model.program import Added, Program
 from loomopt.physics.tolerances import (
     CORRECTIONS,
     FEASIBLE,
@@ -60,6 +60,19 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Spared:
+    """Two designs between which what is added makes little difference; chosen: whether the one with less was taken.
+
+    other: the program's variables, SI, of the one that was not; share: of each figure, what counts as little.
+    """
+
+    added: Added
+    other: Mapping[str, float]
+    share: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
 class Search:
     """How far a search has come.
 
@@ -84,6 +97,8 @@ class Search:
     solved: float = 0.0
     tie_broken: float = 0.0
     certified: float = 0.0
+    spared: Spared | None = None
+    """What is told beside the best where what it adds, or would add, makes little difference."""
 
     @property
     def passed(self) -> bool:

@@ -137,14 +137,15 @@ def test_a_solve_is_beaten_once_it_is_no_better_than_what_is_known():
     assert not Calls(task, Settings()).is_beaten(1e300, np.zeros(0))
 
 
-def test_nodes_known_to_bind_come_before_a_starts_own():
+def test_nodes_known_to_bind_come_after_a_starts_own():
     task = program([("sum", 1, -5.0), ("wave", 1, 1.0)])
     known, own = Extreme(0, 0.9, 2.0), [Extreme(0, k / 10, 9.0 - k) for k in range(8)]
-    with_known = Calls(task, Settings(), known=Known(((known,),)))
-    assert with_known.first_nodes([own]) == ((known, *own[: with_known.leading]),)
-    many = tuple(own)
-    assert Calls(task, Settings(), known=Known((many,))).first_nodes([own]) == (many,), "no more than there is room for"
-    assert Calls(task, Settings()).first_nodes([own]) == (tuple(own[: with_known.leading]),)
+    calls = Calls(task, Settings(), known=Known(((known,),)))
+    first = calls.first_nodes([own])
+    assert first == (tuple(own[: calls.leading]),), "the first round's are its own"
+    assert calls.with_known(first) == ((*first[0], known),)
+    assert calls.with_known([own]) == (tuple(own),), "no more than there is room for"
+    assert Calls(task, Settings()).with_known(first) == first
 
 
 def test_bounds_that_may_give_way_are_none_but_a_positive_one_stays_positive():
