@@ -84,7 +84,7 @@ def is_flat(program: Program, x: Numbers, *goals: Numbers) -> bool:
     nearby = {name: x[name] * (1 + BEYOND) for goal in goals for name in goal}
     trials = [_part_way(x, goal, share) for goal in goals for share in (1.0, 0.5)] + [_part_way(x, nearby, 1.0)]
     changed = (_objectives(program, trial) for trial in trials)
-    # Where two corners of the cycle pass each other a turn has other nodes: that is no move along which nothing changes.
+    # Where two corners of the cycle pass each other a turn has other nodes: something changes along such a move.
     return all(now.shape == before.shape and np.abs(now - before).max() <= UNCHANGED for now in changed)
 
 
