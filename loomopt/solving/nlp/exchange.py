@@ -177,7 +177,8 @@ def solve(
     sampler = calls.sampler(x)
     if sampler is None:
         return Point(x, "Not_Assembled", False)
-    result = _compared(calls, _round(calls, _begin(calls, x, sampler, warm), 0))
+    begin = _begin(calls, x, sampler, warm)
+    result = _compared(calls, begin, _round(calls, begin, 0))
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
         if isinstance(result, Point) or not result.reached:
             break
@@ -240,14 +241,18 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
     return _Round(after, nlp, answer, reached, violation, steady, iterations)
 
 
-def _compared(calls: Calls, result: _Round | Point) -> _Round | Point:
-    """Return the first round with the nodes that are known to bind for the next one.
+def _compared(calls: Calls, begin: _Place, result: _Round | Point) -> _Round | Point:
+    """Return the first round with the nodes that are known to bind for the next one, in place of its own idle ones.
 
-    There they tell soon whether a basin is as good; from the first they would lead every start into the known one.
+    There they tell soon whether a basin is as good; from the first they would lead every start into the known one. What
+    is dropped once cannot cycle; with all of them a larger NLP would have to be built.
     """
-    if isinstance(result, Point):
+    if isinstance(result, Point) or not calls.known.nodes:
         return result
-    return result._replace(after=result.after._replace(nodes=calls.with_known(result.after.nodes)))
+    here, kept = result.after, _binding(result.after)
+    added = (of[len(first) :] for of, first in zip(here.nodes, begin.nodes, strict=True))
+    nodes = [(*own, *more) for own, more in zip(kept, added, strict=True)]
+    return result._replace(after=here._replace(nodes=calls.with_known(nodes), multipliers=Multipliers()))
 
 
 def _ended(calls: Calls, result: _Round) -> Point:
