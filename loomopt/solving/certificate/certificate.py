@@ -105,7 +105,7 @@ def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> J
     """Solve one level's KKT system, along what earlier levels leave open, and judge its curvature."""
     local = replace(whole, closed=tuple(c for each in earlier if each.curvature and (c := each.curvature.closed)))
     system = kkt.system(local.active, place, [each.multipliers for each in earlier], local.program.fixed)
-    first = kkt.solved(local.slopes, system)
+    first = _met(local, system)
     alone = JudgedLevel(_residuals(local, place, system, first, first.residual), first)
     if local.active.zero[place]:
         return alone
@@ -118,6 +118,23 @@ def _judged_level(whole: Local, place: int, earlier: Sequence[JudgedLevel]) -> J
             raise
         return alone
     return JudgedLevel(_residuals(local, place, system, multipliers, first.residual), multipliers, curvature)
+
+
+def _met(local: Local, system: System) -> LevelMultipliers:
+    """Return multipliers that rest on what is met exactly, where those of limits nearby are not needed.
+
+    Where two corners of limits all but coincide, slopes can be balanced by the limits of either.
+    """
+    first = kkt.solved(local.slopes, system)
+    found, rest = first, system
+    while found.residual <= STATIONARY:
+        lost = {k: abs(found.of[k] * local.active.rows[k].excess) for k in rest.inequalities}
+        apart = [k for k, each in lost.items() if each > COMPLEMENTARY]
+        if not apart:
+            return found
+        rest = rest.without(*apart)
+        found = kkt.solved(local.slopes, rest)
+    return first
 
 
 def _best(local: Local, place: int, system: System, first: LevelMultipliers) -> tuple[LevelMultipliers, Curvature]:

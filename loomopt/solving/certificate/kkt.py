@@ -126,8 +126,8 @@ def priced(sampler: Sampler, limit: Limit, objective: Objective, multiplier: flo
 class System:
     """What one level's slopes are balanced from, as places of rows.
 
-    pieces: of the objective; inequalities, equalities: of limits; held: (n, rows) sums of earlier objectives' pieces
-    that must not change.
+    pieces: of the objective; inequalities: of limits, and of earlier objectives' pieces that must not rise; equalities:
+    of limits; held: (n, rows) sums of earlier objectives' pieces that must not change.
     """
 
     pieces: tuple[int, ...]
@@ -137,12 +137,12 @@ class System:
 
     @property
     def limits(self) -> tuple[int, ...]:
-        """All rows of limits."""
+        """All rows of limits, and of what earlier objectives may not exceed."""
         return self.inequalities + self.equalities
 
-    def without(self, row: int) -> "System":
-        """Return the system without one inequality."""
-        kept = tuple(k for k in self.inequalities if k != row)
+    def without(self, *rows: int) -> "System":
+        """Return the system without some inequalities."""
+        kept = tuple(k for k in self.inequalities if k not in rows)
         return System(self.pieces, kept, self.equalities, self.held)
 
     def without_held(self) -> "System":
@@ -179,7 +179,9 @@ def system(
     equal = tuple(
         k for k, limit in enumerate(limits) if limit and (limit.sign == 0 or limit.row in fixed or k in bound)
     )
-    unequal = tuple(k for k in range(active.limits) if k not in equal)
+    # A piece as high as those that bind, though none holds it, may fall, but not rise.
+    beside = (k for of in range(level) if not active.zero[of] for k in active.levels[of] if k not in bound)
+    unequal = (*(k for k in range(active.limits) if k not in equal), *beside)
     held = [sums for place in range(level) for sums in _held(active, place, bound)]
     return System(active.levels[level], unequal, equal, np.array(held).reshape(-1, len(active.rows)))
 

@@ -442,7 +442,8 @@ def critical(local: Local, system: System, multipliers: LevelMultipliers) -> Cri
     """
     active, bound = local.active, multipliers.positive
     fixed = {k for k, row in enumerate(active.rows) if row.limit and row.limit.row in local.program.fixed}
-    limits = sorted({*system.equalities, *fixed, *(k for k in range(active.limits) if k in bound)})
+    touching = {*range(active.limits), *system.inequalities}
+    limits = sorted({*system.equalities, *fixed, *(touching & bound)})
     unit = np.eye(len(active.rows))
     shared = [k for k in system.pieces if k in bound]
     apart = [unit[k] - unit[shared[0]] for k in shared[1:]]
@@ -455,7 +456,7 @@ def critical(local: Local, system: System, multipliers: LevelMultipliers) -> Cri
     excess = np.array([row.excess for row in active.rows])
     missed = np.append(sums @ np.where(np.isfinite(excess), excess, 0.0), np.zeros(len(local.shut)))
     back = -rows[:rank].T @ (left[:, :rank].T @ missed / sizes[:rank])
-    slopes = local.gradients[[k for k in range(active.limits) if k not in limits]] @ basis
+    slopes = local.gradients[sorted(touching.difference(limits))] @ basis
     rises = np.abs(slopes).max(axis=1, initial=0.0)
     return Critical(basis, back, slopes[rises > FLAT], np.concatenate([sizes / least, rises / FLAT]), sums)
 

@@ -454,6 +454,8 @@ class _Steps:
         if self.on_start:
             self.on_start(self.done, self.count)
         search = at(search, f"start {self.done} of {self.count}")
+        if search.reached and search.ranked[0].is_left:
+            search = judged(search)
         if not search.reached:
             return tried(search, start)
         best = search.ranked[0]

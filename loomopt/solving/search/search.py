@@ -22,7 +22,7 @@ from loomopt.physics.tolerances import (
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.nlp import exchange
-from loomopt.solving.nlp.point import Known, Point, Settings, sampler_at
+from loomopt.solving.nlp.point import SUCCESS, Known, Point, Settings, sampler_at
 from loomopt.solving.search import tie_break
 
 MOST_ALIKE = 4
@@ -57,6 +57,11 @@ class Candidate:
     def x(self) -> Mapping[str, float]:
         """The variables of the design, SI."""
         return self.point.x if self.moved is None else self.moved
+
+    @property
+    def is_left(self) -> bool:
+        """Whether the solver gave up there: its limits are all but met, as far as it saw."""
+        return self.point.status not in SUCCESS
 
 
 @dataclass(frozen=True)
@@ -161,6 +166,32 @@ def compared(one: Candidate, other: Candidate) -> int:
 
 def judged(search: Search) -> Search:
     """Return the search with its best candidate tie-broken and certified.
+
+    Where the solver gave up at the best, and its limits cannot be met nearby, that is no design: the others count.
+    """
+    found = _judged(search)
+    while (best := found.best) and best.is_left and best.certificate.feasibility > FEASIBLE:
+        kept = tuple(c if not _is_same(c, best) else _dropped(c) for c in found.candidates)
+        rest = replace(found, candidates=kept, best=None)
+        if not rest.reached:
+            break
+        found = _judged(rest)
+    return found
+
+
+def _is_same(candidate: Candidate, best: Candidate) -> bool:
+    """Say whether a candidate is the best, or the solver gave up at one that is as good."""
+    alike = candidate.is_left and candidate.point.reached and compared(candidate, best) == 0
+    return candidate.point is best.point or alike
+
+
+def _dropped(candidate: Candidate) -> Candidate:
+    """Return a candidate as one that has not reached a design."""
+    return replace(candidate, point=replace(candidate.point, reached=False), objectives=())
+
+
+def _judged(search: Search) -> Search:
+    """Return the search with its best candidate tie-broken and certified, whatever the solver said there.
 
     Where an earlier objective gave way to a later one, it is solved again with a stronger weight between them.
     """

@@ -117,18 +117,20 @@ class Solver:
 
         wide: whether a search goes beyond their basins; None for none even where they lead nowhere.
 
-        Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough.
+        Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough. So
+        it is where the other one cannot be certified after it.
         """
         search = self._searched(asking, near, wide)
         if search.passed and not self._priced(search, asking):
-            asking = asking._replace(levels=2)
-            found = self._begun(asking)
-            best = search.ranked[0].point
-            after = tried(found, best.x)
+            found = self._begun(asking._replace(levels=2))
+            after = tried(found, search.ranked[0].point.x)
             after = judged(after) if after.reached else after
             if wide and after.passed and tied(search):
                 after = self._spread(after)
-            search = after if after.passed else searched(found, None, 0, (), None)
+            if wide and not after.passed:
+                after = searched(found, None, 0, (), None)
+            if after.passed:
+                search, asking = after, asking._replace(levels=2)
         return self._told(least_change.with_least_change(search), asking)
 
     def _begun(self, asking: Asking) -> Search:
