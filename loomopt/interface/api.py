@@ -234,18 +234,19 @@ def pareto(
     """Return the front of two axes: what the first costs of the second, every point certified.
 
     axes: figures or numbers that the scene bounds; M3_fdc counts by magnitude. target: whose demands hold at every
-    point, the scene's limits alone without one. maximise: axes of which the most is sought; of the others it is the
-    least, but of one that offers its most alone, such as a dwell, the most. ranges: axis → "LO:HI UNIT", or both ends
-    in SI, beyond which the front does not go. points: how many are asked for, 40 without; those that narrow changes
-    down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value, and
-    KeyboardInterrupt on Ctrl-C.
+    point, of all but the axes: the job's default without one, "none" for the scene's limits alone. maximise: axes of
+    which the most is sought; of the others it is the least, but of one that offers its most alone, such as a dwell, the
+    most. ranges: axis → "LO:HI UNIT", or both ends in SI, beyond which the front does not go. points: how many are
+    asked for, 40 without; those that narrow changes down come beside them. The rest is as in `sweep`. Raises BadInput,
+    also for an end that has no least value, and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.finished import conducted
     from loomopt.studies.front import front
 
     own = _scene(scene)
     asked = front.si(own, {} if ranges is None else ranges)
-    study = front.trade(own, axes, target, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
+    whose = front.demanding(own, target)
+    study = front.trade(own, axes, whose, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
     return conducted(study, executor, workers, store, resume, on_row)
 
 

@@ -91,7 +91,9 @@ def pareto(
         str | None,
         typer.Option(metavar="N", help="So many points, 40 without it, beside those that narrow changes down."),
     ] = None,
-    target: Annotated[str | None, typer.Option(help="Whose demands hold; the scene's limits alone without it.")] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Whose demands hold, of all but the axes; the job's default without it, or none.")
+    ] = None,
     sets: Set = None,
     free: Free = None,
     on: With = None,
@@ -113,8 +115,9 @@ def pareto(
     axes = _axes(minimise or [], maximise or [], against)
     ranges = front.si(scene, _parted(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
     count = None if points is None else read_number("--points", points, int)
+    whose = front.demanding(scene, target)
     study = front.trade(
-        scene, axes, target, maximise=maximise or (), minimise=minimise or (), ranges=ranges, points=count
+        scene, axes, whose, maximise=maximise or (), minimise=minimise or (), ranges=ranges, points=count
     )
     raise typer.Exit(carried_out(study, how))
 

@@ -90,7 +90,9 @@ def parts(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[str 
     more = [f"and {len(reasons) - MOST_REASONS} more, in the table's last column"] if reasons[MOST_REASONS:] else []
     message = [found.message] if found.message else []
     said = [change_said(study, change, si) for change in found.changes]
-    return [f"{study.heading}: {count}, {outcome}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
+    conditions = study.conditions
+    held = "".join(f"; {name} {conditions[name]}" for name in ("held", "not held") if name in conditions)
+    return [f"{study.heading}: {count}, {outcome}{held}", *message, grid, *said, *reasons[:MOST_REASONS], *more]
 
 
 def change_said(study: SceneStudy, change: Change, si: bool) -> str:

@@ -23,9 +23,24 @@ FEWEST = 3
 """Points of a front."""
 ENDS = "LO:HI UNIT as text, or both ends as numbers in SI"
 """How a range is given."""
+NONE = "none"
+"""What is given in place of a target, where the scene's limits alone hold."""
 Ranges = Mapping[str, tuple[float, float]]
 Given = Mapping[str, str | Sequence[float]]
 """Axis → "LO:HI UNIT", or both ends, SI."""
+
+
+def demanding(scene: Scene, target: str | None) -> str | None:
+    """Return the target whose demands a front holds: the job's default without one, None for "none". Raises BadInput.
+
+    A target's demands on what is traded fall away.
+    """
+    if isinstance(target, str) and target not in (NONE, *scene.schema.targets):
+        allowed = ", ".join((*scene.schema.targets, NONE))
+        raise refusal(
+            f"job {scene.job} has no target {target}", scene.origin, "target", target, allowed, "Choose one of them."
+        )
+    return None if target == NONE else target_name(scene, target)
 
 
 def trade(

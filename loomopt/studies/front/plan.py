@@ -24,8 +24,9 @@ BENT = 0.01
 """Share by which slopes on either side of a change must differ for a kink."""
 STOPS = 0.1
 """Share of its mean slope that a front must have where it ends, for a kink: beyond it nothing changes any more."""
-SHEER = 2.0
-"""Times the steeper slope of two points by which a must fall between them for a jump."""
+SHEER, UPRIGHT = 2.0, 100.0
+"""Times the steeper slope of two points by which a must fall between them for a jump: where that is narrowed down; and
+where rows ran out before, of the front's mean slope too."""
 MOST_MORE = 3
 """Times the points asked for that rows may come to, with those that narrow changes down and those once dominated."""
 
@@ -81,13 +82,17 @@ class FrontScale(NamedTuple):
 class Next(NamedTuple):
     """A point to come, at most at b.
 
-    near: rows to start from, the first one its parent; again: which row it redoes; fine: whether it narrows a change.
+    near: rows to start from, the first one its parent; again: which row it redoes; fine: whether it narrows a change;
+    spare: a row whose design is admissible there, to start from where those lead nowhere; end: which end is sought, at
+    any b.
     """
 
     b: float
     near: tuple[int, ...]
     again: int | None = None
     fine: bool = False
+    spare: int | None = None
+    end: int | None = None
 
 
 def sloped(axes: tuple[str, str]) -> Multiplier:
@@ -152,11 +157,18 @@ def following(rows: Sequence[Row], scale: FrontScale, points: int) -> list[Next]
             if (point, by) not in redone and by not in (by_point[point].warm["near"] or ())
         ]
     asked = [(by_point[point], by) for point, by in pairs]
-    again = [(row, by) for row, by in asked if row.place and row.warm["again"] is None]
-    found = [Next(scale.position(1, row.place[scale.names[1]]), (by,), row.point) for row, by in again][:BATCH]
+    again = [(row, by) for row, by in asked if row.warm["again"] is None]
+    found = [_again(row, by, scale) for row, by in again][:BATCH]
     if room > 0 and len(found) < BATCH:
         found += [_between(front, b) for b in _halved(front, missed, min(BATCH - len(found), room))]
     return found or [_between(front, b)._replace(fine=True) for b in _narrowed(front, missed)]
+
+
+def _again(row: Row, by: int, scale: FrontScale) -> Next:
+    """Return a row once more, from another: at what was asked there, or as the end that it is."""
+    if row.place:
+        return Next(scale.position(1, row.place[scale.names[1]]), (by,), row.point)
+    return Next(scale.position(1, value(row, scale.names[1])), (by,), row.point, end=row.point)
 
 
 def _crossed(front: Sequence[Spot]) -> list[tuple[int, int]]:
@@ -214,11 +226,16 @@ def _changing(left: Spot, right: Spot) -> set[str]:
 
 
 def _between(front: Sequence[Spot], b: float) -> Next:
-    """Return a point with its parent, the nearest (of two the lower), and the other neighbour if it touches others."""
+    """Return a point with its parent, the nearest (of two the lower), and the other neighbour if it touches others.
+
+    The lower one's design is admissible there.
+    """
     left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b)
     right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b)
     near, other = sorted((left, right), key=lambda spot: (abs(spot.b - b), spot.point))
-    return Next(b, (near.point, other.point) if near.active != other.active else (near.point,))
+    if near.active != other.active:
+        return Next(b, (near.point, other.point))
+    return Next(b, (near.point,), spare=None if near is left else left.point)
 
 
 def crossing(left: Spot, right: Spot) -> float | None:
@@ -234,7 +251,7 @@ def changes_and_gaps(front: Sequence[Spot], scale: FrontScale) -> tuple[list[Cha
     changes, gaps = list[Change](), list[tuple[float, float]]()
     for left, right in itertools.pairwise(front):
         jumps = right.b - left.b > NARROW and right.b - left.empty <= 2 * NARROW and left.empty > left.b + NARROW
-        jumps = jumps or (right.b - left.b <= 2 * NARROW and _sheer(left, right))
+        jumps = jumps or _upright(left, right) or (right.b - left.b <= 2 * NARROW and _sheer(left, right))
         if jumps:
             gaps.append((scale.figure(1, left.b), scale.figure(1, right.b)))
         if left is front[0] and len(_changing(left, right)) == 1:
@@ -264,6 +281,18 @@ def _sheer(left: Spot, right: Spot) -> bool:
     return left.a - right.a > SHEER * steepest + 100 * NARROW
 
 
+def _upright(left: Spot, right: Spot) -> bool:
+    """Say whether a falls between two points as it does in a jump alone, though rows ran out before it was narrow."""
+    steepest = max(abs(left.slope), abs(right.slope), 1.0) * (right.b - left.b)
+    return left.a - right.a > UPRIGHT * steepest + 100 * NARROW
+
+
+def _best(rows: Mapping[int, Row], end: int, name: str, sign: int) -> Row:
+    """Return the row of an end: the best of those that sought it."""
+    again = [row for row in rows.values() if row.certified and row.warm["again"] == end and not row.place]
+    return min((rows[end], *again), key=lambda row: sign * value(row, name))
+
+
 def scaled(
     rows: Mapping[int, Row],
     names: tuple[str, str],
@@ -273,9 +302,10 @@ def scaled(
 ) -> FrontScale:
     """Return the scale of a front by its ends: rows 0, where a is least, and 1, where b is; sizes: natural, SI.
 
-    Of ends that agree to ten times the accuracy that was asked the distance is 0.
+    An end that was sought again counts as the better one of both. Of ends that agree to ten times the accuracy that was
+    asked the distance is 0.
     """
-    ends = [[signs[k] * value(rows[row], names[k]) for k in (0, 1)] for row in (0, 1)]
+    ends = [[signs[k] * value(_best(rows, end, names[end], signs[end]), names[k]) for k in (0, 1)] for end in ENDS]
     widths = [abs(one - other) for one, other in zip(*ends, strict=True)]
     least = max(ALIKE, 10 * accuracy)
     wide = tuple(width if width > least * size else 0.0 for width, size in zip(widths, sizes, strict=True))

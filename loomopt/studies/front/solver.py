@@ -112,15 +112,22 @@ class Solver:
         moves = tuple(move for move in self.base.moves if not traded & {*move.along, *map(opposite, move.along)})
         return replace(self.base, objectives=levels, limits=(*self.base.limits, *caps), moves=moves)
 
-    def solve(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Reached:
+    def solve(
+        self,
+        asking: Asking,
+        near: Sequence[Mapping[str, Any]],
+        wide: bool | None,
+        spare: Sequence[Mapping[str, Any]] = (),
+    ) -> Reached:
         """Return what a program comes to, from neighbours' rows.
 
-        wide: whether a search goes beyond their basins; None for none even where they lead nowhere.
+        wide: whether a search goes beyond their basins; None for none even where they lead nowhere; spare: rows from
+        which it starts where the others lead nowhere.
 
         Where the limit on the other axis has a price, nothing is as good with less of it: then one level is enough. So
         it is where the other one cannot be certified after it.
         """
-        search = self._searched(asking, near, wide)
+        search = self._searched(asking, near, wide, spare)
         if search.passed and not self._priced(search, asking):
             found = self._begun(asking._replace(levels=2))
             after = tried(found, search.ranked[0].point.x)
@@ -138,9 +145,26 @@ class Solver:
         today = {**self.job.values(program, self.job.today(self.scene)), **program.today}
         return Search(self.job, program, Settings(self.accuracy), today)
 
-    def _searched(self, asking: Asking, near: Sequence[Mapping[str, Any]], wide: bool | None) -> Search:
+    def _searched(
+        self,
+        asking: Asking,
+        near: Sequence[Mapping[str, Any]],
+        wide: bool | None,
+        spare: Sequence[Mapping[str, Any]] = (),
+    ) -> Search:
         """Return the search for the best of a program."""
         search = self._begun(asking)
+        for known in (near, spare):
+            if not search.passed:
+                search = self._beside(search, known)
+        if wide and search.passed:
+            search = self._spread(search)
+        if not (search.passed or wide is None):
+            search = searched(search, None, 0, (), None)
+        return search
+
+    def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
+        """Return the search after solves from neighbours' rows."""
         program = search.program
         for data in near:
             point = rows.read(data["point"], program)
@@ -148,12 +172,7 @@ class Solver:
                 search = tried(search, point.x, point)
             elif start := exchange.started(program, data["point"]["x"]):
                 search = tried(search, start)
-        search = judged(search) if search.reached else search
-        if wide and search.passed:
-            search = self._spread(search)
-        if not (search.passed or wide is None):
-            search = searched(search, None, 0, (), None)
-        return search
+        return judged(search) if search.reached else search
 
     def _spread(self, search: Search) -> Search:
         """Return a search whose best passed after a look at other basins, where there may be any."""

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from loomopt.base.errors import BadInput
 from loomopt.base.records import lazy
 from loomopt.jobs import registry
+from loomopt.model.program import Goal
 from loomopt.model.session import working
 from loomopt.physics.schema import Sense
 from loomopt.physics.tolerances import ACCURACY, SAME_OBJECTIVE
@@ -26,7 +27,7 @@ from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver
 from loomopt.studies.run.rows import Findings, Row, StudyTask
 
-PLAN = 4
+PLAN = 5
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
 SEARCHED = 1
@@ -70,7 +71,7 @@ class Trade:
     @property
     def heading(self) -> str:
         """Scene, target and axes."""
-        return ", ".join([self.scene.name, *([self.target] if self.target else []), " against ".join(self.labels)])
+        return ", ".join([self.scene.name, self.target or "no target", " against ".join(self.labels)])
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -99,9 +100,30 @@ class Trade:
         """What is asked of every row, for people."""
         words, sought = Words(self.scene), zip(self.senses, self.labels, strict=True)
         found: dict[str, object] = {"axes": ", ".join(f"{sense} {label}" for sense, label in sought)}
+        held, dropped = self.demands
+        found["held"] = ", ".join(["the scene's limits", *held])
+        found |= {"not held": ", ".join(dropped)} if dropped else {}
         for name, ends in self.ranges:
             found[f"range of {name}"] = " ... ".join(words.shown(name, end) for end in ends)
         return {**found, "points": self.points, "accuracy": self.accuracy}
+
+    @functools.cached_property
+    def demands(self) -> tuple[list[str], list[str]]:
+        """What the target demands of every row, and what it demands that does not hold, for people.
+
+        Without a target the second is what the job's default would demand.
+        """
+        base, job, words = self.solver.base, self.solver.job, Words(self.scene)
+        whose = self.target or self.scene.schema.default_target
+        first = {level.figure for level in base.objectives[: self.solver.held]}
+        held = [f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals]
+        try:
+            wanted = job.program(self.scene, whose).goals
+        except BadInput:
+            # The scene has not what the default target needs: it demands nothing of it.
+            wanted = ()
+        kept = {goal.figure for goal in base.goals}
+        return held, [_demand(words, goal) for goal in wanted if goal.figure not in kept]
 
     @property
     def settings(self) -> dict[str, object]:
@@ -159,6 +181,9 @@ class Trade:
         ask = {"also": others, "held": held, "wide": wide}
         ask |= {"again": each.again, "fine": each.fine, "near": list(each.near)}
         length = len(each.near) + WIDE * wide
+        if each.end is not None:
+            return StudyTask(point, each.near[0], {}, {**ask, "end": each.end}, length)
+        ask |= {"spare": [rows[each.spare].warm]} if each.spare is not None else {}
         return StudyTask(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
 
     @property
@@ -252,12 +277,12 @@ class Trade:
 
     def reach(self, task: StudyTask, parent: Row | None) -> Met:
         """Return what a task comes to."""
+        near = [*([parent.warm] if parent else []), *task.ask.get("also", ())]
         if "end" in task.ask:
-            return self._end(int(task.ask["end"]), task.ask.get("also", ()))
-        near = [parent.warm] if parent else []
+            return self._end(int(task.ask["end"]), near)
         cap = self.solver.axes[1].value(task.place[self.axes[1]])
         asking = Asking(0, (self._cap(0), cap))
-        found = self.solver.solve(asking, [*near, *task.ask["also"]], bool(task.ask["wide"]))
+        found = self.solver.solve(asking, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
         return Met(_kept(found, task.ask["held"]), asking, dict(task.place))
 
     def _cap(self, axis: int, best: bool = False) -> float | None:
@@ -299,6 +324,16 @@ class Trade:
         apart = [abs(known.get(name, math.inf) - found.warm["axes"][name]) for name in self.axes]
         same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, self.sizes, strict=True))
         return Met(again, asking, {}) if same else Met(found, Asking(1, (self._cap(0), None)), {})
+
+
+def _demand(words: Words, goal: Goal) -> str:
+    """Return what is asked of a figure in words."""
+    low, high = (words.shown(goal.figure, end) if math.isfinite(end) else "" for end in (goal.low, goal.high))
+    if low == high:
+        return f"{goal.figure} {low}"
+    if low and high:
+        return f"{goal.figure} {low} ... {high}"
+    return f"{goal.figure} at {'least' if low else 'most'} {low or high}"
 
 
 def _kept(found: Reached, held: Sequence[float]) -> Reached:
