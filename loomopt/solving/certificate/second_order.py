@@ -16,6 +16,7 @@ known to an error of its own, within which it counts as none.
 
 import functools
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
@@ -150,6 +151,10 @@ PROBES = 1e-2, 3e-3
 FALLEN, FALL_MARGIN = 1e-12, 10.0
 """Fall of the Lagrangian that counts: a thousand times rounding, and this many times what the slope left explains."""
 
+ROUNDINGS = 16.0
+"""Units in the last place of all terms of a Lagrangian together that its value may be off by: beyond FALLEN where terms
+are hundreds, as where a force is thousands of times the one that is natural."""
+
 FALL_GROWTH = 18.0
 """How many times a fall within the error of an earlier level's valley must grow from the second probe to the first
 to be doubted: of third order it grows 37 times, of higher more, an error by chance (test_valley.py)."""
@@ -179,7 +184,7 @@ class Lagrangian:
 
         unsure: what it may differ by there, beside rounding.
         """
-        return self.fall(there) > FALL_MARGIN * slope * step + FALLEN + unsure
+        return self.fall(there) > FALL_MARGIN * slope * step + max(FALLEN, self._rounding) + unsure
 
     def fall(self, there: Mapping[str, float]) -> float:
         """Return by how much it is lower at a design (SI); −∞ where either value is unknown."""
@@ -189,6 +194,17 @@ class Lagrangian:
     @functools.cached_property
     def _base(self) -> float | None:
         return self.value(self.x)
+
+    @functools.cached_property
+    def _rounding(self) -> float:
+        """What its value may be off by: of its terms, each limit's row one natural size."""
+        sampler = sampler_at(self.program, self.x)
+        if sampler is None:
+            return 0.0
+        weights = {self.level: 1.0, **self.held}
+        objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
+        terms = sum(abs(weight * objective.merit(sampler) / objective.scale) for weight, objective in objectives)
+        return ROUNDINGS * sys.float_info.epsilon * (terms + sum(map(abs, self.prices.values())))
 
     def value(self, there: Mapping[str, float]) -> float | None:
         """Return its value at a design (SI); None where the linkage has no real position."""

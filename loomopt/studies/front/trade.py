@@ -356,7 +356,7 @@ UNSEEN = 1e-6
 def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
     """Return the front that finished rows make: in the order of the second axis, then those without a design."""
     by_point = {row.point: row for row in rows}
-    failed = tuple(row for row in rows if not row.certified)
+    failed = tuple(row for row in rows if not row.certified and not _stood(study, row, by_point))
     if not all(end in by_point for end in ENDS):
         return Findings(tuple(rows), "No front yet: an end is not solved.")
     if not all(by_point[end].certified for end in ENDS):
@@ -376,6 +376,16 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
     order = sorted(best, key=lambda row: plan.value(row, study.axes[1]))
     changes.sort(key=lambda change: change.at or 0.0)
     return Findings((*order, *failed), message, tuple(changes), tuple(sorted(gaps)))
+
+
+def _stood(study: "Trade", row: Row, rows: Mapping[int, Row]) -> bool:
+    """Say whether what a row sought once more is certified there, and what it came to is no better."""
+    before = rows.get(row.warm.get("again"))
+    if before is None or not before.certified:
+        return False
+    first, known = study.solver.axes[0], row.warm.get("axes", {})
+    here = first.value(known[study.axes[0]]) if known else math.inf
+    return here >= first.value(plan.value(before, study.axes[0])) - plan.ALIKE * first.objective.scale
 
 
 def _apart(study: "Trade", rows: Sequence[Row]) -> str:
