@@ -99,9 +99,10 @@ def test_ctrl_c_prints_what_is_finished_and_keeps_it(cli, monkeypatch):
 
 
 def test_axes_that_do_not_conflict_are_one_point(cli):
-    status, out, _ = cli("beatup", *MASS)
+    status, out, _ = cli("beatup", *MASS, "--target", "none")
     assert status == 0
-    assert "beatup, peak_torque against m4e: 1 point, 1 optimal\n" in out
+    first = "beatup, no target, peak_torque against m4e: 1 point, 1 optimal; held the scene's limits; not held M3_fdc 0"
+    assert out.startswith(first)
     assert "peak_torque and m4e do not conflict: one design is best in both." in out
 
 
@@ -171,7 +172,7 @@ def test_an_end_without_a_least_asks_for_a_range(cli, tmp_path):
         ((*MASS, "--range", "l1=30:31 mm"), "l1 is none of both axes"),
         ((*MASS, "--points", "2"), "a front needs more points"),
         ((*MASS, "--points", "many"), "it is not a whole number"),
-        ((*MASS, "--target", "none"), "no target none"),
+        ((*MASS, "--target", "nothing"), "no target nothing"),
         ((*MASS, "--workers", "0"), "no such number of workers"),
         ((*MASS, "--resume"), "nothing to resume from"),
         ((*MASS, "--out", "t.txt"), "t.txt"),
@@ -185,3 +186,29 @@ def test_bad_input_is_one_message_and_nothing_is_written(cli, tmp_path, argument
     assert err.startswith("loomopt: ")
     assert said in err
     assert list(tmp_path.iterdir()) == []
+
+
+DWELL = "--minimise", "peak_acceleration", "--against", "dwell", "--range", "dwell=36:37.5 deg", "--points", "3"
+
+
+def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_so(cli):
+    status, out, _ = cli("rapier", *DWELL)
+    assert status == 0
+    assert " ".join(out.splitlines()[0].split()).startswith(
+        "rapier, stroke-dwell, peak_acceleration against dwell: 3 points, 3 optimal; held the scene's limits, "
+        "stroke 850 mm; not held dwell_after at least"
+    )
+    data = json.loads(cli("rapier", *DWELL, "--json")[1])
+    assert data["target"] == "stroke-dwell"
+    assert [row["figures"]["stroke"] for row in data["rows"]] == pytest.approx([0.85] * 3, rel=1e-8)
+    assert data["rows"][-1]["figures"]["peak_acceleration"] == pytest.approx(0.7232054145, rel=1e-8)
+    assert data["provenance"]["held"] == "the scene's limits, stroke 850 mm"
+
+
+def test_with_target_none_a_front_drops_demands_and_says_which(cli):
+    status, out, _ = cli("rapier", *DWELL, "--target", "none")
+    assert status == 0
+    assert "; held the scene's limits; not held stroke 850 mm, dwell_after at least 30 deg" in " ".join(out.split())
+    data = json.loads(cli("rapier", *DWELL, "--target", "none", "--json")[1])
+    assert data["target"] is None
+    assert data["rows"][-1]["figures"]["peak_acceleration"] == pytest.approx(0.536717, rel=1e-5)

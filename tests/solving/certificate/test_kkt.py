@@ -130,3 +130,16 @@ def test_a_row_apart_from_those_that_depend_on_each_other_is_not_replaceable():
     one = System((3,), (0, 1, 2), (), np.zeros((0, 4)))
     found = LevelMultipliers(np.array([1.0, 0.5, 1.0, 1.0]), 0.0)
     assert replaceable(gradients, one, found, STATIONARY) == [0, 1]
+
+
+def test_a_piece_of_an_earlier_level_that_nothing_holds_may_not_rise():
+    """max(x, y) at 0 with x ≥ 0: x holds it, and −y, which would fall, is stopped by y."""
+    rows = {"p": lambda v: v["x"], "q": lambda v: v["y"], "f": lambda v: -v["y"]}
+    program = toy.program("xy", rows, objectives=("p, q", "f"), limits=(("x", -1, 0.0),))
+    _, _, first = level(program, XY)
+    assert first.of[:3] == pytest.approx([1.0, 1.0, 0.0])
+    active, system, found = level(program, XY, 1, [first])
+    (beside,) = (k for k in active.levels[0] if not first.of[k])
+    assert beside in system.inequalities
+    assert found.residual < 1e-14
+    assert found.of[beside] == pytest.approx(1.0)

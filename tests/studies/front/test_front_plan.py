@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -155,3 +156,21 @@ def test_a_plan_ends():
 def test_ends_that_are_one_have_no_width():
     rows = {0: row(0, 0.3, 0.5), 1: row(1, 0.3 + 1e-9, 0.5)}
     assert plan.scaled(rows, ("a", "b"), (1, 1), (1.0, 1.0)).width == (0.0, 0.0)
+
+
+def test_an_end_that_another_row_dominates_is_sought_again_from_it():
+    rows = [row(0, 1.0, 0.0, 0.0), row(1, 0.0, 1.0), row(2, 0.5, -0.2, asked=0.6, parent=1)]
+    again = next(each for each in plan.following(rows, SCALE, 3) if each.again == 0)
+    assert (again.near, again.end) == ((2,), 0)
+    better = row(3, 0.7, -0.3, 0.0, again=0, parent=2)
+    better = replace(better, place={})
+    scale = plan.scaled({each.point: each for each in (*rows, better)}, ("a", "b"), (1, 1), (1.0, 1.0))
+    assert scale.origin == (-0.3, 0.0)
+    assert scale.width == pytest.approx((1.3, 0.7))
+
+
+def test_a_jump_that_rows_did_not_suffice_to_narrow_down_is_one_with_its_gap():
+    front = [row(1, 0.0, 1.0, -0.01), row(2, 0.999, 0.9, -0.01), row(0, 1.0, 0.0, 0.0, active=("l2 max",))]
+    (change,), (gap,) = told(front)
+    assert change.kind == "jump"
+    assert gap == (0.999, 1.0)

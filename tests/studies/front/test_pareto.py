@@ -194,9 +194,10 @@ def test_the_table_names_the_axes_first_and_the_slope_with_its_unit(reed):
     assert len(set(table.columns)) == len(table.columns)
     assert table.attrs["axes"] == "least peak_torque, least |M3_fdc|"
     assert table.attrs["range of M3_fdc"] == "20 N*m ... 40 N*m"
-    assert (table.attrs["study"], table.attrs["target"]) == ("pareto", "none")
+    assert (table.attrs["study"], table.attrs["target"]) == ("pareto", "balance")
+    assert (table.attrs["held"], table.attrs["not held"]) == ("the scene's limits", "M3_fdc 0 N*m")
     assert "|M3_fdc| [N*m]" in reed._repr_html_()
-    assert repr(reed) == "<DesignStudy pareto of beatup, peak_torque against |M3_fdc|: 3 points, 3 certified>"
+    assert repr(reed) == "<DesignStudy pareto of beatup, balance, peak_torque against |M3_fdc|: 3 points, 3 certified>"
 
 
 def test_an_inch_machine_is_shown_in_inches():
@@ -225,7 +226,7 @@ def test_a_front_that_has_only_begun_shows_what_there_is(serial):
 
 
 def test_one_design_that_is_best_in_both():
-    found = lo.pareto("beatup", AXES)
+    found = lo.pareto("beatup", AXES, "none")
     assert found.findings.message == "peak_torque and m4e do not conflict: one design is best in both."
     assert len(found) == 1
     assert found.answer(found.rows[0].point).message.startswith("The least peak_torque, then the least m4e.")

@@ -1,0 +1,69 @@
+"""Scenes whose fronts ended without a certificate: a second level of one design, corners that coincide, a jump."""
+
+from pathlib import Path
+
+import pytest
+
+import loomopt as lo
+from loomopt.studies.front import front, plan
+from loomopt.studies.front import solver as solving
+from loomopt.studies.front.solver import Asking
+
+CASES = Path(__file__).parent / "cases"
+
+
+def test_an_end_whose_second_level_leaves_one_design_is_certified():
+    """Two pieces of the largest force and two of the least meet: each is held by one of them, none may rise."""
+    scene = lo.load(CASES / "second_level_of_one_point.toml")
+    found = lo.pareto(scene, ("K1", "contact_max"), "stiffness", points=8)
+    assert all(row.certified for row in found.solved)
+    assert len(found) == 8
+    forces, stiffness = (plan.values(found.rows, axis) for axis in ("contact_max", "K1"))
+    assert forces[0] == pytest.approx(2327.2748160284, rel=1e-9)
+    assert stiffness[0] == pytest.approx(26213.778447679, rel=1e-9)
+    # A linear trade is one straight line but for where the preload ends.
+    line = stiffness[0] + (stiffness[-2] - stiffness[0]) / (forces[-2] - forces[0]) * (forces[3] - forces[0])
+    assert stiffness[3] == pytest.approx(line, rel=1e-9)
+
+
+def test_between_points_very_close_together_a_price_rests_on_what_is_met_exactly():
+    scene = lo.load(CASES / "corners_that_coincide.toml")
+    trade = front.trade(scene, ("l4", "mu_min"), maximise=("mu_min",))
+    rows = [trade.solved(task, None) for task in trade.batch(())]
+    for angle in (1.1144963954250675, 1.1144964044438321, 1.114496390915685, 1.1144964089532143):
+        asking = Asking(0, (None, trade.solver.axes[1].value(angle)))
+        found = trade.solver.solve(asking, [row.warm for row in rows], False)
+        assert found.status == "optimal", found.reason
+
+
+def test_a_jump_is_told_as_one_and_beside_it_the_neighbours_design_stands():
+    scene = lo.load(CASES / "jump.toml")
+    found = lo.pareto(scene, ("l1", "M3_fdc"), "none", points=5)
+    assert all(row.certified for row in found.rows)
+    assert max(row.seconds for row in found.rows) < 18.0
+    (jump,) = found.findings.changes
+    ((low, high),) = found.findings.gaps
+    assert jump.kind == "jump"
+    assert low < 60.84002427 < high < 60.840025
+    shortest, before = (row.design["l1"] for row in found.rows[:-3:-1])
+    assert shortest == pytest.approx(0.0331774274, rel=1e-8)
+    assert before == pytest.approx(0.0332447297, rel=1e-6)
+
+
+def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_to(monkeypatch):
+    scene = lo.load(CASES / "second_level_of_one_point.toml")
+    solver = front.trade(scene, ("K1", "contact_max"), "stiffness").solver
+    judged, limits = solving.judged, len(solver.base.objectives)
+
+    def refused(search):
+        found = judged(search)
+        two = len(found.program.objectives) == limits
+        failed = found.best and two
+        return solving.replace(found, best=solving.replace(found.best, certificate=FAILED)) if failed else found
+
+    from loomopt.solving.search.search import NOT_JUDGED as FAILED
+
+    monkeypatch.setattr(solving, "judged", refused)
+    found = solver.solve(Asking(1, (None, None)), [], False)
+    assert found.status == "optimal"
+    assert found.warm["axes"]["contact_max"] == pytest.approx(2327.2748160284, rel=1e-9)
