@@ -48,7 +48,8 @@ def drawn(number: int) -> Asked:
     target = task.target if rng.random() < SHARE else "none"
     offered = {name: axis.senses for name, axis in scene.schema.axes.items()}
     while True:
-        axes = tuple(map(str, rng.choice(sorted(offered), 2, replace=False)))
+        one, other = map(str, rng.choice(sorted(offered), 2, replace=False))
+        axes = one, other
         most = tuple(name for name in axes if rng.choice(offered[name]) == "most")
         try:
             front.trade(scene, axes, front.demanding(scene, target), maximise=most)

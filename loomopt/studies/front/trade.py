@@ -380,7 +380,8 @@ def read_front(study: "Trade", rows: Sequence[Row]) -> Findings:
 
 def _stood(study: "Trade", row: Row, rows: Mapping[int, Row]) -> bool:
     """Say whether what a row sought once more is certified there, and what it came to is no better."""
-    before = rows.get(row.warm.get("again"))
+    again = row.warm.get("again")
+    before = None if again is None else rows.get(again)
     if before is None or not before.certified:
         return False
     first, known = study.solver.axes[0], row.warm.get("axes", {})

@@ -1,10 +1,12 @@
 """Scenes whose fronts ended without a certificate: a second level of one design, corners that coincide, a jump."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import loomopt as lo
+from loomopt.solving.search.search import NOT_JUDGED, judged
 from loomopt.studies.front import front, plan
 from loomopt.studies.front import solver as solving
 from loomopt.studies.front.solver import Asking
@@ -53,15 +55,11 @@ def test_a_jump_is_told_as_one_and_beside_it_the_neighbours_design_stands():
 def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_to(monkeypatch):
     scene = lo.load(CASES / "second_level_of_one_point.toml")
     solver = front.trade(scene, ("K1", "contact_max"), "stiffness").solver
-    judged, limits = solving.judged, len(solver.base.objectives)
 
     def refused(search):
         found = judged(search)
-        two = len(found.program.objectives) == limits
-        failed = found.best and two
-        return solving.replace(found, best=solving.replace(found.best, certificate=FAILED)) if failed else found
-
-    from loomopt.solving.search.search import NOT_JUDGED as FAILED
+        two = len(found.program.objectives) == len(solver.base.objectives)
+        return replace(found, best=replace(found.best, certificate=NOT_JUDGED)) if found.best and two else found
 
     monkeypatch.setattr(solving, "judged", refused)
     found = solver.solve(Asking(1, (None, None)), [], False)
