@@ -194,7 +194,7 @@ DWELL = "--minimise", "peak_acceleration", "--against", "dwell", "--range", "dwe
 def test_a_front_holds_what_the_default_target_demands_and_its_first_line_says_so(cli):
     status, out, _ = cli("rapier", *DWELL)
     assert status == 0
-    assert " ".join(out.splitlines()[0].split()).startswith(
+    assert " ".join(out.split()).startswith(
         "rapier, stroke-dwell, peak_acceleration against dwell: 3 points, 3 optimal; held the scene's limits, "
         "stroke 850 mm; not held dwell_after at least"
     )
