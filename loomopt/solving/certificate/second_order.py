@@ -197,14 +197,9 @@ class Lagrangian:
 
     @functools.cached_property
     def _rounding(self) -> float:
-        """What its value may be off by: of its terms, each limit's row one natural size."""
-        sampler = sampler_at(self.program, self.x)
-        if sampler is None:
-            return 0.0
-        weights = {self.level: 1.0, **self.held}
-        objectives = ((weight, self.program.objectives[k]) for k, weight in weights.items())
-        terms = sum(abs(weight * objective.merit(sampler) / objective.scale) for weight, objective in objectives)
-        return ROUNDINGS * sys.float_info.epsilon * (terms + sum(map(abs, self.prices.values())))
+        """What its value may be off by: that of its terms, each that is weighed of one natural size."""
+        weights = sum(map(abs, (*self.prices.values(), *self.held.values())))
+        return ROUNDINGS * sys.float_info.epsilon * (abs(self._base or 0.0) + weights)
 
     def value(self, there: Mapping[str, float]) -> float | None:
         """Return its value at a design (SI); None where the linkage has no real position."""
