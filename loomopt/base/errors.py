@@ -179,6 +179,7 @@ NEAR, SAME = 0.5, 0.75
 _NOTHING = object()
 _PROBLEMS = {
     "dict_type": "it is not a table",
+    "tuple_type": "it is not a list",
     "string_type": "it is not text",
     "bool_type": "it is neither true nor false",
     "bool_parsing": "it is neither true nor false",

@@ -148,12 +148,14 @@ def simulate(
     target: str | None = None,
     *,
     accuracy: float | None = None,
+    beside: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
     """Return the curves of a design (SI; today's without one) over the cycle, units in the column names.
 
     design: a mapping, or an answer, of which the design alone is taken. target: what it was found for, to be named in
     the table's provenance. accuracy: as few rows as show each column's largest magnitude to it; every half degree
-    without. Raises BadInput.
+    without. beside: a CSV file of what was measured, `phi [deg]` and columns named as the curves: it stands in columns
+    of its own, NAME_measured, and the table's `attrs` tell the rms difference of each. Raises BadInput.
     """
     from loomopt.interface import tables
 
@@ -161,7 +163,7 @@ def simulate(
         check_numbers(accuracy, 1)
     own, given = _request(scene, design)
     name = None if target is None and own.call.target is None else target_name(own, target)
-    return tables.curves(own, given, accuracy, name)
+    return tables.curves(own, given, accuracy, name, beside)
 
 
 def sweep(

@@ -56,15 +56,17 @@ class Evaluation(solution.Evaluated, records.Shown):
         """Return the curves of the design over the cycle, SI, units in the column names."""
         return self.simulate()
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+    def plot(
+        self, path: str | os.PathLike[str] | None = None, *, beside: str | os.PathLike[str] | None = None
+    ) -> "Figure":
         """Return the curves over the cycle as a figure, which shows itself in Jupyter.
 
-        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        path: a file to write it to as well: .png, .svg or .pdf. beside: as in `loomopt.simulate`. Raises BadInput.
         """
         from loomopt.interface.files import outputs
 
         place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
-        return outputs.plot(self, self.scene, self.target, place)
+        return outputs.plot(self, self.scene, self.target, place, beside)
 
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
@@ -91,13 +93,15 @@ class Evaluation(solution.Evaluated, records.Shown):
             return _judged(self.terms.evaluation(design), self.scene, self.target)
         return evaluated(self.scene, design, self.target)
 
-    def simulate(self, *, accuracy: float | None = None) -> "pd.DataFrame":
-        """Return the curves of the design in its own scene; accuracy: as in `loomopt.simulate`. Raises BadInput."""
+    def simulate(
+        self, *, accuracy: float | None = None, beside: str | os.PathLike[str] | None = None
+    ) -> "pd.DataFrame":
+        """Return the curves of the design in its own scene; accuracy, beside: as in `loomopt.simulate`."""
         from loomopt.interface import tables
 
         if accuracy is not None:
             check_numbers(accuracy, 1)
-        return tables.curves(self.scene, self.design, accuracy, self.target)
+        return tables.curves(self.scene, self.design, accuracy, self.target, beside)
 
     def prove(self, *, slack: float = SLACK) -> "Proofs":
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""

@@ -2,16 +2,21 @@
 
 import functools
 import math
+import os
 import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from loomopt.base import arguments
 from loomopt.base.errors import refusal
-from loomopt.base.units import factor
+from loomopt.base.units import SI_UNIT, factor
 from loomopt.jobs import registry
 from loomopt.model.session import working
+from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.effects.kinds import Event
 from loomopt.physics.tolerances import ACCURACY, SHOWN_AS_ZERO
-from loomopt.scenes import designs
+from loomopt.scenes import csv_tables, designs
 from loomopt.scenes.provenance import provenance
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Solution, Words
@@ -173,12 +178,17 @@ def meaningful(frame: "pd.DataFrame", digits: int | None = None) -> "pd.DataFram
 
 @working()
 def curves(
-    scene: Scene, design: designs.Design, accuracy: float | None = None, target: str | None = None
+    scene: Scene,
+    design: designs.Design,
+    accuracy: float | None = None,
+    target: str | None = None,
+    beside: str | os.PathLike[str] | None = None,
 ) -> "pd.DataFrame":
     """Return the curves of a design (SI; what it does not name stays today's) over one turn, SI.
 
     Every half degree; or, with an accuracy, as few rows as show each column's largest magnitude to it, relative.
-    target: what the design was found for, where that is known.
+    target: what the design was found for, where that is known. beside: a CSV file of what was measured, `phi [deg]` and
+    columns named as the curves: each stands beside its own as NAME_measured, in rows at the angles measured.
     """
     import pandas as pd
 
@@ -188,6 +198,11 @@ def curves(
     if accuracy is not None and any(isinstance(effect, Event) for effect in scene.active):
         problem = "what is simulated has no curves in as few rows as show their peaks"
         raise refusal(problem, scene.origin, "accuracy", remedy="Leave the accuracy out, or take the effect off")
+    measured: dict[str, tuple[float, ...]] = {}
+    if beside is not None:
+        measured = csv_tables.measured(Path(arguments.path(beside, "beside", "a CSV file", "Name one")), _kinds(rows()))
+        angles = [angle % TURN for angle in measured.pop(PHI)]
+        rows = functools.partial(rows, also=angles)
     if accuracy is None:
         columns = rows()
     else:
@@ -195,6 +210,42 @@ def curves(
 
         columns, error = curves.sparse_curves(job.sampler(scene, designs.flat(design)), rows, accuracy)
         more |= {"accuracy": accuracy, "error_estimate": f"{error:.2g}"}
+    if measured:
+        more |= {"beside": str(beside), **_put_beside(columns, angles, measured)}
     frame = pd.DataFrame(columns)
     frame.attrs.update(provenance(scene, **more))
     return frame
+
+
+PHI, MEASURED, RMS = "phi", "_measured", "rms_"
+"""The column of crank angles; what ends the name of a column that was measured, and begins what is told of it."""
+
+
+def _kinds(columns: "Mapping[str, Floats]") -> dict[str, str]:
+    """Return the kind of quantity of each column of curves that has one, by name, angles phi first."""
+    from loomopt.model.curves import split
+
+    kinds = {unit: kind for kind, unit in SI_UNIT.items()}
+    named = (split(column) for column in columns)
+    return {name: kinds[unit] for name, unit in named if unit in kinds}
+
+
+def _put_beside(
+    columns: "dict[str, Floats]", angles: Sequence[float], measured: Mapping[str, Sequence[float]]
+) -> dict[str, float]:
+    """Add what was measured to curves, in the rows at its angles, rad; return the rms difference of each, SI."""
+    import numpy as np
+
+    from loomopt.model.curves import ANGLE, split
+
+    phi, told = np.asarray(columns[ANGLE]) % TURN, {}
+    apart = np.abs((phi[:, None] - np.array(angles) + math.pi) % TURN - math.pi)
+    places = np.argmin(apart, axis=0)
+    for column in [column for column in columns if split(column)[0] in measured]:
+        name, unit = split(column)
+        values = np.full(len(phi), math.nan)
+        values[places] = measured[name]
+        columns[f"{name}{MEASURED} [{unit}]"] = values
+        off = np.asarray(columns[column])[places] - np.asarray(measured[name])
+        told[f"{RMS}{name} [{unit}]"] = float(np.sqrt(np.nanmean(off**2)))
+    return told

@@ -6,12 +6,21 @@ cubic. Nothing is smoothed, and nothing holds it between its samples: it may ove
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from loomopt.maths.systems import Maths, Number, within_half_turn
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+Cubic = tuple[float, float, float, float]
 TURN = 2 * math.pi
 SAME = 1e-9
 """rad; angles this close are one: 360 deg and 0."""
@@ -28,14 +37,15 @@ class PeriodicCubic:
     """Cubics c0 + c1 t + c2 t² + c3 t³, t counted from each interval's middle, rad.
 
     begins: angles where intervals begin, rad, ascending within one turn; middles: theirs; cubics: c0 … c3 by interval;
-    corners: how many there are; spread: rms by which samples, left out one at a time, lie off the curve of the others.
+    corners: how many there are; spread: rms by which samples that are no corners, left out one at a time, lie off the
+    curve of the others; None where there are none.
     """
 
     begins: tuple[float, ...]
     middles: tuple[float, ...]
-    cubics: tuple[tuple[float, float, float, float], ...]
+    cubics: tuple[Cubic, ...]
     corners: int
-    spread: float
+    spread: float | None
 
     @property
     def samples(self) -> int:
@@ -93,12 +103,12 @@ def through(angles: tuple[float, ...], values: tuple[float, ...], marked: tuple[
         return _made(rows, _cubics([*rows, turned[len(rows)]], closed=True), 0, _spread(rows, closed=True))
     first = corners[0]
     ends = [*corners, first + len(rows)]
-    cubics: list[tuple[float, ...]] = []
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+    cubics: list[Cubic] = []
+    for begin, end in itertools.pairwise(ends):
         cubics += _cubics(turned[begin : end + 1])
     # The intervals are counted from the first sample on again.
     cubics = cubics[-first:] + cubics[:-first] if first else cubics
-    arcs = [turned[begin : end + 1] for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+    arcs = [turned[begin : end + 1] for begin, end in itertools.pairwise(ends)]
     squares = [square for arc in arcs for square in _left_out(arc, range(1, len(arc) - 1))]
     return _made(rows, cubics, len(corners), _rms(squares))
 
@@ -118,38 +128,62 @@ def _refuse_gaps(rows: Sequence[_Row]) -> None:
             )
 
 
-def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[tuple[float, ...]]:
+def _cubics(rows: Sequence[_Row], closed: bool = False) -> list[Cubic]:
     """Return c0 … c3 between samples, about each interval's middle; closed: the last is the first one turn later."""
-    from scipy.interpolate import CubicSpline
+    import numpy as np
 
-    angles, values = [row[0] for row in rows], [row[1] for row in rows]
-    if not any(values):
-        return [(0.0, 0.0, 0.0, 0.0)] * (len(rows) - 1)
-    if len(rows) == 2:
-        slope = (values[1] - values[0]) / (angles[1] - angles[0])
-        return [((values[0] + values[1]) / 2, slope, 0.0, 0.0)]
-    found = CubicSpline(angles, values, bc_type="periodic" if closed else "not-a-knot")
-    shifted = []
-    for width, powers in zip((b - a for a, b in zip(angles, angles[1:], strict=False)), found.c.T, strict=True):
-        a3, a2, a1, a0 = map(float, powers)
-        h = width / 2
-        shifted.append((a0 + h * (a1 + h * (a2 + h * a3)), a1 + h * (2 * a2 + 3 * h * a3), a2 + 3 * h * a3, a3))
-    return shifted
+    angles, values = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    widths, chords = np.diff(angles), np.diff(values) / np.diff(angles)
+    slopes = _slopes(widths, chords, closed)
+    before, after = slopes[:-1], slopes[1:]
+    columns = (
+        (values[:-1] + values[1:]) / 2 + widths * (before - after) / 8,
+        1.5 * chords - (before + after) / 4,
+        (after - before) / (2 * widths),
+        (before + after - 2 * chords) / widths**2,
+    )
+    return [(c0, c1, c2, c3) for c0, c1, c2, c3 in zip(*(column.tolist() for column in columns), strict=True)]
+
+
+def _slopes(widths: "Floats", chords: "Floats", closed: bool) -> "Floats":
+    """Return the slopes at all samples for which the curvature does not jump inside; widths, chords: of intervals."""
+    import numpy as np
+
+    count = len(widths) + 1
+    if not closed and count <= 3:  # a line, or a parabola
+        bend = (chords[1] - chords[0]) / widths.sum() if count == 3 else 0.0
+        return np.array([chords[0] - bend * widths[0], *(chords + bend * widths)])
+    matrix, right = np.zeros((count, count)), np.zeros(count)
+    for k in range(0 if closed else 1, count - 1):
+        last, own = widths[k - 1], widths[k]
+        matrix[k, [k - 1 if k else count - 2, k, k + 1]] += own, 2 * (last + own), last
+        right[k] = 3 * (own * chords[k - 1] + last * chords[k])
+    if closed:
+        matrix[-1, [0, -1]] = 1.0, -1.0
+        return np.asarray(np.linalg.solve(matrix, right))
+    for place, (first, second), (near, far) in (
+        ((0, 1), widths[:2], chords[:2]),
+        ((-1, -2), widths[:-3:-1], chords[:-3:-1]),
+    ):
+        both = first + second
+        matrix[place[0], list(place)] = second, both
+        right[place[0]] = ((first + 2 * both) * second * near + first**2 * far) / both
+    return np.asarray(np.linalg.solve(matrix, right))
 
 
 def _left_out(rows: Sequence[_Row], places: Sequence[int]) -> list[float]:
     """Return the squares of how far samples lie off the curve through those beside them."""
-    from scipy.interpolate import CubicSpline
-
     squares = []
     for k in places:
         near = [row for j, row in enumerate(rows[: k + BESIDE + 1]) if j >= k - BESIDE and j != k]
-        curve = CubicSpline([row[0] for row in near], [row[1] for row in near])
-        squares.append(float(curve(rows[k][0]) - rows[k][1]) ** 2)
+        place = sum(row[0] < rows[k][0] for row in near) - 1
+        t = rows[k][0] - (near[place][0] + near[place + 1][0]) / 2
+        c0, c1, c2, c3 = _cubics(near)[place]
+        squares.append((c0 + t * (c1 + t * (c2 + t * c3)) - rows[k][1]) ** 2)
     return squares
 
 
-def _spread(rows: Sequence[_Row], closed: bool) -> float:
+def _spread(rows: Sequence[_Row], closed: bool) -> float | None:
     """Return the rms of `_left_out` of all samples of a closed curve."""
     before = [(angle - TURN, value, mark) for angle, value, mark in rows[-BESIDE:]]
     after = [(angle + TURN, value, mark) for angle, value, mark in rows[:BESIDE]]
@@ -157,12 +191,11 @@ def _spread(rows: Sequence[_Row], closed: bool) -> float:
     return _rms(_left_out(whole, range(len(before), len(before) + len(rows))))
 
 
-def _rms(squares: Sequence[float]) -> float:
-    return math.sqrt(math.fsum(squares) / len(squares)) if squares else 0.0
+def _rms(squares: Sequence[float]) -> float | None:
+    return math.sqrt(math.fsum(squares) / len(squares)) if squares else None
 
 
-def _made(rows: Sequence[_Row], cubics: Sequence[tuple[float, ...]], corners: int, spread: float) -> PeriodicCubic:
+def _made(rows: Sequence[_Row], cubics: Sequence[Cubic], corners: int, spread: float | None) -> PeriodicCubic:
     begins = tuple(row[0] for row in rows)
     middles = tuple((a + b) / 2 for a, b in zip(begins, (*begins[1:], begins[0] + TURN), strict=True))
-    four = tuple((cubic[0], cubic[1], cubic[2], cubic[3]) for cubic in cubics)
-    return PeriodicCubic(begins, middles, four, corners, spread)
+    return PeriodicCubic(begins, middles, tuple(cubics), corners, spread)

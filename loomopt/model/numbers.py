@@ -88,11 +88,14 @@ def told(scene: Scene) -> tuple[str, ...]:
         table = loads[name].tabulated
         assert table is not None
         corners = "one corner" if curve.corners == 1 else f"{curve.corners or 'no'} corners"
-        left = scene.show(curve.spread, table.kind, 3)
+        left = ""
+        if curve.spread is not None:
+            left = f"; left out one at a time, samples lie {scene.show(curve.spread, table.kind, 3)} rms off the curve "
+            left += "of the others"
         unread = [each for each in table.needless if scene.given(each) is not None]
         found.append(
             f"{name}.{key} {scene.effects[name].model_dump()[key]}: a cubic through {curve.samples} samples with "
-            f"{corners}, rms of the fit {scene.show(0.0, table.kind)}; left out one at a time, samples lie {left} rms "
-            f"off the curve of the others{f'. {unread[0]} is not read' if unread else ''}"
+            f"{corners}, rms of the fit {scene.show(0.0, table.kind)}{left}"
+            f"{f'. {unread[0]} is not read' if unread else ''}"
         )
     return tuple(found)

@@ -4,13 +4,13 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, near_file, refusal
 from loomopt.base.quantities import plain_number
-from loomopt.base.units import DISPLAY_UNIT, factor
+from loomopt.base.units import DISPLAY_UNIT, QuantityError, factor, fits
 from loomopt.scenes.scene import Scene
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
@@ -46,12 +46,42 @@ def read(
     unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be.
     """
     held = scene.paths.text(key)
+
+    def raw() -> bytes:
+        if held is not None:
+            return held.encode()
+        return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
+
+    rows = _rows(raw, given, header(kinds))
+    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+
+
+def measured(path: Path, kinds: Mapping[str, str]) -> dict[str, tuple[float, ...]]:
+    """Return those columns of a caller's table that have a name of `kinds`, SI, its first one always. Raises BadInput.
+
+    kinds: column name → kind of quantity, angles first.
+    """
+    given, (angle, *names) = str(path), kinds
+    allowed = f"{angle} [{DISPLAY_UNIT[kinds[angle]]}] and a column of the curves"
+    rows = _rows(lambda: _bytes(path, given, "", "beside"), given, allowed)
+    headings = [_HEADING.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
+    there = [name for name in names if any(each and each[1] == name for each in headings)]
+    if rows and not there:
+        allowed = ", ".join(f"{name} [{DISPLAY_UNIT[kinds[name]]}]" for name in names)
+        remedy = "Name its columns as the curves are named"
+        raise refusal("the table has no column of the curves", given, allowed=allowed, remedy=remedy)
+    asked = {name: kinds[name] for name in (angle, *there)}
+    return dict(zip(asked, _columns(rows, asked, given, 1), strict=True))
+
+
+def _rows(read: Callable[[], bytes], given: str, allowed: str) -> list[list[str]]:
+    """Return the cells of a CSV file, row by row. Raises BadInput."""
     try:
-        raw = _bytes(scene, given, key) if held is None else held.encode()
+        raw = read()
         if len(raw) > LARGEST_FILE:
             raise refusal("the table is too large", given, allowed="up to 1 MB", remedy="Thin it out")
         lines = io.StringIO(raw.decode("utf-8-sig"), newline=None)
-        rows = list(csv.reader((line for line in lines if line.strip() and not line.startswith("#")), strict=True))
+        return list(csv.reader((line for line in lines if line.strip() and not line.startswith("#")), strict=True))
     except BadInput:
         raise
     except OSError as error:
@@ -61,18 +91,16 @@ def read(
         raise refusal(f"it is not UTF-8 text (byte {error.start})", given, remedy="Save the file as UTF-8") from None
     except (csv.Error, ValueError):
         remedy = "Write short cells, and close every quotation mark on its own line"
-        raise refusal("the table is not CSV", given, allowed=header(kinds), remedy=remedy) from None
-    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+        raise refusal("the table is not CSV", given, allowed=allowed, remedy=remedy) from None
 
 
-def _bytes(scene: Scene, given: str, key: str) -> bytes:
+def _bytes(path: Path, given: str, origin: str, key: str) -> bytes:
     """Return what stands in a file, a byte more than may at most. Raises BadInput where there is none, and OSError."""
-    path = scene.paths.located(given, key, scene.origin)
     if not path.is_file():
         problem = "the table cannot be read: there is no such file"
         near = near_file(path)
         remedy = f'Perhaps "{Path(given).with_name(Path(near).name)}" is meant' if near else "Correct it"
-        raise refusal(problem, scene.origin, key, given, remedy=remedy)
+        raise refusal(problem, origin, key, given, remedy=remedy)
     with path.open("rb") as file:
         return file.read(LARGEST_FILE + 1)
 
@@ -95,7 +123,7 @@ def _columns(
         _check_length(row, rows[0], line, origin)
     values = [tuple(_number(row, column, line, origin) for line, row in enumerate(rows[1:], 2)) for column in columns]
     for column, numbers in zip(columns, values, strict=True):
-        if column.kind == "angle":
+        if column.kind == "angle" and column.name == next(iter(kinds)):
             _check_angles(column.name, numbers, origin)
     return values
 
@@ -107,11 +135,21 @@ def _found(head: Sequence[str], kinds: Mapping[str, str], origin: str) -> Iterat
         named = [(place, each[2]) for place, each in enumerate(headings) if each and each[1] == name]
         if len(named) > 1:
             raise refusal(f"the table has column {name} {len(named)} times", origin, remedy="Take out all but one")
-        if not named or named[0][1] not in UNITS[kind]:
-            units = " or ".join(UNITS[kind])
+        if not named or not _is_unit(named[0][1], kind):
+            units = " or ".join(UNITS.get(kind, (DISPLAY_UNIT[kind],)))
             problem = f"the table has no column {name} with its unit ({units})"
             raise refusal(problem, origin, allowed=header(kinds), remedy="Name the columns so, parted by commas")
         yield _Column(name, kind, named[0][0], factor(named[0][1]))
+
+
+def _is_unit(text: str, kind: str) -> bool:
+    """Say whether a column of a kind may have a unit."""
+    if kind in UNITS:
+        return text in UNITS[kind]
+    try:
+        return text == DISPLAY_UNIT[kind] or fits(text, kind)
+    except QuantityError:
+        return False
 
 
 def _marked(rows: Sequence[Sequence[str]], name: str, origin: str) -> tuple[float, ...]:

@@ -37,10 +37,10 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
             labels.setdefault(key, found)
         for key, value in scene.tables[table]:
             if isinstance(value, tuple) and value and isinstance(value[0], Table):
-                for place, each in enumerate(value, 1):
-                    for own, found in _fields(type(each)):
-                        if getattr(each, own) is not None:
-                            yield f"{table}.{key}.{place}.{own}", found
+                for k, each in enumerate(value, 1):
+                    for name, found in _fields(type(each)):
+                        if getattr(each, name) is not None:
+                            yield f"{table}.{key}.{k}.{name}", found
     for effect in scene.active:
         for key, found in _fields(effect.own):
             yield ".".join(("effects", *effect.path, key)), found

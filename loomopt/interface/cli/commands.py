@@ -197,6 +197,9 @@ def simulate(
     accuracy: Annotated[
         str | None, typer.Option(metavar="R", help="As few rows as show each peak to R; with --out.")
     ] = None,
+    beside: Annotated[
+        Path | None, typer.Option(metavar="F.csv", help="What was measured: phi [deg] and columns of the curves.")
+    ] = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -212,12 +215,15 @@ def simulate(
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
+    compared = [scenes.beside(scene, api.simulate(scene, given, name, beside=beside))] if beside else []
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else None
     for path in out or ():
-        outputs.curves(path, scene, given, asked, name, said)
+        outputs.curves(path, scene, given, asked, name, said, beside)
         remark(f"Wrote {path}")
     if not out:
-        layout.show(*scenes.curves(scene, given, layout.width()))
+        layout.show(*scenes.curves(scene, given, layout.width()), *compared)
+    elif compared:
+        layout.show(*compared)
     remarked(scene, given)
 
 

@@ -11,7 +11,7 @@ from loomopt.base import files
 from loomopt.base.units import factor, show
 from loomopt.interface.figures import figure
 from loomopt.interface.figures.figure import COLOURS, HEAD_SIZE, STYLES, Entry, head
-from loomopt.model.curves import ANGLE
+from loomopt.model.curves import ANGLE, split
 from loomopt.physics.cycle import Floats
 from loomopt.picture.job_views import Marks, Span
 from loomopt.picture.panels import Panel, each
@@ -173,11 +173,18 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
     drawn = [design.of(column) / size for column in panel.columns]
     old = [before.of(column) / size for column in panel.columns] if before else []
     entries = []
-    for place, (values, label) in enumerate(zip(drawn, panel.labels, strict=True)):
+    for place, (values, label) in enumerate(zip(list(drawn), panel.labels, strict=True)):
         colour, style = COLOURS[place % len(COLOURS)], STYLES[place % len(STYLES)]
         (line,) = axes.plot(design.angles, values, color=colour, linewidth=1.4, linestyle=style, label=plain(label))
         if label != panel.title:
             entries.append((line, label))
+        shown = column_measured(panel.columns[place])
+        if shown in design.columns:
+            (dots,) = axes.plot(
+                design.angles, design.of(shown) / size, "o", color="black", markersize=3, fillstyle="none", zorder=2.2
+            )
+            drawn.append(design.of(shown) / size)
+            entries.append((dots, "measured"))
     for place, values in enumerate(old):
         colour = COLOURS[place % len(COLOURS)] if len(old) > 1 else TODAY
         label = f"{plain(panel.labels[place])}, today"
@@ -189,6 +196,12 @@ def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None)
     if panel.si == "m/s^2":
         _in_g(axes, size)
     return entries + _levels(axes, panel, size)
+
+
+def column_measured(column: str) -> str:
+    """Return the column of what was measured beside a column of the curves."""
+    name, unit = split(column)
+    return f"{name}_measured [{unit}]"
 
 
 def _frame(axes: Any, values: Floats, turn: DrawnTurn) -> None:

@@ -4,6 +4,7 @@ import contextlib
 import functools
 import json
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -146,13 +147,15 @@ def curves(
     accuracy: float | None = None,
     target: str | None = None,
     said: DrawnSubject | None = None,
+    beside: Path | None = None,
 ) -> None:
     """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
     target: what the design was found for, to be named in the table; said: what it is, for a figure's title.
+    beside: a file of what was measured.
     """
     ending = suffix(path, CURVES)
-    frame = tables.curves(scene, design, accuracy, target)
+    frame = tables.curves(scene, design, accuracy, target, beside)
     if ending == ".csv":
         text(path, provenance.csv(tables.filed(frame, scene)))
     elif ending == ".parquet":
@@ -164,13 +167,19 @@ def curves(
         atomically(path, functools.partial(figure.save, drawn))
 
 
-def plot(found: Evaluated, scene: Scene, target: str, path: Path | None) -> "Figure":
+def plot(
+    found: Evaluated,
+    scene: Scene,
+    target: str,
+    path: Path | None,
+    beside: str | os.PathLike[str] | None = None,
+) -> "Figure":
     """Return the curves of an evaluated design as a figure; path: a file to write it to as well. Raises BadInput."""
     from loomopt.interface.figures import figure
 
     if path:
         suffix(path, PICTURES)
-    frame = tables.curves(scene, found.design, target=target)
+    frame = tables.curves(scene, found.design, target=target, beside=beside)
     drawn = plotted(frame, scene, flat(found.design), what(found))
     if path:
         atomically(path, functools.partial(figure.save, drawn))
@@ -191,7 +200,8 @@ def plotted(
     job, view = registry.of(scene), registry.of(scene).views
     now = job.today(scene)
     own = {**now, **design}
-    panels = [in_units(scene, panel) for panel in view.panels(scene, design, tuple(frame.columns))]
+    columns = tuple(column for column in frame.columns if f"{tables.MEASURED} [" not in column)
+    panels = [in_units(scene, panel) for panel in view.panels(scene, design, columns)]
     today = None if own == now else (tables.curves(scene, {}), view.marks(scene, now))
     subject = said or DrawnSubject(GIVEN if design else TODAY)
     short = ", limits not held" if subject.broken else f", {subject.shortfall}" if subject.shortfall else ""

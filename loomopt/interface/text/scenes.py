@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import Scene, given
 from loomopt.solving.answer.solution import Words
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEP = 15
 """Crank angle between printed rows, deg."""
@@ -129,6 +133,24 @@ def curves(scene: Scene, design: Design, width: int | None) -> list[str | Grid]:
         groups[-1].append(curve)
     tables = [_table([first, *group], rows) for group in groups]
     return [f"{scene.title}: {marks}", *tables]
+
+
+def beside(scene: Scene, frame: "pd.DataFrame") -> Grid:
+    """Return how far curves, SI, lie off what was measured, in the scene's display units."""
+    lines = []
+    for column in frame.columns:
+        name, _, unit = column.removesuffix("]").partition("_measured [")
+        if unit:
+            shown = scene.unit_for(unit)
+            size = 1.0 if shown == unit else factor(shown) / factor(unit)
+            off = (frame[f"{name} [{unit}]"] - frame[column]).to_numpy(dtype=float) / size
+            there = np.flatnonzero(np.isfinite(off))
+            worst = there[np.argmax(np.abs(off[there]))]
+            angle = scene.show(float(frame["phi [rad]"].iloc[worst]), "angle", 5)
+            rms = math.sqrt(float(np.mean(off[there] ** 2)))
+            lines.append((name, shown, str(len(there)), f"{rms:.4g}", f"{off[worst]:.4g}", angle))
+    heads = ("curve", "unit", "samples", "rms", "largest", "at")
+    return Grid(f"Curves less what was measured ({frame.attrs['beside']})", heads, tuple(lines), right=(2, 3, 4, 5))
 
 
 def _angles(marks: Marks) -> dict[str, float]:

@@ -64,7 +64,8 @@ class Beatup(Job):
                 "target torque needs a tolerance for the reed torque",
                 file=scene.origin,
                 key="targets.torque.M3_tolerance",
-                remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of its largest torque.',
+                remedy='Set it, as in M3_tolerance = "8 N*m", or add the effect resistance: then it is 1 % of '
+                "its largest torque.",
             )
         for name in scene.table(RetrofitTarget).weights if target == "retrofit" else ():
             if name not in VARIABLES:

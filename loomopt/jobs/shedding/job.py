@@ -257,7 +257,7 @@ def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
 
 def judged(model: JobModel) -> str:
     """Return the dwells, in words, that the cam force is judged in; "" where it is known all round."""
-    names = [SEGMENTS[int(value)] for _, value in model.known_in if int(value) in frame(model).segments]
+    names = [SEGMENTS[k] for k in frame(model).segments if (SEGMENT, float(k)) in model.known_in]
     known = [name.replace("_", " ") for name in names]
     return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
 

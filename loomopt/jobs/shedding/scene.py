@@ -175,14 +175,14 @@ def check_motion(scene: Scene) -> None:
         problem = f"segments and {', '.join(given)} say the same twice"
         remedy = f"Take segments out, or {', '.join(given)}"
         raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
-    heights = [each.to for each in segments if each.to is not None]
-    if not heights or max(heights) == min(heights):
+    told = [each.to for each in segments if each.to is not None]
+    if not told or max(told) == min(told):
         remedy = 'Write moves with the height at their end, such as { angle = "90 deg", to = "45 mm" }'
         raise refusal("the segments move nothing", scene.origin, "mechanism.segments", remedy=remedy)
-    if min(heights) != 0.0:
-        problem = f"the lowest height is {scene.show(min(heights), 'length')}, and X counts from the lowest"
+    if min(told) != 0.0:
+        problem = f"the lowest height is {scene.show(min(told), 'length')}, and X counts from the lowest"
         raise refusal(problem, scene.origin, "mechanism.segments", remedy='Let a move end at to = "0 mm"')
-    before = heights[-1]
+    before = told[-1]
     for k, each in enumerate(segments, 1):
         if each.law and (each.to is None or each.to == before):
             problem = f"segment {k} is a dwell, which has no law"
@@ -221,7 +221,7 @@ def heights(scene: Scene) -> list[float]:
 
 
 def program_numbers(scene: Scene) -> dict[str, float]:
-    """Return angles, rad, and heights, m, of a motion in several segments by name, and its travel; {} of one in four."""
+    """Return angles, rad, heights and travel, m, of a motion in several segments by name; {} of one in four."""
     own = scene.table(HealdFrame).segments
     if own is None:
         return {}

@@ -12,7 +12,7 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput, Broken, Faults, refusal
 from loomopt.base.records import freeze
 from loomopt.jobs import registry
-from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, required
+from loomopt.physics.effects.kinds import Effect, Event, Fault, Speed, State, faults, needed, required
 from loomopt.physics.schema import Table
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs
@@ -65,7 +65,7 @@ def combined(given: Mapping[Effect, Table], scene: Scene) -> Together:
     Of two that cannot, a state, a speed or an event yields to any other kind, else the later one in the order of the
     job. What needs a number of the scene that is not there, or an effect that stays out, stays out too.
     """
-    out = {e.name: text for e in given if (text := _lacking(e, scene))}
+    out = {e.name: text for e in given if (text := _lacking(e, given[e], scene))}
     while True:
         chosen, yielding = _chosen({e: own for e, own in given.items() if e.name not in out})
         fault = next((each for each in faults(chosen) if each.missing), None)
@@ -90,10 +90,10 @@ def _other(fault: Fault, effect: Effect) -> str:
     return fault.other if fault.effect is effect else fault.effect.name
 
 
-def _lacking(effect: Effect, scene: Scene) -> str:
+def _lacking(effect: Effect, own: Table, scene: Scene) -> str:
     """Return what of the scene an effect lacks; "" where it has all it needs."""
-    given = {f"{table}.{key}" for table, own in scene.tables.items() for key, value in own if value is not None}
-    keys = [key for key in effect.needs if key not in given]
+    given = {f"{name}.{key}" for name, table in scene.tables.items() for key, value in table if value is not None}
+    keys = [key for key in needed(effect, own) if key not in given]
     return f"it needs {', '.join(keys)}" if keys else ""
 
 
