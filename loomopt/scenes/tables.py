@@ -46,6 +46,7 @@ class SceneSchema:
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
     parts: whether the job honours effects by which the output may part from the mechanism.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
+    instead: keys of [mechanism] → those that each stands for: a scene gives it, or them.
     own_axes: axes that are read otherwise than under their own name.
     conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
     """
@@ -67,6 +68,7 @@ class SceneSchema:
     partly_known: bool = False
     parts: bool = False
     own_axes: Mapping[str, Axis] = field(default_factory=dict)
+    instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conflict: Conflict | None = None
 
     @lazy
@@ -295,6 +297,17 @@ def demand(
         path, name = key.split(".")
         if getattr(tables[path], name) is None:
             faults.add(missing(type(tables[path]), origin, path, name, f"{first[key]} needs it"))
+    own = tables["mechanism"]
+    for key, others in schema.instead.items():
+        given = [name for name in others if getattr(own, name) is not None]
+        if getattr(own, key) is None:
+            for name in others:
+                if name not in given:
+                    faults.add(missing(type(own), origin, "mechanism", name))
+        elif given:
+            problem = f"{key} and {', '.join(given)} say the same twice"
+            remedy = f"Take {key} out, or {', '.join(given)}"
+            faults.add(refusal(problem, origin, f"mechanism.{key}", remedy=remedy))
     if any(effect.beside or effect.clashes for effect in active):
         _combined(active, origin, faults)
     for effect, own in active.items():

@@ -1,7 +1,7 @@
 """The JSON Schema of a job's scenes, by which editors complete and check TOML: from the models that read a scene."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import TypeAdapter
@@ -25,7 +25,7 @@ def scene(schema: SceneSchema) -> Json:
     makers: Mapping[str, Callable[[SceneSchema], Json]] = {
         "problem": _problem,
         "operation": lambda of: _model(of.operation),
-        "mechanism": lambda of: _model(of.mechanism),
+        "mechanism": _mechanism,
         "effects": _effects,
         "available": _effects,
         "bounds": _bounds,
@@ -104,12 +104,22 @@ def _either(effect: Effect) -> Json:
     curve = effect.tabulated if isinstance(effect, Load) else None
     if curve is None:
         return {}
-    numbers = [key for key in required(effect) if key in curve.instead]
+    return _alternative(curve.key, curve.instead, [key for key in required(effect) if key in curve.instead])
+
+
+def _alternative(key: str, instead: Sequence[str], needed: Sequence[str]) -> Json:
+    """Return that a table has either a key, or those that it stands for; needed: of these, those without a default."""
     return {
-        "if": {"required": [curve.key]},
-        "then": {"properties": dict.fromkeys(curve.instead, False)},
-        "else": {"required": numbers},
+        "if": {"required": [key]},
+        "then": {"properties": dict.fromkeys(instead, False)},
+        "else": {"required": list(needed)},
     }
+
+
+def _mechanism(schema: SceneSchema) -> Json:
+    """Return [mechanism]; what one key stands for is given, or that key."""
+    rules = [_alternative(key, instead, instead) for key, instead in schema.instead.items()]
+    return _model(schema.mechanism) | ({"allOf": rules} if rules else {})
 
 
 def _given(key: str, effect: Effect | None = None) -> Json:
@@ -173,6 +183,9 @@ def _hoisted(whole: Json) -> Json:
     kinds: dict[str, Json] = {}
 
     def hoist(part: Json) -> Json:
+        if "$defs" in part:  # models inside a model: references name them at the root
+            kinds.update({name: hoist(each) for name, each in part["$defs"].items()})
+            part = {key: value for key, value in part.items() if key != "$defs"}
         if QUANTITY_PATTERN not in part:
             return _each(part, hoist)
         own: Json = {key: part[key] for key in ("description",) if key in part}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from loomopt.base.errors import refusal
 from loomopt.base.units import factor, show
 from loomopt.jobs import registry
-from loomopt.jobs.shedding.model import FOLLOWER, follower, frame
+from loomopt.jobs.shedding.model import FOLLOWER, CamProgram, follower, frame
 from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.maths import systems
 from loomopt.model.sampling import Extreme, Sampler
@@ -396,7 +396,12 @@ def _legend(scene: Scene, drawn: Picture, figures: Figures, units: Units) -> tup
 
 def _law(scene: Scene, found: CamDrawing) -> str:
     """Return the name of the law the cam really has."""
-    law = frame(found.sampler.model).law
+    cam = frame(found.sampler.model)
+    if isinstance(cam, CamProgram):
+        own = [each.law or scene.table(HealdFrame).law for each in scene.table(HealdFrame).segments or ()]
+        laws = [law for law, move in zip(own, cam.moves, strict=True) if move.law]
+        return ", ".join(dict.fromkeys(laws))
+    law = cam.law
     return f"spline of {law.intervals} intervals" if isinstance(law, Spline) else scene.table(HealdFrame).law
 
 

@@ -378,7 +378,6 @@ class CamProgram(CamFrame):
             """Return a number of the segment."""
             return maths.choose(place, [numbers[k] for k in segments])
 
-        piece = maths.choose(place, [piece for _, piece in self.stretches])
         count = len(self.moves)
         tops = [values[height(k)] for k in range(count)]
         lows = [tops[k - 1] if move.rises or not move.law else tops[k] for k, move in enumerate(self.moves)]
@@ -395,17 +394,20 @@ class CamProgram(CamFrame):
         u = (theta - chosen(since)) * rate
         speeds = values.get("speed"), values.get("omega_dot")
         kind, worst = chosen([move.kind for move in self.moves]), node.switch.get("worst", LEAST)
-        law = self._law(maths, given, place, u, piece)
+        law = self._law(maths, given, place, u)
         found = (maths, theta, values["travel"], kind, u, rate, law, worst, *speeds)
         return ProgramMotion(*found, low=chosen(lows), span=chosen(spans))
 
-    def _law(self, maths: Maths, given: Given, place: Number, u: Number, piece: Number) -> LawDerivatives:
+    def _law(self, maths: Maths, given: Given, place: Number, u: Number) -> LawDerivatives:
         """Return the law that holds, of all that there are."""
         laws = list(dict.fromkeys(move.law for move in self.moves if move.law))
-        found = [law.at(maths, given.values, u, piece) for law in laws]
+        which = [laws.index(move.law) if move.law else 0 for move in self.moves]
+        found = []
+        for number, law in enumerate(laws):
+            piece = maths.choose(place, [piece if which[k] == number else 0 for k, piece in self.stretches])
+            found.append(law.at(maths, given.values, u, piece))
         if len(found) == 1:
             return found[0]
-        which = [laws.index(move.law) if move.law else 0 for move in self.moves]
         return LawDerivatives(
             *(maths.choose(place, [column[which[k]] for k, _ in self.stretches]) for column in zip(*found, strict=True))
         )

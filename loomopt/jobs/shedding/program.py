@@ -146,6 +146,7 @@ def model(scene: Scene, law: CamLaw | None = None, raced: tuple[str, ...] = ()) 
     several = moves(scene)
     dwells = (True, True) if free or several else dwelt(scene.mechanism)
     known = frozenset((*scene_numbers(scene), *((CONTACT_SPEED,) if FASTEST in raced else ())))
+    law = next((move.law for move in several if move.law), law)
     return shedding.model(law or chosen(scene), dwells, scene.active, words(scene), known, raced, several)
 
 

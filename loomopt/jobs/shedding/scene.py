@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from loomopt.base.errors import BadInput, missing, refusal
+from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import (
     NARROWEST,
     Angle,
@@ -163,18 +163,10 @@ FORM = (*SEGMENTS, "travel")
 
 
 def check_motion(scene: Scene) -> None:
-    """Raise BadInput where the motion is neither of four segments nor of several that close after one turn."""
-    own, segments = scene.tables["mechanism"], scene.table(HealdFrame).segments
-    given = [name for name in FORM if getattr(own, name) is not None]
+    """Raise BadInput where the segments of a motion in several make none."""
+    segments = scene.table(HealdFrame).segments
     if segments is None:
-        for name in FORM:
-            if name not in given:
-                raise missing(type(own), scene.origin, "mechanism", name)
         return
-    if given:
-        problem = f"segments and {', '.join(given)} say the same twice"
-        remedy = f"Take segments out, or {', '.join(given)}"
-        raise refusal(problem, scene.origin, "mechanism.segments", remedy=remedy)
     told = [each.to for each in segments if each.to is not None]
     if not told or max(told) == min(told):
         remedy = 'Write moves with the height at their end, such as { angle = "90 deg", to = "45 mm" }'
@@ -329,6 +321,7 @@ SCHEMA = SceneSchema(
     own_axes=AXES,
     conflict=Conflict(("K1", "X0")),
     groups={"rise": SEGMENTS},
+    instead={"segments": FORM},
     lists={"law": "number"},
     partly_known=True,
     parts=True,

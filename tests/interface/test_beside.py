@@ -1,0 +1,89 @@
+"""Curves beside what was measured: columns of their own, the rms difference, dots in the figure."""
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import loomopt as lo
+from loomopt.base.errors import BadInput
+from loomopt.interface.cli import app
+
+
+@pytest.fixture
+def measured(tmp_path):
+    """Write the packaged machine's rocker angle at 24 crank angles, off by 0.1 deg up and down, with other columns."""
+    frame = lo.simulate("beatup")
+    rows = ["phi [deg],psi [deg],time"]
+    for k in range(24):
+        at = int(np.argmin(np.abs(frame["phi [rad]"] - math.radians(15 * k))))
+        rows.append(f"{15 * k - (360 if k > 20 else 0)},{math.degrees(frame['psi [rad]'][at]) + 0.1 * (-1) ** k!r},x")
+    path = tmp_path / "measured.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def test_what_was_measured_stands_in_a_column_of_its_own_with_its_rms(measured):
+    frame = lo.simulate("beatup", beside=measured)
+    there = frame["psi_measured [rad]"].dropna()
+    assert len(there) == 24
+    off = (frame["psi [rad]"] - frame["psi_measured [rad]"]).dropna()
+    assert off.abs().to_numpy() == pytest.approx(math.radians(0.1), rel=1e-9)
+    assert float(frame.attrs["rms_psi [rad]"]) == pytest.approx(math.radians(0.1), rel=1e-9)
+    assert frame.attrs["beside"] == str(measured)
+
+
+def test_angles_between_the_rows_of_curves_have_rows_of_their_own(tmp_path):
+    path = tmp_path / "one.csv"
+    path.write_text("phi [deg],psi [deg]\n12.345,150\n")
+    frame = lo.simulate("beatup", beside=path)
+    at = frame["psi_measured [rad]"].first_valid_index()
+    assert frame["phi [rad]"][at] == pytest.approx(math.radians(12.345), abs=1e-15)
+
+
+def test_an_answer_is_drawn_beside_what_was_measured(measured):
+    answer = lo.evaluate("beatup")
+    figure = answer.plot(beside=measured)
+    dots = [
+        line for axes in figure.axes for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata()) > 2
+    ]
+    assert len(dots) == 1
+    assert np.isfinite(dots[0].get_ydata().astype(float)).sum() in (24, 25)
+    assert answer.simulate(beside=measured)["psi_measured [rad]"].notna().sum() == 24
+
+
+def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
+    out = [tmp_path / name for name in ("curves.csv", "curves.png")]
+    words = ["simulate", "beatup", "--beside", str(measured), *(w for path in out for w in ("--out", str(path)))]
+    told = CliRunner().invoke(app.application(words), words)
+    assert told.exit_code == 0, told.output
+    assert "psi" in told.stdout
+    assert " 24 " in told.stdout
+    assert " 0.1 " in told.stdout
+    assert "psi_measured [rad]" in out[0].read_text()
+    assert out[1].stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ("phi [deg],chi [deg]\n0,1\n", "no column of the curves"),
+        ("psi [deg]\n1\n", "no column phi"),
+        ("phi [deg],psi [mm]\n0,1\n", "no column psi with its unit"),
+        ("phi [deg],psi [deg]\n0,1\n0,2\n", "repeats an angle"),
+        ("phi [deg],psi [deg]\n0,\n", "no number under psi"),
+        ("", "empty"),
+    ],
+)
+def test_a_file_that_measures_nothing_is_refused_in_one_line(tmp_path, rows, told):
+    path = tmp_path / "bad.csv"
+    path.write_text(rows)
+    with pytest.raises(BadInput, match=told):
+        lo.simulate("beatup", beside=path)
+
+
+@pytest.mark.parametrize("wrong", [5, "none.csv", b"x", True])
+def test_what_is_no_file_is_refused(wrong):
+    with pytest.raises(BadInput):
+        lo.simulate("beatup", beside=wrong)
