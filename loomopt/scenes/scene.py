@@ -319,7 +319,10 @@ class Scene(Shown):
             "job": self.job,
             "operation": self.tables["operation"].model_dump(exclude_none=True),
             "mechanism": self.tables["mechanism"].model_dump(exclude_none=True),
-            "effects": {name: own.model_dump() for name, own in self.effects.items()},
+            "effects": {
+                effect.name: own.model_dump(exclude=_no_curve(effect, own))
+                for effect, own in zip(self.active, self.effects.values(), strict=True)
+            },
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
             "targets": {name: _deciding(own) for name, own in self.targets.items()},
@@ -364,6 +367,12 @@ class Scene(Shown):
         if self._kind(name) not in known:
             raise unknown("effect", name, known, self.origin, "effects")
         return name.split(".")
+
+
+def _no_curve(effect: Effect, own: Table) -> set[str]:
+    """Return the key of a curve that an effect's table could name and does not."""
+    curve = effect.tabulated if isinstance(effect, Load) else None
+    return {curve.key} if curve and getattr(own, curve.key) is None else set()
 
 
 def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:

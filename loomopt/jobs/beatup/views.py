@@ -11,6 +11,7 @@ from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.model.curves import tops
 from loomopt.model.model import JobModel
+from loomopt.model.numbers import told
 from loomopt.physics import balance
 from loomopt.physics.cycle import TURN
 from loomopt.physics.effects.kinds import State
@@ -128,7 +129,7 @@ class BeatupViews(JobViews):
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
         """Return what there is to remark upon: curves, a reed that twists away while it beats up."""
-        found = super().remarks(scene, design)
+        found = told(scene)
         if not any(isinstance(effect, State) for effect in scene.active):
             return found
         from loomopt.picture.panels import twisted
