@@ -109,11 +109,8 @@ def _either(effect: Effect) -> Json:
 
 def _alternative(key: str, instead: Sequence[str], needed: Sequence[str]) -> Json:
     """Return that a table has either a key, or those that it stands for; needed: of these, those without a default."""
-    return {
-        "if": {"required": [key]},
-        "then": {"properties": dict.fromkeys(instead, False)},
-        "else": {"required": list(needed)},
-    }
+    others: Json = {"anyOf": [{"required": [name]} for name in instead]}
+    return {"anyOf": [{"required": [key], "not": others}, {"required": list(needed), "not": {"required": [key]}}]}
 
 
 def _mechanism(schema: SceneSchema) -> Json:
