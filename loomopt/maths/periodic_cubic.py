@@ -59,8 +59,9 @@ class PeriodicCubic:
 
     @property
     def acting(self) -> tuple[float, ...]:
-        """The intervals in which it is not 0 all over."""
-        return tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
+        """The intervals in which it is not 0 all over; all of them where it is 0 everywhere."""
+        found = tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
+        return found or tuple(map(float, range(self.samples)))
 
     def _value(self, k: int, angle: float) -> float:
         t, (c0, c1, c2, c3) = angle - self.middles[k], self.cubics[k]

@@ -126,6 +126,42 @@ def test_the_equations_say_what_the_curve_is(resisted):
     assert "2 corners" in told[0]
 
 
+@pytest.mark.parametrize(
+    ("job", "effect", "column"), [("beatup", "resistance", "M [N*m]"), ("shedding", "warp_tension", "T [N]")]
+)
+def test_a_curve_of_nothing_is_no_load(tmp_path, job, effect, column):
+    path = tmp_path / "nothing.csv"
+    path.write_text(f"angle [deg],{column},corner\n-10,0,1\n0,0,\n10,0,1\n")
+    nothing, without = lo.load(job).set(f"effects.{effect}.table", str(path)), lo.load(job).without_effect(effect)
+    first, second = (lo.evaluate(scene).figures for scene in (nothing, without))
+    for name, value in second.items():
+        if value is not None:
+            assert first[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
+
+
+@pytest.mark.parametrize("turns", [-1, 1])
+def test_a_curve_is_the_same_on_every_turn(resisted, turns):
+    """The load alone, a turn on; also where its corners are declared in another order."""
+    from types import SimpleNamespace
+
+    from loomopt.maths import systems
+    from loomopt.model.numbers import curves
+    from loomopt.physics.effects.beatup import resistance
+
+    ((_, curve),) = curves(resisted).items()
+    given, own = {"beta": 1.1}, {"table": curve}
+    corners = resistance.corners(systems.FLOAT, given, own)
+    for phi in np.linspace(0.0, 2 * math.pi, 50):
+        turned = float(phi) + 2 * math.pi * turns
+        found = [
+            resistance.force(
+                systems.FLOAT, SimpleNamespace(phi=angle), given, own, resistance.EFFECT.switch(angle, corners)
+            )
+            for angle in (float(phi), turned)
+        ]
+        assert found[1] == pytest.approx(found[0], abs=1e-9)
+
+
 def test_the_warp_as_samples_is_the_warp(tmp_path):
     """The linear pull over the packaged cam, a corner at each half open shed."""
     rows = ["angle [deg],T [N],corner"]
