@@ -75,4 +75,5 @@ def test_an_indifference_that_is_not_given_leaves_the_hash_of_a_scene():
     scene = lo.load("beatup")
     assert scene.hash == "7796953876c4"
     assert scene.set("targets.balance.indifference", "0.001").hash != scene.hash
-    assert math.isclose(scene.set("targets.balance.indifference", "0.01").targets["balance"].indifference, 0.01)
+    set_so = scene.set("targets.balance.indifference", "0.01").targets["balance"].model_dump()
+    assert math.isclose(set_so["indifference"], 0.01)
