@@ -18,6 +18,10 @@ from loomopt.solving.certificate.verdict import Level
 from loomopt.solving.nlp.point import Known
 from loomopt.solving.search.search import Candidate, Search, Spared, judged, objectives, tried
 
+LOOKED_AT = 10.0
+"""Shares by which a level may change where what is added is left out and all else stays: what changes more, of its
+natural size or its figure, is worth its place, and no other design is sought without it."""
+
 
 def settled(search: Search) -> Search:
     """Return the search with its best as simple as the program asks, and with the least change of what is still open.
@@ -60,6 +64,9 @@ def _without(search: Search, best: Candidate, added: Added) -> Search | None:
     if not gone:
         return None
     share = added.share or INDIFFERENT
+    before, after = objectives(program, best.x), objectives(program, {**best.x, **gone})
+    if any(there - here > LOOKED_AT * share * max(1.0, abs(here)) for here, there in zip(before, after, strict=True)):
+        return None
     variables = (replace(v, lower=gone[v.name], upper=gone[v.name]) if v.name in gone else v for v in program.variables)
     limits = tuple(limit for limit in program.limits if limit.row not in gone)
     task = replace(program, variables=tuple(variables), limits=limits)
