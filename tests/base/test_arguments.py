@@ -140,13 +140,12 @@ GIVEN: dict[str, dict[str, Any]] = {
     "show": {"value": 1.0, "kind": "length"},
     "shown_in": {"kind": "length"},
     "unit_for": {"si": "m"},
-    "filed_in": {"si": "m"},
     "export": {"path": "x.csv"},
     "answer": {"point": 0},
 }
 FUNCTIONS = ["load", "scene", "solve", "evaluate", "simulate", "prove", "sweep", "effects", "pareto"]
 OF_SCENE = ["set", "update", "change", "with_effect", "without_effect", "free", "given", "full", "show"]
-OF_SCENE += ["shown_in", "unit_for", "filed_in"]
+OF_SCENE += ["shown_in", "unit_for"]
 OF_ANSWER = ["plot", "export", "to_frame", "simulate", "prove"]
 OF_STUDY = ["table", "answer", "plot"]
 ENGINES = ["loomopt.solving.engine.solve", "loomopt.studies.run.run.run", "loomopt.solving.proof.whole_cycle._readings"]

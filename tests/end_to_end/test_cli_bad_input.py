@@ -30,7 +30,7 @@ CASES = [
     ("solve binary.toml", ["binary.toml", "not UTF-8"]),
     ("solve latin.toml", ["latin.toml", "not UTF-8", "Save the file as UTF-8"]),
     ("solve broken.toml", ["broken.toml", "not TOML", "Correct the line"]),
-    ("solve answer.json", ["answer.json", "path that ends in .toml"]),
+    ("solve answer.json", ["answer.json", "no such file"]),
     ("solve comma.toml", ["comma.toml", "mechanism.l1", "31,5 mm", "decimal point"]),
     ("solve swapped.toml", ["swapped.toml", "not a crank-rocker", "mechanism.l1", "shortest"]),
     ("solve beatup --target ballance", ["--target", "ballance", "balance, pulse"]),

@@ -171,7 +171,7 @@ METHODS = {
             "plot",
         ),
         *("point", "problem", "proofs", "prove", "reached", "relaxation", "scene", "simulate", "solver", "sought"),
-        *("status", "table", "target", "terms", "time", "to_frame", "today", "units"),
+        *("beside", "outcome", "status", "table", "target", "terms", "time", "to_frame", "today", "units"),
     },
     "Scene": {
         *("active", "bounds", "call", "called", "change", "document", "effects", "equations", "free", "full", "given"),

@@ -576,9 +576,12 @@ def _settled_but_for_moves(local: Local, level: int, basis: Floats, hessian: Flo
 
     def along(move: Mapping[str, float]) -> Floats:
         way = np.array([move.get(name, 0.0) for name in local.derivatives.names]) / local.scales
-        return np.asarray(way / np.linalg.norm(way))
+        return np.asarray(way / (np.linalg.norm(way) or 1.0))
 
-    moves = tie_break.unchanging(local.program, local.x, lambda move: _is_open(basis, along(move)))
+    # What moves may be held: there is no direction then.
+    moves = tie_break.unchanging(
+        local.program, local.x, lambda move: bool(np.any(along(move))) and _is_open(basis, along(move))
+    )
     inside = [basis.T @ along(move) for move in moves]
     if not inside:
         return False

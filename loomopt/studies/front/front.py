@@ -35,8 +35,10 @@ def demanding(scene: Scene, target: str | None) -> str | None:
 
     A target's demands on what is traded fall away.
     """
-    if isinstance(target, str) and target not in (NONE, *scene.schema.targets):
-        allowed = ", ".join((*scene.schema.targets, NONE))
+    allowed = ", ".join((*scene.schema.targets, NONE))
+    if target is not None:
+        arguments.text(target, "target", allowed, "Choose one of them")
+    if target and target not in (NONE, *scene.schema.targets):
         raise refusal(
             f"job {scene.job} has no target {target}", scene.origin, "target", target, allowed, "Choose one of them."
         )

@@ -115,6 +115,7 @@ FREED = {
 def test_any_number_of_the_scene_may_be_bounded(name, target):
     scene = lo.load("beatup").with_effect("gravity").with_effect("rod_inertia").with_effect("bearing_friction")
     low, high = FREED[name]
+    scene = scene.set(f"targets.{target}.indifference", "0")
     fixed = lo.solve(scene, target, starts=1)
     scene = scene.set(f"bounds.{name}", {"min": low, "max": high})
     answer = lo.solve(scene, target, starts=1)
@@ -191,7 +192,7 @@ def test_the_rod_as_a_rigid_body(target):
 )
 def test_the_first_level_is_never_traded_for_the_second(changes):
     """However steeply the peak torque would fall: |M3| is the least that SLSQP finds."""
-    scene = lo.load("beatup").update(changes)
+    scene = lo.load("beatup").update(changes).set("targets.balance.indifference", "0")
     answer = lo.solve(scene)
     machine = assert_right(scene, answer)
     size = max(machine.M0, abs(answer.figures["M3_fdc"]))
