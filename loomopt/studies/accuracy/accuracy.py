@@ -1,6 +1,6 @@
 """What accuracy costs in time: a work-precision study of what a designer reads, method by method.
 
-A method is a ladder (studies/ladders.py); one more method is one more function that yields ladders in LADDERS.
+A method is a ladder (subject.py); one more method is one more function that yields ladders in LADDERS.
 """
 
 import math
