@@ -14,7 +14,7 @@ from loomopt.model.limits import CycleLimit
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import working
-from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
+from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE, SHOWN_AS_ZERO
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import (
@@ -312,11 +312,15 @@ def with_optimum(
 def _little(words: Words, beside: Beside, answer: Solution) -> str:
     """Say what another design of more or less added mass would change, and that it is little."""
     name = beside.added
-    changed = (words.shown(figure, value, 3) for figure, value in beside.changes(answer).items())
-    changes = ", ".join(
-        f"{figure} {'' if text.startswith('-') else '+'}{text}"
-        for figure, text in zip(beside.changes(answer), changed, strict=True)
-    )
+    told = []
+    for figure, change in beside.changes(answer).items():
+        alike = [
+            abs(value or 0.0) for each, value in answer.figures.items() if answer.units[each] == answer.units[figure]
+        ]
+        if abs(change) > SHOWN_AS_ZERO * max(alike, default=0.0):
+            text = words.shown(figure, change, 3)
+            told.append(f"{figure} {'' if text.startswith('-') else '+'}{text}")
+    changes = ", ".join(told) or "nothing that is sought changes"
     other = words.shown(name, beside.other.design[name])
     little = f"{100 * beside.share:g} %"
     if not beside.chosen:
