@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from loomopt.base.units import factor
-from loomopt.interface.text.layout import Grid, joined
+from loomopt.interface.text.layout import Grid, call
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.provenance import provenance
 from loomopt.solving.answer.solution import Words
@@ -31,8 +31,10 @@ def parts(found: Found, timed: bool = True) -> list[str | Grid]:
 
 
 def _shown(found: Found, name: str) -> str:
-    value = found.reference.figures[name]
-    return "undefined" if value is None else Words(found.scene).shown(name, value)
+    value, scale = found.reference.figures[name], found.reference.scales[name]
+    if value is None:
+        return "undefined"
+    return Words(found.scene).shown(name, 0.0 if abs(value) <= SHOWN_AS_ZERO * scale else value)
 
 
 def _grid(found: Found, timed: bool) -> Grid:
@@ -91,13 +93,13 @@ def listed(names: Sequence[str]) -> str:
 
 def verdict(found: Found) -> list[str]:
     """Return in a sentence what may be left out, and how that was verified; in others what is to be kept in mind."""
-    share, call = f"{100 * found.tolerance:g} %", joined(found.command or "")
+    share, solve = f"{100 * found.tolerance:g} %", call(found.command or "")
     if not found.finished:
         return ["Not finished: what may be left out is not known."]
     if not found.reference.scales:
         return ["Without a design for the reference nothing can be measured."]
     said = f"{listed(found.left_out)} may be left out" if found.left_out else "no effect may be left out"
-    lines = [f"At {share}, {said}{': ' if call else ''}{call}"]
+    lines = [f"At {share}, {said}{': ' if solve else ''}{solve}"]
     if found.together and found.largest_omission:
         lines.append(
             f"Left out together, and what is found so judged with all on: {_largest_change(found.together.largest)}."

@@ -14,14 +14,21 @@ from typing import Any
 GAP = "  "
 JOINED = "\ue000"
 """A space at which no line breaks: it is printed as a space, but no white space to Rich."""
+OPTION = "\ue001"
+"""A space before an option of a call of the shell, where a call that is too long goes on in the next line."""
 RULED = "    \n    \n -- \n    \n    \n    \n    \n    \n"
 """One rule under the heading and no other line, in Rich's terms."""
 LONGEST_WORD = 30
 """Characters of a word beyond which it is broken where it must be, such as an address."""
+CONTINUED, INDENT = " \\", "    "
+"""How a line of the shell ends that goes on in the next, and how that begins."""
 UNWRAPPED = 10_000
 """Columns of a pipe or a file."""
 ONE_CELL = re.compile(
-    "[ -~\u00a1-\u00ac\u00ae-\u02ff\u0370-\u0482\u2010-\u2027\u2030-\u205e\u2070-\u20cf\u2100-\u22ff" + JOINED + "]*"
+    "[ -~\u00a1-\u00ac\u00ae-\u02ff\u0370-\u0482\u2010-\u2027\u2030-\u205e\u2070-\u20cf\u2100-\u22ff"
+    + JOINED
+    + OPTION
+    + "]*"
 )
 """Text whose characters take one cell of a terminal each, and are no white space but the space."""
 
@@ -51,9 +58,14 @@ def joined(text: str) -> str:
     return text.replace(" ", JOINED)
 
 
+def call(text: str) -> str:
+    """Return a call of the shell that, where it is too long for a line, goes on in the next as the shell reads it."""
+    return joined(text).replace(f"{JOINED}--", f"{OPTION}--")
+
+
 def spaced(text: str) -> str:
     """Return text as it is printed."""
-    return text.replace(JOINED, " ")
+    return text.replace(JOINED, " ").replace(OPTION, " ")
 
 
 def width() -> int | None:
@@ -170,6 +182,7 @@ def _widths(grid: Grid, columns: int) -> list[int]:
 def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
     """Return paragraphs and tables as Rich lays them out, wrapped where they are wider than `columns`."""
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(file=StringIO(), width=columns, color_system=None, highlight=False, markup=False)
     for part in parts:
@@ -180,8 +193,32 @@ def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
                 console.print(_paragraph(line), crop=False)
         else:
             for line in part.split("\n"):
-                console.print(_paragraph(line), crop=False)
+                told, called = _called(line, columns)
+                for own in told:
+                    console.print(_paragraph(own), crop=False)
+                for own in called:
+                    console.print(Text(own), crop=False, no_wrap=True, overflow="ignore")
     return str(console.file.getvalue())  # type: ignore[attr-defined]
+
+
+def _called(line: str, columns: int) -> tuple[list[str], list[str]]:
+    """Return what stands before a call of the shell at a line's end that does not fit, and the lines of the call.
+
+    An option with its value that is itself too long is left to the terminal, which breaks nothing that is copied.
+    """
+    if OPTION not in line or len(line) <= columns:
+        return [line], []
+    told, _, text = line.rpartition(" ")
+    first, *options = text.split(OPTION)
+    lines = [first]
+    for place, option in enumerate(options, 1):
+        end = "" if place == len(options) else CONTINUED
+        if len(lines[-1] + OPTION + option + end) <= columns:
+            lines[-1] += OPTION + option
+        else:
+            lines[-1] += CONTINUED
+            lines.append(INDENT + option)
+    return [told] if told else [], lines
 
 
 def _paragraph(line: str) -> Any:

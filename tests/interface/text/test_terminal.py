@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+import shlex
 
 import pytest
 from hypothesis import given, settings
@@ -86,6 +87,29 @@ def test_a_joined_phrase_is_never_broken():
     lines = text("Limits: " + ", ".join(layout.joined(phrase) for phrase in phrases), columns=40).splitlines()
     assert len(lines) > 2
     assert all(any(phrase in line for line in lines) for phrase in phrases)
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 120])
+def test_a_call_of_the_shell_that_is_longer_than_the_screen_goes_on_in_the_next_line(columns):
+    words = ["loomopt", "solve", "my loom.toml", "--set", "operation.speed=560 rpm", "--without", "bearing_friction"]
+    words += ["--with", "counterweight_inertia", "--with", "rod_inertia", "--free", "J4"]
+    shown = text(f"At 1 %, that may go: {layout.call(shlex.join(words))}", columns=columns)
+    assert all(len(line) <= columns for line in shown.splitlines())
+    assert shlex.split(shown[shown.index("loomopt") :].replace("\\\n", "")) == words
+
+
+def test_an_option_longer_than_the_screen_is_not_broken():
+    words = [
+        "loomopt",
+        "solve",
+        "x.toml",
+        "--set",
+        f"effects.resistance.table={'long/' * 12}pulse.csv",
+        "--with",
+        "coil",
+    ]
+    shown = text(f"That may go: {layout.call(shlex.join(words))}", columns=40)
+    assert shlex.split(shown[shown.index("loomopt") :].replace("\\\n", "")) == words
 
 
 def test_the_width_is_the_terminals_and_none_in_a_pipe(monkeypatch, capsys):
