@@ -188,6 +188,8 @@ def _wrapped(parts: Sequence[str | Grid], columns: int) -> str:
     for part in parts:
         if isinstance(part, Grid):
             grid, gone = narrowed(part, columns)
+            for line in ["", grid.title] if grid.title else [""]:  # a title may be wider than its table
+                console.print(_paragraph(line), crop=False)
             console.print(_table(grid, _widths(grid, columns)), crop=False)
             for line in [gone] if gone else []:
                 console.print(_paragraph(line), crop=False)
@@ -231,7 +233,7 @@ def _paragraph(line: str) -> Any:
 
 
 def _table(grid: Grid, widths: Sequence[int]) -> Any:
-    """Return a table in Rich's terms, a blank line before and after it; widths: of its columns."""
+    """Return a table in Rich's terms without its title, a blank line after it; widths: of its columns."""
     from rich import box
     from rich.padding import Padding
     from rich.table import Table
@@ -239,8 +241,6 @@ def _table(grid: Grid, widths: Sequence[int]) -> Any:
 
     head = any(grid.columns)
     table = Table(
-        title=Text(grid.title) if grid.title else None,
-        title_justify="left",
         box=box.Box(RULED, ascii=True) if head else None,
         show_header=head,
         show_edge=False,
@@ -259,4 +259,4 @@ def _table(grid: Grid, widths: Sequence[int]) -> Any:
         )
     for line in grid.lines:
         table.add_row(*map(Text, line))
-    return Padding(table, (1, 0, 1, 0))
+    return Padding(table, (0, 0, 1, 0))

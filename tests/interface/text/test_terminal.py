@@ -73,6 +73,11 @@ def test_a_table_fits_the_width_and_keeps_every_word(lines, columns):
     assert sorted(shown.split()[4:]) == sorted(word for line in lines for cell in line for word in cell.split())
 
 
+def test_a_title_that_is_wider_than_its_table_stands_on_one_line():
+    grid = Grid("What binds, and what loosening it is worth", ("limit", "by"), (("X0 <= 80 mm", "740 N/m"),))
+    assert text(grid, columns=60).splitlines()[0] == grid.title
+
+
 @given(CELLS, st.integers(20, 90))
 @settings(deadline=None, derandomize=True)
 def test_a_paragraph_fits_the_width_and_keeps_every_word(sentence, columns):
