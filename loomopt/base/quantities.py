@@ -149,6 +149,11 @@ def plain_number(text: str) -> float | None:
     return value if nothing or _SMALLEST < abs(value) < _LARGEST else None
 
 
+def is_beyond(text: str) -> bool:
+    """Say whether text is a number by the same pattern that is too large or too small to compute with."""
+    return plain_number(text) is None and bool(_PLAIN.fullmatch(text)) and len(text) <= _LONGEST_TEXT
+
+
 def unit_of(text: str) -> str:
     """Return the unit of a quantity as written, "1" for a pure number. Raises QuantityError without one."""
     text = text.strip(" \t")

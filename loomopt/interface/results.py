@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from loomopt.base import arguments, records
 from loomopt.base.records import lazy
-from loomopt.physics.tolerances import SLACK
+from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes import designs
 from loomopt.scenes.scene import Scene
 from loomopt.solving.answer import report, solution
@@ -130,13 +130,18 @@ class Evaluation(solution.Evaluated, records.Shown):
         from loomopt.jobs import registry
         from loomopt.solving.answer.solution import Words
 
-        if self.terms:
-            asked = list(self.terms.axes)
-        else:
-            asked = [each.figure for each in registry.of(self.scene).program(self.scene, self.target).objectives]
+        sizes = dict[str, float]()
+        if not self.terms:
+            objectives = registry.of(self.scene).program(self.scene, self.target).objectives
+            sizes = {each.figure: each.scale if each.power == 1 else 0.0 for each in objectives}
         words, all_of = Words(self.scene), {**self.design, **self.figures}
-        known = {name: all_of.get(name) for name in asked}
-        return ", ".join(f"{name} {words.shown(name, value)}" for name, value in known.items() if value is not None)
+        told = list[str]()
+        for name in self.terms.axes if self.terms else sizes:
+            value = all_of.get(name)
+            if value is not None:
+                value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(name, 0.0) else value
+                told.append(f"{name} {words.shown(name, value)}")
+        return ", ".join(told)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._summary}>"

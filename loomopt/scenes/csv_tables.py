@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from loomopt.base.errors import BadInput, near_file, refusal
-from loomopt.base.quantities import plain_number
+from loomopt.base.quantities import is_beyond, plain_number
 from loomopt.base.units import DISPLAY_UNIT, QuantityError, factor, fits
 from loomopt.scenes.scene import Scene
 
@@ -176,7 +176,13 @@ def _check_length(row: Sequence[str], head: Sequence[str], line: int, origin: st
 
 
 def _number(row: Sequence[str], column: _Column, line: int, origin: str) -> float:
-    value = plain_number(row[column.place].strip(" \t"))
+    text = row[column.place].strip(" \t")
+    value = plain_number(text)
+    if is_beyond(text):
+        problem = f"row {line} of the table holds a number under {column.name} that is too large or too small"
+        raise refusal(
+            problem, origin, value=text, allowed="0, and sizes of 1e-60 to 1e60", remedy="Write 0 for next to nothing"
+        )
     if value is None:
         problem = f"row {line} of the table holds no number under {column.name}"
         remedy = "Write digits and a decimal point, such as 12.5 or 1.25e1"

@@ -3,6 +3,7 @@
 import inspect
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -215,3 +216,11 @@ def test_a_signature_is_names_that_can_be_read(shown):
     assert "loomopt" not in text
     assert "<factory>" not in text
     assert ("certificate" in text) == (shown is lo.Answer)
+
+
+def test_a_goal_that_is_reached_reads_zero():
+    """Rounding has no digits that mean something: the least M3_fdc of a balanced machine is 0 in what Python shows."""
+    answer = lo.solve("beatup")
+    rounded = replace(answer, figures={**answer.figures, "M3_fdc": -1.13687e-13})
+    assert "M3_fdc 0 N*m, " in repr(rounded)
+    assert "M3_fdc 0.0001 N*m, " in repr(replace(answer, figures={**answer.figures, "M3_fdc": 1e-4}))

@@ -31,6 +31,7 @@ def with_row(row):
 REFUSED = {
     "decimal commas": (HEAD + "\n".join(f"{k},5,{k},25" for k in range(12)), "row 2 of the table has 4"),
     "one decimal comma": (with_row("150,1,5"), "row 7 of the table has 3"),
+    "next to nothing": (with_row("150,1.3e-171"), 'too small (given: "1.3e-171"). Allowed: 0, and sizes of'),
     "quoted decimal comma": (with_row('150,"1,5"'), "row 7 of the table holds no number under S"),
     "decimal commas under nameless columns": (
         "phi1 [deg],S [mm],,\n" + "\n".join(f"{k},5,{k},25" for k in range(12)), "row 2 of the table has 4"),
