@@ -22,13 +22,14 @@ from loomopt.physics.tolerances import (
     POLISH_MET,
     POLISH_RANK,
     POLISH_STEPS,
+    SAME_NODE,
     SETTLED,
     TOUCHING,
 )
 from loomopt.solving.nlp.follow import follow
 from loomopt.solving.nlp.ipopt import Calls, IpoptAnswer, run
 from loomopt.solving.nlp.point import SUCCESS, Elastic, Known, Point, Settings, sampler_at
-from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily
+from loomopt.solving.nlp.rows import BindingRows, Multipliers, RowFamily, binding
 from loomopt.solving.nlp.transcribe import Transcription
 
 NodeRows = Sequence[Sequence[Extreme]]
@@ -105,6 +106,51 @@ def met(
     inside = np.all(trial >= lower - POLISH_MET) and np.all(trial <= upper + POLISH_MET)
     held = np.all(values <= arguments["ubg"] + POLISH_MET) and np.all(values >= arguments["lbg"] - POLISH_MET)
     return np.clip(trial, lower, upper) if small and inside and held else None
+
+
+def brought_closer(program: Program, point: Point, settings: Settings) -> Point | None:
+    """Return a solved point put on all that carries a slope, however far from it the solver stopped.
+
+    IPOPT leaves a row its tolerance over the multiplier away. Where several nodes stand for one extreme they share the
+    multiplier; and where a row is steep, a small one balances much: what counts is the slope that it carries.
+    """
+    calls = Calls(program, settings)
+    sampler = calls.sampler(point.x)
+    if sampler is None or not point.multipliers:
+        return None
+    before, peaks = point.multipliers, calls.loose(sampler, calls.peaks(sampler))
+    every = [_shared(*of) for of in zip(peaks, point.nodes, before.at_nodes, strict=True)]
+    priced = [of[: before.rows.slots] for of in every]
+    nodes = [[e for e, _ in of] for of in priced]
+    nlp = calls.transcribed(sampler, nodes, warm=False)
+    arguments = calls.arguments(nlp, sampler, point.x, point.extra, nodes)
+    carried = before.on(nlp.rows).lam_g
+    for own, of in zip(nlp.rows.at_nodes(carried), priced, strict=True):
+        own[:] = np.pad([price for _, price in of], (0, len(own) - len(of)))
+    slopes = np.asarray(nlp.jacobian(arguments["x0"], arguments["p"])[1])
+    carried *= np.maximum(np.abs(slopes).max(axis=1, initial=0.0), 1.0)
+    flat = met(nlp.jacobian, arguments, arguments["x0"], binding(before.lam_x, carried), settings.farthest)
+    if flat is None:
+        return None
+    design, extra = nlp.rows.parted(flat)
+    x = calls.design(design)
+    moved = calls.sampler(x)
+    if moved is None:
+        return None
+    x, touching = polish(calls, x, extra, before, calls.peaks(moved))
+    return replace(point, x=x, extra=extra, binding=_frozen(touching), rough=False)
+
+
+def _shared(extremes: Sequence[Extreme], nodes: Sequence[Extreme], prices: Floats) -> list[tuple[Extreme, float]]:
+    """Return the extremes that nodes with a multiplier stand for, each with the sum of these, the largest first."""
+
+    def alike(extreme: Extreme, node: Extreme) -> bool:
+        here = extreme.piece == node.piece and extreme.sign == node.sign
+        return here and abs(extreme.u - node.u) <= SAME_NODE
+
+    pairs = list(zip(nodes, prices.tolist(), strict=False))
+    sums = [(e, sum(price for node, price in pairs if alike(e, node))) for e in extremes]
+    return sorted((each for each in sums if each[1] > 0.0), key=lambda each: -each[1])
 
 
 EXCHANGE_ROUNDS, ELASTIC_ROUNDS = 16, 32

@@ -224,13 +224,19 @@ def _another(search: Search) -> Search:
 
 def _met_farther(search: Search, best: Candidate) -> Search:
     """Return the search with its best put on what just binds, where that was too far to be sure, if that passes."""
-    if not best.point.rough:
-        return search
     farther = replace(search, settings=replace(search.settings, farthest=POLISH_FARTHER))
-    again = tried(farther, best.point.x)
-    if again.candidates[-1].point.reached:
-        again = _certified(again, again.candidates[-1])
-    return replace(again, settings=search.settings) if again.passed else search
+    if best.point.rough:
+        again = tried(farther, best.point.x)
+        if again.candidates[-1].point.reached:
+            again = _certified(again, again.candidates[-1])
+        if again.passed:
+            return replace(again, settings=search.settings)
+    if any(level.stationarity > STATIONARY for level in best.certificate.levels):
+        closer = exchange.brought_closer(search.program, best.point, farther.settings)
+        found = _certified(search, replace(best, point=closer)) if closer else search
+        if found.passed:
+            return found
+    return search
 
 
 def _too_weak(settings: Settings, certificate: Certificate) -> bool:

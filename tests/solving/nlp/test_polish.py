@@ -1,14 +1,17 @@
 """Newton's method on what binds: the last digits, and only those."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from waves import objective, program
 
 import loomopt as lo
+from loomopt.physics.tolerances import BINDING
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.ipopt import Calls
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.nlp.rows import binding
+from loomopt.solving.nlp.rows import Multipliers, binding
 
 PEAK = (objective("circle", "peak", ("shifted",)),)
 """Two cones of equal height: on the line y = b they cross at x = (10 − 2 b) / 6."""
@@ -128,3 +131,37 @@ def test_what_just_binds_is_met_though_ipopt_leaves_it_far_off():
     answer = lo.solve(scene.with_effect("gravity").with_effect("counterweight_inertia"), target="pulse")
     assert answer.status == "optimal", answer.message
     assert answer.design["m4e"] == 2.64
+
+
+def test_what_carries_a_slope_is_met_however_far_the_solver_stopped():
+    """The nearest point to (3, 2) of the unit circle's disc, IPOPT a millionth inside, its multiplier on four nodes."""
+    task = program(limits=(("circle", 1, 1.0),))
+    exact = solved(task)
+    price = exact.multipliers.at_nodes.sum()
+    x = {name: value * (1 - 1e-6) for name, value in exact.x.items()}
+    lam_g = np.zeros(exact.multipliers.rows.size)
+    exact.multipliers.rows.at_nodes(lam_g)[0, :4] = price / 4
+    nodes = (tuple(e._replace(u=e.u + shift) for shift in (-3e-4, 2e-4) for e in exact.binding[0]),)
+    short = replace(exact, x=x, nodes=nodes, multipliers=replace(exact.multipliers, lam_g=lam_g))
+    assert polished(task, x, exact.extra, short)[0] == x, "farther than an extreme that touches"
+    closer = exchange.brought_closer(task, short, Settings(farthest=2e-5))
+    assert closer is not None
+    assert np.hypot(closer.x["x"], closer.x["y"]) == pytest.approx(1.0, abs=1e-12)
+    assert [len(of) for of in closer.binding] == [2], "either sign of it"
+    assert exchange.brought_closer(task, short, Settings(farthest=1e-9)) is None, "too far"
+    assert exchange.brought_closer(task, replace(short, multipliers=Multipliers()), Settings()) is None
+
+
+def test_a_steep_row_counts_by_its_slope():
+    """Where a limit's size is tiny multiplier is below what counts as binding, what it balances is not."""
+    task = program(limits=(("circle", 1, 1.0),))
+    (limit,) = task.limits
+    steep = replace(task, limits=(replace(limit, scale=1e-7 * limit.scale),))
+    exact = solved(task)
+    x = {name: value * (1 - 1e-6) for name, value in exact.x.items()}
+    lam_g = 1e-7 * exact.multipliers.lam_g
+    short = replace(exact, x=x, multipliers=replace(exact.multipliers, lam_g=lam_g))
+    assert lam_g.max() < BINDING
+    closer = exchange.brought_closer(steep, short, Settings(farthest=2e-5))
+    assert closer is not None
+    assert np.hypot(closer.x["x"], closer.x["y"]) == pytest.approx(1.0, abs=1e-12)

@@ -65,3 +65,32 @@ def test_a_point_whose_second_level_is_not_certified_keeps_what_the_first_came_t
     found = solver.solve(Asking(1, (None, None)), [], False)
     assert found.status == "optimal"
     assert found.warm["axes"]["contact_max"] == pytest.approx(2327.2748160284, rel=1e-9)
+
+
+def test_a_cap_far_beyond_its_natural_size_is_met_though_its_multiplier_is_small():
+    """The torque may be forty times its natural size: what it costs there is small, what its slope balances is not."""
+    scene = lo.load("shedding").update(
+        {
+            "mechanism.travel": "93.8 mm",
+            "mechanism.X0": "68 mm",
+            "mechanism.law": "harmonic",
+            "mechanism.rise": "122 deg",
+            "mechanism.far_dwell": "16 deg",
+            "mechanism.return": "148 deg",
+            "mechanism.near_dwell": "74 deg",
+            "operation.speed": "296.2 rpm",
+            "operation.N_min": "187.53 N",
+            "effects.inertia.M": "47.46 kg",
+            "effects.weight.G": "184.7 N",
+            "effects.warp_tension": {"T1": "264.6 N", "T2": "0 N", "shape": "step"},
+            "effects.damping.C": "41.14 N*s/m",
+            "bounds.K1": {"min": "0 N/m", "max": "31054117 N/m"},
+            "bounds.X0": {"min": "0 mm", "max": "68 mm"},
+            "targets.law.intervals": 9,
+        }
+    )
+    solver = front.trade(scene, ("spring_stretch", "peak_torque"), "law").solver
+    for torque in (4118.5, 15658.3, 61817.0):
+        found = solver.solve(Asking(0, (None, torque)), [], False)
+        assert found.status == "optimal", found.reason
+        assert found.warm["axes"]["peak_torque"] == pytest.approx(torque, rel=1e-6)
