@@ -179,4 +179,8 @@ def drawn(rng):
     for name in EFFECTS:
         if rng.random() < 0.2:
             changes[f"effects.{name}"] = dict(available[name])
-    return Machine(str(rng.choice(TARGETS)), changes)
+    target = str(rng.choice(TARGETS))
+    if target != "retrofit":
+        # The least there is: without it up to a thousandth is given away for less counterweight.
+        changes[f"targets.{target}.indifference"] = 0.0
+    return Machine(target, changes)

@@ -126,6 +126,7 @@ def test_what_just_binds_is_met_though_ipopt_leaves_it_far_off():
             "bounds.m4e.max": "2.64 kg",
             "limits.theta": {"min": "1.18 deg", "max": "6.07 deg"},
             "limits.mu_min.min": "53.1 deg",
+            "targets.pulse.indifference": 0.0,
         }
     )
     answer = lo.solve(scene.with_effect("gravity").with_effect("counterweight_inertia"), target="pulse")
