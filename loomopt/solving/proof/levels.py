@@ -133,7 +133,7 @@ class _Level:
     def search(self, until: float, say: Callable[[str], None]) -> dict[str, float] | None:
         """Grow the tree; returns a better design, the program's variables, SI, if one turns up."""
         while not self.tree.closed and time.perf_counter() < until:
-            found = grown(self.tree, self.question)
+            found = grown(self.tree, self.question, until)
             say(f"proving {self.objective.figure}: {self._gap_said()}, {self.tree.boxes} boxes")
             if found is not None:
                 return self.task.design(found)

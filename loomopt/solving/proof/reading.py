@@ -3,6 +3,7 @@
 import itertools
 import math
 import operator
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -24,6 +25,10 @@ from loomopt.physics.tolerances import ACTIVE, SAME_ANGLE
 from loomopt.solving.proof.task import BoxRows, BoxTask, OpenError, strips
 
 Places = NDArray[np.intp]
+
+AT_ONCE = 512
+"""Boxes between two looks at the clock: a read of 2048 with a mean over the cycle takes a second or more, and from 256
+downward a formula's own Python counts."""
 
 GRID = 96
 """Nodes of one turn among which a middle's worst is chosen: any node gives a valid bound, the worst the best one."""
@@ -224,6 +229,10 @@ class Read(NamedTuple):
     of: tuple[int, ...]
 
 
+class LateError(Exception):
+    """Time is up within a read: nothing is known of its boxes."""
+
+
 class Reader:
     """Reads boxes of a task.
 
@@ -271,26 +280,34 @@ class Reader:
             return True
         return False
 
-    def read(self, low: Floats, high: Floats) -> Read:
-        """Return all rows over boxes (names, boxes)."""
+    def read(self, low: Floats, high: Floats, until: float = math.inf) -> Read:
+        """Return all rows over boxes (names, boxes); until: the clock's time, looked at between parts.
+
+        Raises LateError where it is past.
+        """
         middles, boxes = low + (high - low) / 2, low.shape[1]
         rows, names = len(self.of), len(self.task.names)
         value, middle = (_unknown((rows, boxes)) for _ in range(2))
-        slope = _unknown((names, rows, boxes))
+        slope, done = _unknown((names, rows, boxes)), 0
         for layout, places in layouts(self.task, middles, self._known):
-            found = self._alike(layout, low[:, places], high[:, places], middles[:, places])
-            for whole, part in zip((value, middle, slope), found, strict=True):
-                whole.low[..., places], whole.high[..., places] = part.low, part.high
+            count = strips((high[:, places] - low[:, places]) / self.task.sizes[:, None])
+            for first in range(0, len(places), AT_ONCE):
+                if done and time.perf_counter() >= until:
+                    raise LateError
+                here = places[first : first + AT_ONCE]
+                found = self._alike(layout, low[:, here], high[:, here], middles[:, here], count)
+                for whole, part in zip((value, middle, slope), found, strict=True):
+                    whole.low[..., here], whole.high[..., here] = part.low, part.high
+                done += len(here)
         return Read(value, middle, slope, self.of)
 
     def _alike(
-        self, layout: NodeLayout | None, low: Floats, high: Floats, middles: Floats
+        self, layout: NodeLayout | None, low: Floats, high: Floats, middles: Floats, count: int
     ) -> tuple[Interval, Interval, Interval]:
-        """Return value, middle and slopes of boxes whose middles have one order of corners."""
+        """Return value, middle and slopes of boxes whose middles have one order of corners; count: strips of a mean."""
         names, boxes = low.shape
         with np.errstate(all="ignore"):
             spots = self._spots(layout, middles) if layout else {}
-            count = strips((high - low) / self.task.sizes[:, None])
             whole, sure = self._rows(layout, self.task.numbers(low, high), spots, boxes, count)
             value, slope = _stacked(whole, sure, names, boxes)
             points, sure = self._rows(layout, self.task.points(middles), spots, boxes, count)

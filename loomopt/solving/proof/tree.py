@@ -13,7 +13,7 @@ import numpy as np
 from loomopt.maths.intervals import Floats, Interval, interval
 from loomopt.maths.nnls import nnls
 from loomopt.physics.tolerances import ACTIVE, FEASIBLE
-from loomopt.solving.proof.reading import LIMIT, Read, Reader
+from loomopt.solving.proof.reading import LIMIT, LateError, Read, Reader
 
 WEIGHT = 100.0
 """Weight of the sum of an objective's multipliers, which is 1, against slopes of natural size."""
@@ -146,6 +146,11 @@ class Tree:
         self.low, self.high = np.hstack([self.low, low]), np.hstack([self.high, high])
         self.least = np.append(self.least, least)
 
+    def put_back(self, low: Floats, high: Floats, least: Floats) -> None:
+        """Put boxes back that were taken out and not read."""
+        self.boxes -= low.shape[1]
+        self.put(low, high, least)
+
 
 @dataclass(frozen=True)
 class Question:
@@ -169,10 +174,18 @@ class Question:
         return np.array([ends.get(of, math.inf) for of in self.reader.of])
 
 
-def grown(tree: Tree, question: Question) -> Floats | None:
-    """Read one batch of boxes; returns a better design (names,) where one turns up."""
+def grown(tree: Tree, question: Question, until: float = math.inf) -> Floats | None:
+    """Read one batch of boxes; returns a better design (names,) where one turns up.
+
+    until: the clock's time at which a read is given up; its boxes stay open.
+    """
     low, high, least = tree.take()
-    read, bounds = with_cut(question.reader.read(low, high), question.weights, question.bounds)
+    try:
+        rows = question.reader.read(low, high, until)
+    except LateError:
+        tree.put_back(low, high, least)
+        return None
+    read, bounds = with_cut(rows, question.weights, question.bounds)
     half = _half(low, high)
     below = _at_least(read, half)
     # Written so that what is no number discards nothing.

@@ -5,7 +5,8 @@ import pytest
 from machines_in_boxes import solved
 
 from loomopt.model.sampling import Sampler
-from loomopt.solving.proof.reading import LIMIT, Reader
+from loomopt.solving.proof import reading
+from loomopt.solving.proof.reading import LIMIT, LateError, Reader
 
 
 @pytest.mark.parametrize(
@@ -51,6 +52,26 @@ def test_rows_that_depend_on_corners_are_open_where_their_order_is_not_sure():
     assert np.all(np.isinf(read.value.low[of >= 0]))
     # Ratios of lengths, and limits of the design alone, are not.
     assert np.isfinite(read.value.low[of == LIMIT]).any()
+
+
+def test_boxes_read_in_parts_are_the_same_bits_and_the_clock_is_looked_at_between_parts(monkeypatch):
+    """A mean over the cycle takes as many strips as all boxes of the read ask for, whatever part they stand in."""
+    found = solved("beatup", "pulse")
+    task = found.task
+    reader = Reader(task, 1, task.place(found.x))
+    half = 0.5 * task.sizes[:, None] * np.linspace(1e-4, 0.2, 20)
+    middle = np.clip(task.place(found.x)[:, None], task.low[:, None] + half, task.high[:, None] - half)
+    whole = reader.read(middle - half, middle + half)
+    monkeypatch.setattr(reading, "AT_ONCE", 7)
+    parts = reader.read(middle - half, middle + half)
+    for one, other in zip(whole[:3], parts[:3], strict=True):
+        assert one.low.tobytes() == other.low.tobytes()
+        assert one.high.tobytes() == other.high.tobytes()
+    clock = iter([2.0, 3.0])
+    monkeypatch.setattr(reading.time, "perf_counter", lambda: next(clock))
+    with pytest.raises(LateError):
+        reader.read(middle - half, middle + half, until=2.5)
+    assert next(clock, None) is None
 
 
 def test_a_middle_without_a_cycle_leaves_what_speaks_of_the_design_alone():

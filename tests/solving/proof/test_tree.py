@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from loomopt.maths.intervals import Interval, variable
-from loomopt.solving.proof.reading import LIMIT, Read
+from loomopt.solving.proof.reading import LIMIT, LateError, Read
 from loomopt.solving.proof.tree import BATCH, Question, Tree, grown
 
 LOW, HIGH = np.array([-1.0, -2.0]), np.array([2.0, 1.0])
@@ -23,7 +23,7 @@ class Written:
         self.task = SimpleNamespace(sizes=HIGH - LOW)
         self.wild = wild
 
-    def read(self, low, high):
+    def read(self, low, high, until=math.inf):
         def rows(a, b):
             x, y = (variable(k, 2, a[k], b[k]) for k in range(2))
             return [x * x + y * y + 1.0, 1.0 - x]
@@ -106,7 +106,7 @@ def test_boxes_of_which_nothing_is_known_are_halved_and_never_discarded():
 
 def test_what_is_no_number_discards_nothing():
     class Broken(Written):
-        def read(self, low, high):
+        def read(self, low, high, until=math.inf):
             read = super().read(low, high)
             nothing = np.full_like(read.value.low, np.nan)
             return read._replace(value=Interval(nothing, nothing), middle=Interval(nothing, nothing))
@@ -124,6 +124,22 @@ def test_what_cannot_be_halved_is_kept_as_open():
         grown(tree, question(2.5, Written(wild=True)))
     assert tree.closed
     assert tree.stuck == -math.inf == tree.bound
+
+
+def test_boxes_whose_read_is_given_up_stay_open_and_do_not_count():
+    class Late(Written):
+        def read(self, low, high, until=math.inf):
+            raise LateError
+
+    tree, asked = whole(), question(2.0 - 1e-6)
+    for _ in range(5):
+        grown(tree, asked)
+    boxes, bound, left = tree.boxes, tree.bound, tree.low.shape[1]
+    assert grown(tree, question(2.0 - 1e-6, Late()), until=0.0) is None
+    assert (tree.boxes, tree.bound, tree.low.shape[1]) == (boxes, bound, left)
+    while not tree.closed:
+        grown(tree, asked)
+    assert math.isinf(tree.stuck)
 
 
 def test_the_most_promising_boxes_are_read_first():
