@@ -1,8 +1,9 @@
-"""What the benchmarks share: one thread, interleaved repeats, the least time of each, tables."""
+"""What the benchmarks share: one thread, a fixed number of turns, ratios by their median and spread, tables."""
 
 import importlib.util
 import json
 import os
+import statistics
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -30,10 +31,22 @@ def seconds(call: Callable[[], Any]) -> float:
     return time.perf_counter() - began
 
 
-def least(calls: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, float]:
-    """Return the least time of each call, s; every repeat runs all of them in turn, so that noise hits all alike."""
-    times = [{name: seconds(call) for name, call in calls.items()} for _ in range(repeats)]
-    return {name: min(taken[name] for taken in times) for name in calls}
+def turns(calls: Mapping[str, Callable[[], Any]], repeats: int) -> list[dict[str, float]]:
+    """Return what each call took in each turn, s; every turn runs all of them, so that noise hits all alike.
+
+    How many turns there are is said beforehand: a benchmark that stops as soon as it likes what it sees flatters.
+    """
+    return [{name: seconds(call) for name, call in calls.items()} for _ in range(repeats)]
+
+
+def medians(taken: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the median time of each call, s."""
+    return {name: statistics.median(turn[name] for turn in taken) for name in taken[0]}
+
+
+def spread(ratios: Sequence[float]) -> dict[str, float]:
+    """Return the median of the ratios of all turns, the lowest and the highest."""
+    return {"median": statistics.median(ratios), "lowest": min(ratios), "highest": max(ratios)}
 
 
 def installed(module: str) -> bool:
@@ -70,4 +83,6 @@ def _print(rows: Sequence[Mapping[str, Any]]) -> None:
 def _text(value: Any) -> str:
     if value is None:
         return ""
+    if isinstance(value, dict) and set(value) == {"median", "lowest", "highest"}:
+        return f"{value['median']:.3g} ({value['lowest']:.3g} to {value['highest']:.3g})"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -2,9 +2,9 @@
 
     python benchmarks/measure/answers.py [--count 60] [--memory 1000] [--json]
 
-The clock counts the processor's time; the steps are those that every answer tells in its `time`, as shares of it. An
-answer counts where it is optimal and certified. Memory: what the process holds after the first tenth of so many
-beat-up answers and after the last, in MB.
+The clock counts the processor's time: of the median answer, the fastest and the slowest. The steps are those that every
+answer tells in its `time`, as shares of it. An answer counts where it is optimal and certified. Memory: what the
+process holds after the first tenth of so many beat-up answers and after the last, in MB.
 """
 
 import argparse
@@ -26,8 +26,6 @@ CASES = {
 SHARE = {"beatup balance": 1, "rapier stroke-dwell": 5, "shedding stiffness": 2}
 """How many times fewer answers of the slower ones there are."""
 STEPS = ("build", "solve", "settle", "certify", "report")
-WINDOW = 10
-"""Answers that are timed together: the fastest window counts, for other work on the machine slows some."""
 
 
 def scenes(name: str) -> Iterator[Any]:
@@ -56,12 +54,10 @@ def answers(name: str, count: int) -> dict[str, Any]:
         by.add(answer.certificate.by if answer.certificate else "")
         for step in STEPS:
             spent[step] += answer.time[f"{step}_s"]
-    width = min(WINDOW, count)
-    windows = [statistics.fmean(taken[k : k + width]) for k in range(0, count - width + 1, width)]
     whole = sum(spent.values())
     each = {f"{step} %": 100 * value / whole for step, value in spent.items()}
-    row = {"answers": name, "a second": 1 / min(windows), "ms": 1e3 * min(windows), **each}
-    return {**row, "certified": f"{certified} of {count}", "by": ", ".join(sorted(by))}
+    row = {"answers": name, "a second": 1 / statistics.median(taken), "ms": harness.spread([1e3 * s for s in taken])}
+    return {**row, **each, "certified": f"{certified} of {count}", "by": ", ".join(sorted(by))}
 
 
 def memory(count: int) -> dict[str, float]:

@@ -47,7 +47,7 @@ def chunked(function, phi):
 
 
 def run(positions: int, repeats: int):
-    """Return the table's rows and the ratio that is promised."""
+    """Return the table's rows and the ratio that is promised, by its spread."""
     phi = np.linspace(0.0, 2 * np.pi, positions, endpoint=False)
     few = phi[:: max(1, positions // EXACT)][:EXACT]
     lengths, function = Lengths(*LENGTHS), symbolic()
@@ -62,12 +62,13 @@ def run(positions: int, repeats: int):
         "mpmath, 40 digits": (few, exact, 1),
     }
     promised = dict(list(methods.items())[:2])
-    times = harness.least({name: functools.partial(f, at) for name, (at, f, _) in promised.items()}, repeats)
+    taken = harness.turns({name: functools.partial(f, at) for name, (at, f, _) in promised.items()}, repeats)
+    times, (ours, theirs) = harness.medians(taken), promised
     for name, (at, f, often) in methods.items():
         if name not in times:
-            times |= harness.least({name: functools.partial(f, at)}, often)
+            times |= harness.medians(harness.turns({name: functools.partial(f, at)}, often))
     reference = exact(few)
-    plain_time = times["plain NumPy, chunks of 8192"]
+    plain_time = times[theirs]
     rows = [
         {
             "method": name,
@@ -77,7 +78,7 @@ def run(positions: int, repeats: int):
         }
         for name, (at, f, _) in methods.items()
     ]
-    return rows, times["loomopt, chunks of 8192"] / plain_time
+    return rows, harness.spread([turn[ours] / turn[theirs] for turn in taken])
 
 
 def main():

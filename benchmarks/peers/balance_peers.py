@@ -2,8 +2,8 @@
 
 Errors are those of the designs handed in, judged by a referee that shares nothing with any of them (plain NumPy,
 30 000 angles a piece, then refined): M3 at front dead centre and the true peak torque over the whole turn, both
-against the best-known optimum; the peak a method claims against its true one; the worst limit. Times are the least of
-interleaved repeats, one thread each.
+against the best-known optimum; the peak a method claims against its true one; the worst limit. Times are medians of
+turns in which all take part, their number fixed; ratios are told by their median and spread. One thread each.
 
     python benchmarks/peers/balance_peers.py [--quick] [--json]
 
@@ -36,8 +36,8 @@ KNOWN = {
 }
 """M0 → best-known M3 and peak torque, N·m; the referee's own best must agree with them."""
 QUICK = {*KNOWN, 700, 740, 850}
-PROMISED, LONGEST = 1.25, 5
-"""Re-solve over SLSQP's that is promised; how many times as many rounds at most show it on a busy machine."""
+TURNS = 9
+"""Turns of a sweep each, whatever they show."""
 JOB = registry.find("beatup")
 
 
@@ -128,34 +128,36 @@ def slsqp_sweep():
     return took, designs
 
 
-def fast(best, repeats, calls):
-    """Return the rows of loomopt and of SLSQP, and the two ratios that are promised."""
+def fast(best):
+    """Return the rows of loomopt and of SLSQP, and the spread of each ratio."""
     own = Loomopt()
-    times: dict[str, list] = {"loomopt": [], "slsqp": []}
-    for _ in range(repeats):
+    runs: dict[str, list] = {"loomopt": [], "slsqp": []}
+    for _ in range(TURNS):
         own.build()
-    for _ in range(calls):
-        own.calls()
-    for turn in range(LONGEST * repeats):
         for name, sweep in (("loomopt", own.sweep), ("slsqp", slsqp_sweep)):
-            took, designs = sweep()
-            times[name].append((took, designs))
-        least = {name: np.min([took for took, _ in runs], axis=0) for name, runs in times.items()}
-        if turn + 1 >= repeats and least["loomopt"].sum() <= PROMISED * least["slsqp"].sum():
-            break
-    parts = {name: np.min(runs, axis=0).sum() for name, runs in own.times.items()}
+            runs[name].append(sweep())
+        own.calls()
+    took = {name: np.array([sum(times) for times, _ in of]) for name, of in runs.items()}
+    took |= {name: np.array(times).reshape(TURNS, -1).sum(axis=1) for name, times in own.times.items()}
+    parts = {name: float(np.median(times)) for name, times in took.items()}
     answers = {M0: (plain_design(a.design), a.figures["peak_torque"]) for M0, a in own.answers.items()}
     cold = {SINGLE: (plain_design(own.cold.design), own.cold.figures["peak_torque"])}
-    count, build = len(SWEEP), parts["first"] - parts["cold"]
+    count, build = len(SWEEP), took["first"] - took["cold"]
     rows = [
-        row("loomopt: build, once (what the first solve takes longer)", 1, build),
+        row("loomopt: build, once (what the first solve takes longer)", 1, float(np.median(build))),
         row("loomopt: solve from today's machine", 1, parts["cold"], judged(cold, best)),
-        row("loomopt: re-solve", count, least["loomopt"].sum(), judged(times["loomopt"][-1][1], best)),
+        row("loomopt: re-solve", count, parts["loomopt"], judged(runs["loomopt"][-1][1], best)),
         row("loomopt: silent levels and certificate", count, parts["certificate"]),
         row("loomopt: whole call, with report", count, parts["call"], judged(answers, best)),
-        row("SciPy SLSQP, 360 points: re-solve", count, least["slsqp"].sum(), judged(times["slsqp"][-1][1], best)),
+        row("SciPy SLSQP, 360 points: re-solve", count, parts["slsqp"], judged(runs["slsqp"][-1][1], best)),
     ]
-    return rows, least["loomopt"].sum() / least["slsqp"].sum(), build / parts["cold"]
+    ratios = {
+        "resolve_to_slsqp": took["loomopt"] / took["slsqp"],
+        "call_to_slsqp": took["call"] / took["slsqp"],
+        "call_to_resolve": took["call"] / took["loomopt"],
+        "build_to_solve": build / took["cold"],
+    }
+    return rows, {name: harness.spread(of.tolist()) for name, of in ratios.items()}
 
 
 def slow(best):
@@ -196,9 +198,9 @@ def main():
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
     best = best_known(QUICK if asked.quick else {*KNOWN, *SWEEP})
-    rows, warm, build = fast(best, repeats=9, calls=1 if asked.quick else 5)
+    rows, ratios = fast(best)
     rows += [] if asked.quick else slow(best)
-    harness.show(rows, asked.json, resolve_to_slsqp=warm, build_to_solve=build)
+    harness.show(rows, asked.json, **ratios)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ time.
 """
 
 import argparse
+import statistics
 import time
 from dataclasses import replace
 from typing import Any
@@ -34,7 +35,7 @@ from reference import shedding as plain
 SCENES = {"shedding": plain.PAPER, "shedding-printed-travel": plain.PRINTED}
 BOUND = 2 * np.pi
 RAISED = (2, 4, 8)
-BESIDE = (16, 64, 256)
+BESIDE, TURNS = (16, 64, 256), 5
 """Intervals of the laws beside IPOPT alone."""
 IPOPT: dict[str, Any] = {
     "tol": 1e-13,
@@ -152,11 +153,11 @@ def clocked(call):
     return call(), time.process_time() - began
 
 
-def beside(name, n, repeats):
-    """Return the row of one size beside IPOPT alone; the least time of each counts, repeated in turn."""
+def beside(name, n):
+    """Return the row of one size beside IPOPT alone: medians of turns, the ratio by its spread."""
     scene = lo.load(name).set("targets.law.intervals", n)
     taken: dict[str, list[float]] = {"build": [], "solve": [], "loomopt": []}
-    for _ in range(repeats):
+    for _ in range(TURNS):
         (solver, asked, unit), built = clocked(lambda: by_hand(SCENES[name], n))
         said, solved = clocked(lambda: solver(**asked))  # noqa: B023
         session.current().forget(transcribe.NLPS)
@@ -165,7 +166,7 @@ def beside(name, n, repeats):
             part.append(seconds)
     assert answer.status == "optimal", (name, n, answer.message)
     assert solver.stats()["success"], (name, n)
-    build, solve, own = (min(part) for part in taken.values())
+    build, solve, own = map(statistics.median, taken.values())
     return {
         "scene": name,
         "intervals": n,
@@ -174,7 +175,7 @@ def beside(name, n, repeats):
         "IPOPT: build [ms]": 1e3 * build,
         "solve [ms]": 1e3 * solve,
         "loomopt [ms]": 1e3 * own,
-        "ratio": own / (build + solve),
+        "ratio": harness.spread([own / (build + solve) for build, solve, own in zip(*taken.values(), strict=True)]),
     }
 
 
@@ -189,7 +190,7 @@ def main():
     softest = {name: dict(zip(("K1", "law"), fixed(case), strict=True)) for name, case in SCENES.items()}
     bounds = {name: raised(name, sizes[-1]) for name in SCENES}
     lo.solve(lo.load("shedding"))  # what is imported once is no answer's
-    costs = [beside("shedding", n, 2 if asked.quick else 5) for n in BESIDE]
+    costs = [beside("shedding", n) for n in BESIDE]
     facts = {"softest_fixed_law": softest, "orders": orders(rows), "bound_raised": bounds}
     harness.show(rows, asked.json, **facts, beside_ipopt_alone=costs)
 

@@ -3,11 +3,12 @@
 The least spring K1, with its preload X0 of at most 80 mm, that keeps the roller on the cam over the whole turn, for
 cases that differ in travel, law, damping, tension and cam angles. Every answer is judged by a referee that shares
 nothing with loomopt (tests/reference, 30 digits): how far K1 is off, and how far the cam force falls below N_min
-somewhere in the turn, as a share of the largest spring force. Times are for all cases; loomopt's whole call = 1.
+somewhere in the turn, as a share of the largest spring force. Times are for all cases, medians of a fixed number of
+turns; loomopt's whole call = 1. Ratios are told by their median and spread.
 
     python benchmarks/peers/shedding_peers.py [--quick] [--json]
 
---quick repeats less and leaves out the slow peers.
+--quick leaves out the slow peers.
 """
 
 import argparse
@@ -27,6 +28,7 @@ from reference import shedding as plain
 
 GRIDS = (36, 72, 180, 360, 3600)
 COARSE, ENOUGH = 36, 1e-10
+TURNS = 5
 SIZE = np.array([1e5, 1e-1])
 """K1, N/m, and X0, m, that count as one for SLSQP."""
 CASES = {
@@ -206,7 +208,7 @@ def lift_off(case, K1, X0):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="fewer repeats, the fast methods")
+    parser.add_argument("--quick", action="store_true", help="the fast methods")
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -219,18 +221,25 @@ def main():
     def kept(name):
         found[name] = {of: methods[name](case) for of, case in CASES.items()}
 
-    times = harness.least({name: functools.partial(kept, name) for name in methods}, 2 if asked.quick else 5)
+    turns = harness.turns({name: functools.partial(kept, name) for name in methods}, TURNS)
+    times = harness.medians(turns)
     unit = times["loomopt: whole call"]
     table = [{"method": name, "time": times[name] / unit, **judged(found[name], best)} for name in methods]
     pressed = {count: float(plain.uniform_grid(plain.PRESSED, count) / best["pressed on"] - 1) for count in GRIDS}
     rounds = [PARTS[k : k + len(CASES)] for k in range(1, len(PARTS), len(CASES))]
-    solving, certifying = (min(sum(call[part] for call in each) for each in rounds) for part in ("solve", "certify"))
+    parts = {part: [sum(call[part] for call in each) for each in rounds] for part in ("solve", "certify")}
+
+    def beside(part, method):
+        return harness.spread([own / turn[method] for own, turn in zip(parts[part], turns, strict=True)])
+
+    lowest = "SciPy SLSQP, 36 points and the lowest added"
     harness.show(
         table,
         asked.json,
-        solve_to_call=solving / unit,
-        certify_to_call=certifying / unit,
-        solve_to_slsqp_lowest=solving / times["SciPy SLSQP, 36 points and the lowest added"],
+        solve_to_call=beside("solve", "loomopt: whole call"),
+        certify_to_call=beside("certify", "loomopt: whole call"),
+        solve_to_slsqp_lowest=beside("solve", lowest),
+        call_to_slsqp_lowest=harness.spread([turn["loomopt: whole call"] / turn[lowest] for turn in turns]),
         pressed_on_equal_points_off=pressed,
         ms_a_call=1e3 * unit / len(CASES),
         first_call_to_others=first / (unit / len(CASES)),

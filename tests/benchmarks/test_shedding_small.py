@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
-from test_benchmarks_small import ATTEMPTS, least, rows, run, said
+from test_benchmarks_small import median, rows, said
 
 import loomopt as lo
 
@@ -251,7 +251,7 @@ def test_peers_that_refine_are_right_and_equal_points_lose_contact():
 
 
 def test_a_solve_takes_no_longer_than_slsqp_where_that_is_right():
-    assert least(PEERS, "solve_to_slsqp_lowest", 1.0) <= 1.0
+    assert median(PEERS, "solve_to_slsqp_lowest") <= 1.0
 
 
 def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
@@ -265,15 +265,10 @@ def test_loomopts_laws_need_the_springs_of_the_linear_programmes():
 
 def test_a_certified_law_takes_at_most_ten_times_ipopt_alone_on_an_nlp_written_for_it():
     """And is the same optimum, from 16 to 256 intervals."""
-    ratios = [1e9] * 3
-    for attempt in range(ATTEMPTS):
-        found = (said(LAW) if attempt == 0 else run(LAW))["beside_ipopt_alone"]
-        assert [row["intervals"] for row in found] == [16, 64, 256]
-        assert max(abs(row["off IPOPT's"]) for row in found) < 1e-9
-        ratios = list(map(min, ratios, (row["ratio"] for row in found)))
-        if max(ratios) <= 10.0:
-            break
-    assert max(ratios) <= 10.0
+    found = said(LAW)["beside_ipopt_alone"]
+    assert [row["intervals"] for row in found] == [16, 64, 256]
+    assert max(abs(row["off IPOPT's"]) for row in found) < 1e-9
+    assert max(row["ratio"]["median"] for row in found) <= 10.0
 
 
 def test_a_free_law_of_16_intervals_needs_a_quarter_less_spring_than_the_softest_fixed_one():

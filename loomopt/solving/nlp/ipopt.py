@@ -21,7 +21,8 @@ FIRST_SLOTS, LEADING = 6, 4
 """Nodes that a built NLP has room for (doubled when they are used up), and those of a start: its largest extremes.
 
 The experiment: two of them take IPOPT a third more iterations; eight, or room for twelve, end one target's first start
-in another local optimum.
+in another local optimum. Room for three and two of a start take a rapier drive 0.86 of the time, and end one point of
+a front of ten in an optimum that is 1.8 % worse.
 """
 
 BESIDE_STATIONS = 2, 1
