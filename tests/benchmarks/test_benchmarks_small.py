@@ -65,9 +65,9 @@ def test_curves_in_numpy_beat_casadi_and_mpmath():
     assert {method: ratio for method, ratio in ratios.items() if ratio <= floors[method]} == {}
 
 
-def test_re_solving_for_another_cloth_takes_at_most_one_and_a_half_times_slsqp_on_a_grid():
-    """1.1 to 1.4 of SLSQP in C, which SciPy has since 1.16 (benchmarks/README.md)."""
-    assert median("peers.balance_peers", "resolve_to_slsqp") <= 1.5
+def test_re_solving_for_another_cloth_takes_at_most_twice_as_long_as_slsqp_on_a_grid():
+    """1.2 to 1.6 of SLSQP in C, which SciPy has since 1.16 (benchmarks/README.md)."""
+    assert median("peers.balance_peers", "resolve_to_slsqp") <= 2.0
 
 
 def test_building_takes_less_than_three_solves():
