@@ -1,8 +1,9 @@
 """Whole-cycle quantities of one design in plain NumPy: curves, true extremes, means. No symbols, no solver."""
 
 import functools
+import itertools
 from array import array
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,9 @@ cam law is one cubic, which the five points that refine an extreme hold exactly.
 CLOSER = 1 / 8
 """Step, in samples, of the five points that refine a sampled extreme: their quartic errs by the step's 6th power, 4e-6
 of what the samples' own would, and values a step apart still differ by far more than rounding."""
+
+SIDES = np.arange(-1, 2)[:, None]
+"""A sample and those beside it."""
 
 CHUNK = 8192
 """Positions evaluated at once: small enough to stay in cache."""
@@ -164,8 +168,7 @@ class Sampler:
 
         where: the pieces they are asked for; every piece without it.
         """
-        if name not in self._extremes:
-            self._extremes[name] = self._find_extremes(name)
+        self.search((name,))
         found = self._extremes[name]
         on = self.on(name, where)
         return [e for e in found if on[e.piece]]
@@ -175,21 +178,32 @@ class Sampler:
         known, asked = [self.cycle.on(place) for place in self.model.known_of(name)], self.cycle.on(where)
         return asked & np.any(known, axis=0) if known else asked
 
-    def _find_extremes(self, name: str) -> list[Extreme]:
-        pieces, u = self.grid()
-        values = self._sampled(name)
-        size = self.heights(name, values)
+    def search(self, names: Iterable[str]) -> None:
+        """Find the extremes of several quantities in one pass, so that they need not be looked for one by one."""
+        new = [name for name in dict.fromkeys(names) if name not in self._extremes]
+        if not new:
+            return
+        values = {name: self._sampled(name) for name in new}
+        peaks = {name: self._peaks(self.heights(name, of)) for name, of in values.items()}
+        refined = self._refined(values, {name: at for name, at in peaks.items() if at is not None})
+        for name in new:
+            found = refined.get(name)
+            if found is None:
+                self._extremes[name] = [Extreme(0, 0.0, float("inf"))]
+                continue
+            if self.singular:
+                found += self._spikes(name)
+            self._extremes[name] = sorted(found, key=lambda extreme: -extreme.height)
+
+    def _peaks(self, size: Floats) -> Pieces | None:
+        """Return where heights on the sampler's own grid are locally largest; None where one is no number."""
         if not np.all(np.isfinite(size)):
-            return [Extreme(0, 0.0, float("inf"))]
+            return None
         left, right = np.empty_like(size), np.empty_like(size)
         left[1:], right[:-1] = size[:-1], size[1:]
         first, last = self._ends
         left[first] = right[last] = -np.inf
-        peaks = np.flatnonzero((size > left) & (size >= right))
-        found = self._refine(name, pieces, u, values, peaks)
-        if self.singular:
-            found += self._spikes(name)
-        return sorted(found, key=lambda extreme: -extreme.height)
+        return np.flatnonzero((size > left) & (size >= right))
 
     def _sampled(self, name: str) -> Floats:
         """Return a quantity on the sampler's own grid; one that fits in the cache keeps its poses for the next."""
@@ -244,26 +258,50 @@ class Sampler:
         """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
         return values if name in self.model.signed else np.abs(values)
 
-    def _refine(self, name: str, pieces: Pieces, u: Floats, values: Floats, peaks: Pieces) -> list[Extreme]:
-        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak."""
-        signed = name in self.model.signed
-        piece, sign = pieces[peaks], np.ones(len(peaks)) if signed else np.sign(values[peaks])
-        sampled = sign * values[peaks]
-        inner = peaks + (u[peaks] == 0.0) - (u[peaks] == 1.0)
+    def _refined(self, values: Mapping[str, Floats], peaks: Mapping[str, Pieces]) -> dict[str, list[Extreme]]:
+        """Refine sampled peaks: a parabola through the samples, then a quartic; a piece's end may stay the peak.
+
+        values: of each quantity on the sampler's own grid; peaks: where each is locally largest there.
+        """
+        names, counts = tuple(peaks), [len(at) for at in peaks.values()]
+        if not sum(counts):
+            return {name: [] for name in names}
+        ends = list(itertools.accumulate(counts, initial=0))
+        spans = {name: slice(*span) for name, span in zip(names, itertools.pairwise(ends), strict=True)}
+        pieces, u = self.grid()
+        at = np.concatenate(list(peaks.values()))
+        piece = pieces[at]
+        inner = at + (u[at] == 0.0) - (u[at] == 1.0)
+        sampled, sign, beside = np.empty(len(at)), np.ones(len(at)), np.empty((3, len(at)))
+        for name, span in spans.items():
+            sampled[span] = values[name][at[span]]
+            beside[:, span] = values[name][inner[span] + SIDES]
+            if name not in self.model.signed:
+                sign[span] = np.sign(sampled[span])
+        sampled *= sign
         step = u[inner + 1] - u[inner]
-        centre = u[inner] + step * vertex(sign * values[inner + np.arange(-1, 2)[:, None]])
+        centre = u[inner] + step * vertex(sign * beside)
         step = CLOSER * step
         centre = inside_samples(centre, 2 * step)
         nodes = centre + step * np.arange(-2, 3)[:, None]
-        around = self.at(name, np.tile(piece, 5), nodes.ravel()).reshape(nodes.shape)
+        around = self._each_at(spans, np.broadcast_to(piece, nodes.shape), nodes)
         top = inside_samples(centre + step * vertex(sign * around), np.zeros_like(step))
-        refined = sign * self.at(name, piece, top)
+        refined = sign * self._each_at(spans, piece, top)
         # A level stretch's extreme is its beginning.
         bent = (around[0] != around[2]) | (around[4] != around[2])
         better = (refined >= sampled) & bent
-        best_u, best = np.where(better, top, u[peaks]), sign * np.where(better, refined, sampled)
-        found = zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True)
-        return [Extreme(*extreme, signed=signed) for extreme in found]
+        best_u, best = np.where(better, top, u[at]), sign * np.where(better, refined, sampled)
+        found = list(zip(piece.tolist(), best_u.tolist(), best.tolist(), strict=True))
+        signed = self.model.signed
+        return {n: [Extreme(*extreme, signed=n in signed) for extreme in found[span]] for n, span in spans.items()}
+
+    def _each_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
+        """Return each quantity, SI, at those columns of nodes (pieces, u) that are its own."""
+        read = self.together(tuple(spans), pieces.ravel(), u.ravel())
+        found = np.empty(u.shape)
+        for name, span in spans.items():
+            found[..., span] = read[name].reshape(u.shape)[..., span]
+        return found
 
     def angle(self, extreme: Extreme) -> float:
         """Return the crank angle of an extreme, rad."""

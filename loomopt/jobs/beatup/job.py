@@ -124,6 +124,7 @@ class Beatup(Job):
         static = sampled.figures
         found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
         found["mu_min"] = min(static["mu_near"], static["mu_far"])
+        sampled.search((*sampled.model.quantities, *sampled.model.least))
         found |= {name: sampled.peak(name) for name in sampled.model.quantities}
         found |= {name: -sampled.peak(name) for name in sampled.model.least}
         weights = scene.table(RetrofitTarget).weights

@@ -75,6 +75,7 @@ class Rapier(Job):
         if "s_dwell" in scene.operation:
             found |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
             found["dwell"] = min(reading.dwell_after, reading.dwell_before)
+        sampled.search((*sampled.model.quantities, "obliquity"))
         found |= {name: sampled.peak(name) for name in sampled.model.quantities}
         found["mu_min"] = math.pi / 2 - sampled.peak("obliquity")
         found["sley_mu_min"] = min(static["sley_mu_near"], static["sley_mu_far"])

@@ -154,7 +154,9 @@ class Shedding(Job):
         """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
         sampler = self.sampler(scene, design)
         found: dict[str, float | None] = {name: sampler.static.get(name) for name in scene.schema.figures}
-        for name, quantity in self.peaks(sampler.model).items():
+        peaks = self.peaks(sampler.model)
+        sampler.search(("lift", *peaks.values()))
+        for name, quantity in peaks.items():
             found[name] = sampler.peak(quantity) * (-1 if quantity == "concavity" else 1)
         parted = self.parted(scene, sampler)
         return found | contact_figures(scene, sampler) | (parted.figures if parted else {})

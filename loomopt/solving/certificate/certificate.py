@@ -75,10 +75,11 @@ def certified(
     settings = Settings(accuracy)
     try:
         sampler = sampled(program.model, {**program.parameters, **x}, settings.sampled)
+        rows = cycle_rows(program)
+        sampler.search(name for name, _, _ in rows)
         active = active_set(program, sampler)
         found = derivatives(program, x, sampler, active.rows)
         local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
-        rows = cycle_rows(program)
         cycle = WholeCycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
         return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
     except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:

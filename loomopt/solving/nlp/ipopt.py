@@ -60,6 +60,7 @@ class Calls:
 
     def peaks(self, sampler: Sampler) -> list[list[Extreme]]:
         """Return the local extremes of each family's quantity, largest first."""
+        sampler.search(family.row for family in self.families)
         return [sampler.extremes(family.row, family.where) for family in self.families]
 
     def loose(self, sampler: Sampler, extremes: Sequence[Sequence[Extreme]]) -> list[list[Extreme]]:
