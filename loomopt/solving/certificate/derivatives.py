@@ -15,7 +15,7 @@ from loomopt.model.model import Integral
 from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, Reading, quadrature
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.physics.tolerances import JET_ERROR, NEWTON_SHIFT, ROUNDED, THIRD_STEPS
 from loomopt.solving.certificate.kkt import ActiveRow
 
@@ -73,10 +73,10 @@ class JetReading(Reading):
     def _begins(self) -> Number:
         return stacked(self.starts)
 
-    def along(self, name: str, pieces: Pieces, u: Number) -> Number:
-        """Return a whole-cycle quantity at nodes (pieces, u), each (nodes,), SI."""
+    def along(self, names: tuple[str, ...], pieces: Pieces, u: Number) -> tuple[Number, ...]:
+        """Return whole-cycle quantities at nodes (pieces, u), each (nodes,), SI: the pose is computed once for all."""
         begin, end = self._begins[pieces], self._begins[pieces + 1]
-        return self.quantity(name, begin + u * (end - begin), self.cycle.switch(pieces))
+        return self._quantities(names, Node(begin + u * (end - begin), self.cycle.switch(pieces)))
 
     def mean(self, integral: Integral) -> Number:
         """Return a mean by its rule, all nodes at once, SI."""
@@ -85,7 +85,8 @@ class JetReading(Reading):
             return _total(values, len(integral.angles)) / len(integral.angles)
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = weights * (self._begins[pieces + 1] - self._begins[pieces])
-        return _total(widths * self.along(integral.quantity, pieces, u), len(u)) / _total(widths, len(u))
+        (values,) = self.along((integral.quantity,), pieces, u)
+        return _total(widths * values, len(u)) / _total(widths, len(u))
 
 
 def _total(values: Number, count: int) -> Number:
@@ -109,7 +110,7 @@ class JetDerivatives(Derivatives):
         self.pieces = {name: np.array([node.piece for node in of]) for name, of in nodes.items()}
         self.inner = {name: np.array([not self.at_corner(node) for node in of]) for name, of in nodes.items()}
         with np.errstate(all="ignore"):
-            self.u = {name: self._settled(name, np.array([node.u for node in of])) for name, of in nodes.items()}
+            self.u = self._settled({name: np.array([node.u for node in of]) for name, of in nodes.items()})
 
     def gradients(self) -> Floats:
         """Return (rows, variables): first derivatives; a row whose value is no number has none."""
@@ -119,8 +120,8 @@ class JetDerivatives(Derivatives):
             reading = self._reading(directions, curved=False)
             for k, jet in self._static(reading, len(self.names)):
                 found[k] = jet.g + 0 * jet.v
-            for name, places in self.groups.items():
-                value = _jet(reading.along(name, self.pieces[name], self.u[name]), len(self.names))
+            for name, at in self._along(reading, self.u).items():
+                value, places = _jet(at, len(self.names)), self.groups[name]
                 found[places] = self._factors(places)[:, None] * (value.g + 0 * np.reshape(value.v, (-1, 1)))
         return _finite(found)
 
@@ -162,8 +163,8 @@ class JetDerivatives(Derivatives):
             reading = self._reading(directions, curved=True, x=x)
             for k, jet in self._static(reading, width):
                 found[k] = jet.curvature
-            for name, places in self.groups.items():
-                value = _jet(reading.along(name, self.pieces[name], _moving(u[name], width)), width)
+            for name, at in self._along(reading, u, width).items():
+                value, places = _jet(at, width), self.groups[name]
                 found[places] = self._factors(places)[:, None, None] * value.curvature
         return found
 
@@ -199,15 +200,33 @@ class JetDerivatives(Derivatives):
                 found.append((k, _jet(value / row.scale, width)))
         return found
 
-    def _settled(self, name: str, u: Floats) -> Floats:
-        """Return u of a quantity's extremes after one Newton step; an extreme at a piece's end stays."""
-        value = self._sampled.along(name, self.pieces[name], _moving(u, 1))
+    def _settled(self, u: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return u of each quantity's extremes after one Newton step; an extreme at a piece's end stays."""
+        read = self._along(self._sampled, u, 1) if u else {}
+        return {name: self._stepped(name, u[name], value) for name, value in read.items()}
+
+    def _stepped(self, name: str, u: Floats, value: Number) -> Floats:
+        """Return u of a quantity's extremes moved to where its slope along u vanishes."""
         if not isinstance(value, Jet):
             return u
         slope, bend = np.broadcast_to(value.g[..., 0], u.shape), np.broadcast_to(value.curvature[..., 0, 0], u.shape)
         shift = np.where(bend != 0.0, -slope, 0.0) / np.where(bend != 0.0, bend, 1.0)
         near = self.inner[name] & (np.abs(shift) < float(NEWTON_SHIFT))
         return np.where(near, u + np.where(near, shift, 0.0), u)
+
+    def _along(self, reading: JetReading, u: Mapping[str, Floats], width: int = 0) -> dict[str, Number]:
+        """Return each quantity at its own nodes, in one pass for all; width: of directions, the last of which moves u.
+
+        Without one u does not move.
+        """
+        if not u:
+            return {}
+        names, at = tuple(u), np.concatenate(list(u.values()))
+        pieces = np.concatenate([self.pieces[name] for name in names])
+        values = reading.along(names, pieces, _moving(at, width) if width else at)
+        ends = list(itertools.accumulate((len(of) for of in u.values()), initial=0))
+        spans = (slice(*span) for span in itertools.pairwise(ends))
+        return {name: _part(value, span) for name, value, span in zip(names, values, spans, strict=True)}
 
     @lazy
     def _sampled(self) -> JetReading:
@@ -217,6 +236,17 @@ class JetDerivatives(Derivatives):
 def _jet(value: Number, width: int) -> Jet:
     """Return a number as a jet along so many directions, none of which moves what is no jet."""
     return value if isinstance(value, Jet) else Jet(value, np.zeros(width), np.zeros((width, width)))
+
+
+def _part(value: Number, span: slice) -> Number:
+    """Return a value at some of its nodes; what is the same at all of them stays as it is."""
+
+    def part(numbers: Number, axes: int) -> Number:
+        return numbers[span] if np.ndim(numbers) > axes and len(numbers) > 1 else numbers
+
+    if not isinstance(value, Jet):
+        return part(value, 0)
+    return Jet(part(value.v, 0), part(value.g, 1), None if value.h is None else part(value.h, 2))
 
 
 def _moving(u: Floats, width: int) -> Jet:
