@@ -61,6 +61,13 @@ def _grid(counts: tuple[int, ...]) -> tuple[Pieces, Floats]:
     return pieces, np.concatenate([np.linspace(0.0, 1.0, count) for count in counts])
 
 
+@functools.cache
+def _ends(counts: tuple[int, ...]) -> tuple[Pieces, Pieces]:
+    """Return the first and the last of the nodes of each piece."""
+    last = np.cumsum(counts) - 1
+    return last - np.array(counts) + 1, last
+
+
 class Sampler:
     """One design, ready to be sampled over its cycle; samples: of one turn, from which extremes are refined.
 
@@ -151,15 +158,15 @@ class Sampler:
 
     def grid(self, samples: int = 0) -> tuple[Pieces, Floats]:
         """Return nodes spread evenly over the turn, the sampler's own number without one; ends of pieces included."""
-        return _grid(self._counts(samples)) if samples else self._own_grid
+        return _grid(self._counts(samples) if samples else self._own_counts)
 
     @lazy
-    def _own_grid(self) -> tuple[Pieces, Floats]:
-        return _grid(self._counts(self.samples))
+    def _own_counts(self) -> tuple[int, ...]:
+        return self._counts(self.samples)
 
     def _counts(self, samples: int) -> tuple[int, ...]:
         """Return how many nodes each piece has."""
-        widths = np.diff(self.cycle.starts)
+        widths = self.cycle.starts[1:] - self.cycle.starts[:-1]
         least = max(samples // max(LEAST_SHARE, len(widths) // 2), LEAST_NODES)
         return tuple((np.maximum(np.ceil(samples * widths / TURN).astype(int), least) + 1).tolist())
 
@@ -201,7 +208,7 @@ class Sampler:
             return None
         left, right = np.empty_like(size), np.empty_like(size)
         left[1:], right[:-1] = size[:-1], size[1:]
-        first, last = self._ends
+        first, last = _ends(self._own_counts)
         left[first] = right[last] = -np.inf
         return np.flatnonzero((size > left) & (size >= right))
 
@@ -247,13 +254,6 @@ class Sampler:
             (values,) = self.quantities((name,), node)
         return np.broadcast_to(np.asarray(values, dtype=np.float64), angles.shape)
 
-    @lazy
-    def _ends(self) -> tuple[Pieces, Pieces]:
-        """Where pieces begin and end in the sampler's own grid."""
-        counts = np.array(self._counts(self.samples))
-        last = np.cumsum(counts) - 1
-        return last - counts + 1, last
-
     def heights(self, name: str, values: Floats) -> Floats:
         """Return what of a quantity's values is compared with a bound: their magnitude, or themselves."""
         return values if name in self.model.signed else np.abs(values)
@@ -298,6 +298,8 @@ class Sampler:
     def _each_at(self, spans: Mapping[str, slice], pieces: Pieces, u: Floats) -> Floats:
         """Return each quantity, SI, at those columns of nodes (pieces, u) that are its own."""
         read = self.together(tuple(spans), pieces.ravel(), u.ravel())
+        if len(spans) == 1:
+            return read[next(iter(spans))].reshape(u.shape)
         found = np.empty(u.shape)
         for name, span in spans.items():
             found[..., span] = read[name].reshape(u.shape)[..., span]

@@ -55,8 +55,9 @@ def speed_reached(model: JobModel, values: Mapping[str, float], name: str, most:
     own = float(values["speed"])
     at_rest = sampled(model, {**values, "speed": 0.0})
     speed = _reached(at_rest, own, name, most, slack)
-    tied = slack > 0.0 and speed < own <= _reached(at_rest, own, name, most + slack, slack)
-    return own if tied else speed
+    if not (slack > 0.0 and speed < own and sampled(model, values).peak(name) <= most + slack):
+        return speed
+    return own if own <= _reached(at_rest, own, name, most + slack, slack) else speed
 
 
 def followed(
