@@ -175,7 +175,8 @@ class Sampler:
 
         where: the pieces they are asked for; every piece without it.
         """
-        self.search((name,))
+        if name not in self._extremes:
+            self.search((name,))
         found = self._extremes[name]
         on = self.on(name, where)
         return [e for e in found if on[e.piece]]

@@ -90,6 +90,34 @@ def test_every_local_extreme_of_the_scan_is_found_with_its_sign(name):
             assert nearest.value == pytest.approx(signed, rel=1e-13)
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_extremes_of_several_quantities_at_once_are_those_of_each_alone(name):
+    model = JOB.sampler(SCENES[name], {}).model
+    values = JOB.sampler(SCENES[name], {}).values
+    together, names = Sampler(model, values), (*model.quantities, "obliquity")
+    together.search(names)
+    for quantity in names:
+        assert together.extremes(quantity) == Sampler(model, values).extremes(quantity)
+
+
+def test_extremes_of_several_quantities_are_refined_in_two_passes_for_all(monkeypatch):
+    scene = registry.load("rapier")
+    sampled = registry.of(scene).sampler(scene, {})
+    names, read = ("span_near", "span_far", "obliquity", "peak_acceleration"), []
+    whole = Sampler.together
+
+    def counted(self, asked, pieces, u):
+        read.append(asked)
+        return whole(self, asked, pieces, u)
+
+    monkeypatch.setattr(Sampler, "together", counted)
+    sampled.search(names)
+    sampled.search(names)
+    assert read == [names, names]
+    assert all(sampled.extremes(name) for name in names)
+    assert len(read) == 2
+
+
 def test_an_extreme_may_stand_on_one_side_of_a_corner():
     """A Coulomb torque that outweighs all else: |M3| jumps at the dead centres, where one side has the peak."""
     sampled = JOB.sampler(SCENES["friction above all"], {})

@@ -6,6 +6,7 @@ import pytest
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import registry
+from loomopt.jobs.shedding import program
 from loomopt.jobs.shedding.program import SPARE
 from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.model.limits import CycleLimit, DesignLimit
@@ -160,3 +161,16 @@ def test_a_design_with_a_law_is_adopted_as_the_scenes_own():
     assert adopted.table(HealdFrame).law_coefficients == pytest.approx(cycloid_like(8), rel=1e-15)
     assert adopted.limits["law_acceleration"].max == pytest.approx(2 * math.pi)
     assert JOB.adopted(SCENE, {"K1": 1e5}, "force") == (SCENE, "force")
+
+
+def test_a_spring_that_is_too_soft_is_not_asked_whether_it_just_holds(monkeypatch):
+    roots, settled = [], program._settled
+
+    def counted(*asked):
+        roots.append(settled(*asked))
+        return roots[-1]
+
+    monkeypatch.setattr(program, "_settled", counted)
+    survived = JOB.figures(SCENE, JOB.today(SCENE))["contact_speed"]
+    assert survived < SCENE.operation["speed"]
+    assert roots == [survived]

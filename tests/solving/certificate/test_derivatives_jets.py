@@ -14,7 +14,7 @@ from loomopt.maths.jets import variables
 from loomopt.model.sampling import Sampler
 from loomopt.physics.cycle import Node
 from loomopt.physics.tolerances import JET_ERROR
-from loomopt.solving.certificate.derivatives import JetDerivatives
+from loomopt.solving.certificate.derivatives import JetDerivatives, JetReading
 from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 from loomopt.solving.certificate.kkt import active_set
 
@@ -144,3 +144,21 @@ def test_a_batch_of_designs_is_judged_in_one_pass():
         assert together.v[k] == pytest.approx(alone.v, rel=1e-13)
         assert together.g[k] == pytest.approx(alone.g, rel=1e-12, abs=1e-10)
         assert together.h[k] == pytest.approx(alone.h, rel=1e-11, abs=1e-8)
+
+
+def test_all_whole_cycle_rows_are_read_in_one_pass_whatever_their_quantities(monkeypatch):
+    program, x = optimum("rapier", "stroke-dwell")
+    sampler = Sampler(program.model, {**program.parameters, **x})
+    rows = active_set(program, sampler).rows
+    read, whole = [], JetReading.along
+
+    def counted(self, names, pieces, u):
+        read.append(names)
+        return whole(self, names, pieces, u)
+
+    monkeypatch.setattr(JetReading, "along", counted)
+    found = JetDerivatives(program, x, sampler, rows)
+    found.gradients()
+    found.curvatures(np.eye(len(found.names)))
+    assert len(found.groups) > 1
+    assert read == [tuple(found.groups)] * 3
