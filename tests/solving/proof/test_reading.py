@@ -68,7 +68,7 @@ def test_boxes_read_in_parts_are_the_same_bits_and_the_clock_is_looked_at_betwee
         assert one.low.tobytes() == other.low.tobytes()
         assert one.high.tobytes() == other.high.tobytes()
     clock = iter([2.0, 3.0])
-    monkeypatch.setattr(reading.time, "perf_counter", lambda: next(clock))
+    monkeypatch.setattr("loomopt.solving.proof.reading.time.perf_counter", lambda: next(clock))
     with pytest.raises(LateError):
         reader.read(middle - half, middle + half, until=2.5)
     assert next(clock, None) is None
