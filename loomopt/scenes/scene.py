@@ -466,7 +466,12 @@ def _judged(scene: Scene, faults: Faults) -> bool:
     optional = [
         name for name in wrong if quantity_of(type(own), name) and not type(own).model_fields[name].is_required()
     ]
-    return wrong == optional and not faults.within("operation", "effects")
+    lacking = [
+        key
+        for key, others in scene.schema.instead.items()
+        if getattr(own, key) is None and not {*others} <= scene.mechanism.keys()
+    ]
+    return wrong == optional and not lacking and not faults.within("operation", "effects")
 
 
 def given(table: Table) -> dict[str, Any]:

@@ -49,7 +49,7 @@ NAMED_LAW = Literal[
     "gutman_13",
     "freudenstein_13",
 ]
-LAW = NAMED_LAW | Literal["spline", "table"]
+LAW = Literal[NAMED_LAW, "spline", "table"]
 
 
 class Operation(Table):
