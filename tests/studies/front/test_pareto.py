@@ -150,7 +150,7 @@ def test_an_answer_of_a_front_is_judged_and_proven_by_its_own_limits(serial, ree
     of_reed = reed.answer(middle.point)
     torque = next(limit for limit in of_reed.limits if limit.name == "M3_fdc")
     assert (torque.min, torque.max) == pytest.approx((-30.0, 30.0))
-    assert of_reed.as_dict()["target"] is None, "nothing was demanded but limits"
+    assert of_reed.as_dict()["target"] == "balance", "what it demands of all else is held"
     proofs = of_reed.prove()
     assert proofs.passed
     assert "M3_fdc" in {proof.limit for proof in proofs.proofs}

@@ -91,21 +91,21 @@ DYING = """
 import os, signal, sys
 from pathlib import Path
 from loomopt.base.errors import BadInput
-from loomopt.studies.run import executors
+from loomopt.studies.run import run
 
 log, most = Path(sys.argv[1]), int(sys.argv[2])
 
-def dies(lifeline, begin=executors._begin):
+def dies(lifeline, begin=run._begin):
     with log.open("a") as file:
         file.write("x")
     if len(log.read_text()) <= most:
         os.kill(os.getpid(), signal.SIGKILL)
     begin(lifeline)
 
-executors._begin = dies
+run._begin = dies
 if __name__ == "__main__":
     try:
-        pool = executors.workers(2)()
+        pool = run.workers(2)()
         print(pool.submit(int, 7).result())
         pool.shutdown()
     except Exception as error:
@@ -126,7 +126,7 @@ def test_a_worker_that_is_killed_while_it_starts_costs_a_new_pool(tmp_path, deat
 
 def test_a_call_that_the_script_itself_repeats_is_bad_input(tmp_path):
     script = tmp_path / "bare.py"
-    script.write_text("from loomopt.studies.run import executors\nexecutors.workers(2)()\n")
+    script.write_text("from loomopt.studies.run import run\nrun.workers(2)()\n")
     folder = {"PYTHONPATH": str(Path(run.__file__).parents[3])}
     done = subprocess.run(
         [sys.executable, script], env=os.environ | folder, capture_output=True, text=True, timeout=120
