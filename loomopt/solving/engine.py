@@ -27,6 +27,7 @@ def solve(
     starts: int | None = None,
     seed: int = 0,
     near: Sequence[Point] = (),
+    wholly: bool = True,
     prove: bool = False,
     global_proof: GlobalProof | None = None,
     on_iteration: Callable[[int], None] | None = None,
@@ -38,10 +39,11 @@ def solve(
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
     without it a search for the best basin, its designs drawn with `seed`; near: where neighbours' solves ended, the
-    best of which counts (one of another structure is left alone); prove: whether to prove every limit of the answer at
-    every crank angle; global_proof: to prove that no admissible design is better, and how closely; on_iteration(number)
-    is called at each iteration, on_start(number, how many) at each start, on_step(what) before each step that may take
-    long; session: what earlier solves left, the current one's without it. Raises BadInput for an unknown target or one
+    best of which counts (one of another structure is left alone); wholly: whether what is added goes where it is worth
+    next to nothing and no share is asked for; prove: whether to prove every limit of the answer at every crank angle;
+    global_proof: to prove that no admissible design is better, and how closely; on_iteration(number) is called at each
+    iteration, on_start(number, how many) at each start, on_step(what) before each step that may take long;
+    session: what earlier solves left, the current one's without it. Raises BadInput for an unknown target or one
     the scene cannot serve, KeyboardInterrupt on Ctrl-C.
     """
     with working(session) as own:
@@ -56,6 +58,8 @@ def solve(
             import casadi  # noqa: F401  # so that building is not charged with it
         with clock.charged("build"):
             program = job.program(scene, target)
+            if not wholly and program.added and program.added.wholly:
+                program = replace(program, added=None)
         today = {**job.values(program, job.today(scene)), **program.today}
 
         begun = own.positions

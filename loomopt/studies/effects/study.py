@@ -207,7 +207,8 @@ class Effects:
 
         scene = self.without(frozenset(task.place))
         try:
-            answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed)
+            # What a counterweight is worth to the design is no worth of an effect.
+            answer = engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, wholly=False)
         except Broken:
             raise
         except BadInput as error:
