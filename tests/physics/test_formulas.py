@@ -124,5 +124,4 @@ def test_formulas_of_an_effect_hold_no_branch(file):
     formulas = {name: node for name, node in found.items() if any(a.arg == "maths" for a in node.args.args)}
     assert formulas or file == "shedding/separation.py", "flight is followed in floats alone"
     for name, node in formulas.items():
-        checked = node if name == "force" else without_structure(node)
-        assert not offences(checked), name
+        assert not offences(without_structure(node)), name

@@ -2,7 +2,6 @@
 
 import contextlib
 import contextvars
-import importlib
 import shutil
 import sys
 import threading
@@ -88,11 +87,11 @@ class CellLine:
 
     def show(self, text: str, seconds: float) -> None:
         """Show the line in place of what stood there."""
-        # Not among the dependencies: where a cell runs, it is there.
-        display = importlib.import_module("IPython.display").display
+        from IPython.display import display
+
         told: dict[str, Any] = {"text/plain": text}
         if self.handle is None:
-            self.handle = display(told, raw=True, display_id=True)
+            self.handle = display(told, raw=True, display_id=True)  # type: ignore[no-untyped-call]
         else:
             self.handle.update(told, raw=True)
 
