@@ -224,11 +224,11 @@ def solve(
     if sampler is None:
         return Point(x, "Not_Assembled", False)
     begin = _begin(calls, x, sampler, warm)
-    result = _compared(calls, begin, _round(calls, begin, 0))
+    result = _round(calls, begin, 0)
+    if not _is_done(result, settings):
+        result = _compared(calls, begin, result)
     for more in range((ELASTIC_ROUNDS if elastic else EXCHANGE_ROUNDS) - 1, -1, -1):
-        if isinstance(result, Point) or not result.reached:
-            break
-        if result.violation <= settings.excess and result.steady:
+        if isinstance(result, Point) or _is_done(result, settings):
             break
         followed = _followed(calls, result) if result.steady else None
         if followed:
@@ -236,6 +236,13 @@ def solve(
         if more:
             result = _round(calls, result.after, result.iterations)
     return result if isinstance(result, Point) else _ended(calls, result)
+
+
+def _is_done(result: _Round | Point, settings: Settings) -> bool:
+    """Say whether another round has nothing to add."""
+    if isinstance(result, Point) or not result.reached:
+        return True
+    return result.violation <= settings.excess and result.steady
 
 
 def _begin(calls: Calls, x: dict[str, float], sampler: Sampler, warm: Point | None) -> _Place:

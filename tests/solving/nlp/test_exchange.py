@@ -15,7 +15,7 @@ from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import TURN, split
 from loomopt.solving.certificate.certificate import certify
 from loomopt.solving.nlp import exchange, ipopt
-from loomopt.solving.nlp.point import Elastic, Settings, sampler_at
+from loomopt.solving.nlp.point import Elastic, Known, Settings, sampler_at
 
 BEATUP = registry.load("beatup")
 
@@ -292,3 +292,14 @@ def test_iterations_are_those_of_all_rounds(monkeypatch):
     point = solved(task, polished=False)
     assert len(told) > 2
     assert point.iterations == sum(told)
+
+
+def test_an_elastic_solve_may_end_in_its_first_round_whatever_is_known():
+    """What is known to bind waits for the second round: where there is none, what the first one stood on is told."""
+    task = program(limits=(("circle", 1, 1.0),))
+    known = Known(tuple(solved(task).binding))
+    assert any(known.nodes)
+    point = exchange.solve(task, {"x": 0.1, "y": 0.1}, Settings(uniform=36), elastic=Elastic(), known=known)
+    assert point.reached
+    assert len(point.binding) == len(known.nodes)
+    assert set(point.nodes[0]).isdisjoint(known.nodes[0])
