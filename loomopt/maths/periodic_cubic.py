@@ -63,6 +63,10 @@ class PeriodicCubic:
         found = tuple(float(k) for k, cubic in enumerate(self.cubics) if any(cubic))
         return found or tuple(map(float, range(self.samples)))
 
+    def since(self, k: int) -> tuple[float, ...]:
+        """Return how far, rad, the middle of each interval lies behind where interval k begins, within one turn."""
+        return tuple((middle - self.begins[k]) % TURN for middle in self.middles)
+
     def _value(self, k: int, angle: float) -> float:
         t, (c0, c1, c2, c3) = angle - self.middles[k], self.cubics[k]
         return c0 + t * (c1 + t * (c2 + t * c3))

@@ -368,7 +368,10 @@ def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, fa
     given_bounds: Mapping[str, Any] = {}
     with faults:
         given_bounds = flat(table(raw, origin, "bounds"), [*schema.variables, *(place.label for place in known)])
+    missed = {fault.key for fault in faults.found}
     for name, each in given_bounds.items():
+        if f"mechanism.{name}" in missed:
+            continue
         with faults:
             waiting = [p for p in known if p.label == name and p.waits]
             given = any(place.label == name and place.given for place in known)

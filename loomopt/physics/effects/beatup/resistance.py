@@ -96,8 +96,7 @@ def _tabulated(
         before = _cubic(answers[k - 1], maths.number(halves[k - 1]) / omega)
         after = _cubic(answers[k], -maths.number(halves[k]) / omega)
         kick = oscillator.repeated(before[0] - after[0], before[1] - after[1])
-        since = [(middle - curve.begins[k]) % TURN for middle in curve.middles]
-        elapsed = maths.choose(interval, [maths.number(angle) for angle in since]) / omega + time
+        elapsed = maths.choose(interval, [maths.number(angle) for angle in curve.since(k)]) / omega + time
         rung = oscillator.ringing(kick, elapsed)
         position, rate = position + rung[0], rate + rung[1]
     return position, rate
