@@ -52,7 +52,7 @@ def read(*path):
 
 
 def without_structure(node):
-    """Return a function without what asks how the scene is built: `if X is None`, `if "table" in own`, `A if X == "word"`."""
+    """Return a function without what asks how the scene is built: `X is None`, `"table" in own`, `A if X == "word"`."""
 
     class Structure(ast.NodeTransformer):
         def visit_ImportFrom(self, found):
