@@ -15,6 +15,8 @@ INTERRUPTED = 130
 SIGNALS = signal.SIGINT, signal.SIGTERM
 """What stops a run: Ctrl-C, and what a system sends that wants a process to end."""
 STOPPED = "loomopt: stopped; nothing was left half-written."
+_came: list[int] = []
+"""Signals that have come while a run was stoppable."""
 
 
 def leave() -> NoReturn:
@@ -33,14 +35,13 @@ def leave_at_once() -> None:
 
 def stoppable(run: Callable[[], int]) -> int:
     """Return the exit status of `run`; after Ctrl-C 130, whatever an import or a library has made of it."""
-    stopped: list[int] = []
 
     def stop(number: int, frame: "FrameType | None") -> None:
-        stopped.append(number)
+        _came.append(number)
         raise KeyboardInterrupt
 
     def swallowed(what: "sys.UnraisableHookArgs") -> None:
-        if stopped:
+        if _came:
             leave()
         sys.__unraisablehook__(what)
 
@@ -49,11 +50,17 @@ def stoppable(run: Callable[[], int]) -> int:
     try:
         status = run()
     except BaseException:
-        if not stopped:
+        if not _came:
             raise
         leave()
     leave_at_once()
     return status
+
+
+def check() -> None:
+    """Raise KeyboardInterrupt where Ctrl-C has come and a library that calls Python has swallowed it."""
+    if _came:
+        raise KeyboardInterrupt
 
 
 def _handle(handler: Callable[[int, "FrameType | None"], None]) -> None:

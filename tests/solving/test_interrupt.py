@@ -9,6 +9,7 @@ import textwrap
 import pytest
 
 import loomopt as lo
+from loomopt.base import interrupts
 
 HOOKED = """
 import os, signal, sys
@@ -135,3 +136,13 @@ def test_ctrl_c_is_told_in_one_line_without_the_solvers_own_warning(after):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "loomopt: stopped; nothing was left half-written.\n"
+
+
+def test_an_interrupt_that_a_library_swallowed_is_found_after_the_solve(monkeypatch):
+    monkeypatch.setattr(interrupts, "_came", [])
+    interrupts.check()
+    monkeypatch.setattr(interrupts, "_came", [signal.SIGINT])
+    with pytest.raises(KeyboardInterrupt):
+        interrupts.check()
+    with pytest.raises(KeyboardInterrupt):
+        lo.solve("beatup", starts=1)

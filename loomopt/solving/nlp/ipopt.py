@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from loomopt.base import interrupts
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler
 from loomopt.physics.cycle import Floats
@@ -236,6 +237,7 @@ def run(
     solver = nlp.solver(bool(warm), calls.settings)
     with _no_warning_on_ctrl_c():
         said = solver(**arguments)
+    interrupts.check()
     stats = solver.stats()
     status = str(stats["return_status"])
     if status in STOPPED:
