@@ -154,9 +154,9 @@ def spoilt_text(draw: random.Random, text: str, parts: tuple[str, ...]) -> bytes
 
 
 def plain_line(text: str) -> None:
-    """Check that a message is one printable line that is read to its end."""
-    assert text.isprintable(), "it is not one line, or it has control characters"
-    assert len(text) <= LONGEST_LINE, f"{len(text)} characters"
+    """Check that a message has printable lines, one for each mistake, that are read to their end."""
+    assert all(line.isprintable() for line in text.split("\n")), "it has control characters"
+    assert all(len(line) <= LONGEST_LINE for line in text.split("\n")), f"{len(text)} characters"
     assert "Traceback" not in text
 
 

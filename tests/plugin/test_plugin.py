@@ -71,9 +71,9 @@ def test_curves_and_pictures_are_written(loomopt, tmp_path):
     loomopt("simulate", "press", "--out", "curves.csv", "--out", "curves.png")
     lines = [line for line in (tmp_path / "curves.csv").read_text().splitlines() if not line.startswith("#")]
     rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
-    motion = ["phi [rad]", "q [m]", "q_1 [m/rad]", "q_2 [m/rad^2]", "q_t [m/s]", "q_tt [m/s^2]"]
-    assert list(rows[0]) == [*motion, "forming [N]", "Q [N]", "Md [N*m]", "motor_power [W]"]
-    met = [row for row in rows if float(row["forming [N]"])]
+    motion = ["phi [deg]", "q [mm]", "q_1 [m/rad]", "q_2 [m/rad^2]", "q_t [m/s]", "q_tt [m/s^2]"]
+    assert list(rows[0]) == [*motion, "forming [kN]", "Q [kN]", "Md [N*m]", "motor_power [W]"]
+    met = [row for row in rows if float(row["forming [kN]"])]
     assert float(met[0]["Md [N*m]"]) == pytest.approx(torque(0.105, 0.42), rel=1e-9)
     for name in ("linkage.svg", "linkage.dxf", "joints.csv"):
         loomopt("export", "press", "--out", name)
