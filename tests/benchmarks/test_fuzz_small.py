@@ -62,7 +62,7 @@ def test_a_number_that_is_none_is_found(fuzz, data):
         fuzz.finite(data)
 
 
-@pytest.mark.parametrize("text", ["a\nb", "x" * 3000, "Traceback (most recent call last)", "\x1b[31m"])
+@pytest.mark.parametrize("text", ["a\rb", "x" * 3000, "Traceback (most recent call last)", "\x1b[31m"])
 def test_a_message_that_is_not_one_plain_line_is_found(fuzz, text):
     fuzz.plain_line("loomopt: a.toml: l1: it is wrong. Mend it.")
     with pytest.raises(AssertionError):
