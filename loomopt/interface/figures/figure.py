@@ -33,7 +33,15 @@ SUFFIXES = (".png", ".pdf", ".svg")
 
 _PAGE = 240 / 25.4
 """Longer side of a drawing's page, inches."""
-_STYLE = {"svg.hashsalt": "loomopt", "pdf.fonttype": 42, "font.size": 9.0, "axes.titlesize": 9.0}
+_STYLE = {
+    "svg.hashsalt": "loomopt",
+    "pdf.fonttype": 42,
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    # A factor common to an axis would stand where the names above it do.
+    "axes.formatter.limits": (-5, 8),
+    "axes.formatter.useoffset": False,
+}
 COLOURS = ("#1d4ed8", "#c2410c", "#047857", "#7c3aed", "#b91c1c", "#0e7490", "#a16207")
 STYLES = ("-", (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
 """Of curves that stand together: the first of both, the second of both, and so on."""

@@ -219,3 +219,9 @@ def test_a_size_that_is_given_is_the_figures_size_and_texts_are_as_large_as_ther
     assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx([s / 2 for s in sizes])
     figure.set_size_inches(*(own * 2))
     assert sorted({text.get_fontsize() for text in figure.findobj(Text)}) == pytest.approx(sizes)
+
+
+def test_no_common_factor_stands_where_the_names_of_designs_do():
+    figure = lo.pareto("shedding", ("K1", "X0"), points=3).plot()
+    figure.canvas.draw()
+    assert {axis.get_offset_text().get_text() for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)} == {""}
