@@ -7,6 +7,9 @@ from typing import Any, TypeGuard
 
 from loomopt.base.errors import refusal
 
+PICTURE = "a path that ends in .png, .svg or .pdf", "Name a file, or leave it out"
+"""What a figure may be written to, and what to do where it is none."""
+
 
 def number(given: object, key: str, allowed: str, remedy: str) -> float:
     """Return a number, of Python or of NumPy. Raises BadInput for anything else, a truth value too."""

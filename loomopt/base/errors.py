@@ -78,6 +78,15 @@ class BadInput(ValueError):  # noqa: N818 (it names what happened; users catch i
         """Each mistake as an error of its own, the worst first."""
         return (self, *self.others)
 
+    def placed(self, file: str, tables: Collection[str]) -> "BadInput":
+        """Return the same mistakes, those in one of these tables as mistakes of a file, where they name none."""
+        first, *others = (each._in(file) if each.key.split(".")[0] in tables else each for each in self.faults)
+        return first.together(others) if others else first
+
+    def _in(self, file: str) -> "BadInput":
+        more = {name: getattr(self, name) for name in ("key", "value", "allowed", "remedy", "grade")}
+        return self if self.file else type(self)(self.problem, file=file, **more)
+
     def together(self, others: "Sequence[BadInput]") -> "BadInput":
         """Return one error of this mistake and of others, a line each."""
         found = copy.copy(self)

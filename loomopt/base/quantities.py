@@ -8,8 +8,10 @@ import functools
 import math
 import re
 import typing
+from collections.abc import Mapping
 from decimal import Context, Decimal
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -341,10 +343,34 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e60
 
 
+MOST_MODELS = 256
+"""Models whose fields are remembered: a scene's tables say which models it has, and every scene asks of all of them."""
+
+
 def quantity_of(model: type[BaseModel], field: str) -> Quantity | None:
     """Return what a model's field may be, also for `X | None`; None for a field that holds no quantity."""
     info = model.model_fields[field]
     return _find_quantity(*info.metadata, info.annotation)
+
+
+@functools.lru_cache(maxsize=MOST_MODELS)
+def quantities_of(model: type[BaseModel]) -> Mapping[str, Quantity]:
+    """Return what a model's fields may be that hold a quantity; those of a table inside it under "table.key"."""
+    found: dict[str, Quantity] = {}
+    for name in model.model_fields:
+        quantity, inner = quantity_of(model, name), table_inside(model, name)
+        if quantity:
+            found[name] = quantity
+        elif inner:
+            found |= {f"{name}.{key}": each for key, each in quantities_of(inner).items()}
+    return MappingProxyType(found)
+
+
+def table_inside(model: type[BaseModel], field: str) -> type[BaseModel] | None:
+    """Return the model of a table that a model's field is, also for `X | None`; None for a field that is none."""
+    annotation = model.model_fields[field].annotation
+    parts = (annotation, *(part for part in typing.get_args(annotation) if typing.get_origin(annotation) is not tuple))
+    return next((part for part in parts if isinstance(part, type) and issubclass(part, BaseModel)), None)
 
 
 def _find_quantity(*parts: object) -> Quantity | None:
@@ -367,6 +393,7 @@ MoveAngle = Annotated[float, Quantity("angle", least=NARROWEST, below=2 * math.p
 DwellAngle = Annotated[float, Quantity("angle", above=0, below=math.pi)]
 Mass = Annotated[float, Quantity("mass", least=0)]
 PositiveMass = Annotated[float, Quantity("mass", above=0)]
+Inertia = Annotated[float, Quantity("inertia", least=0)]
 PositiveInertia = Annotated[float, Quantity("inertia", above=0)]
 Torque = Annotated[float, Quantity("torque", least=0)]
 PositiveTorque = Annotated[float, Quantity("torque", above=0)]
@@ -379,6 +406,7 @@ PositivePressure = Annotated[float, Quantity("pressure", above=0)]
 PositiveDensity = Annotated[float, Quantity("density", above=0)]
 Speed = Annotated[float, Quantity("angular speed", above=0)]
 RotaryDamping = Annotated[float, Quantity("rotary damping", least=0)]
+RotaryStiffness = Annotated[float, Quantity("rotary stiffness", least=0)]
 PositiveRotaryStiffness = Annotated[float, Quantity("rotary stiffness", above=0)]
 PositiveRotaryDamping = Annotated[float, Quantity("rotary damping", above=0)]
 PureNumber = Annotated[float, Quantity("number", least=0)]

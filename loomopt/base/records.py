@@ -1,7 +1,7 @@
 """Mappings that never change: what answers and scenes are made of."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, ItemsView, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NoReturn, TypeVar, overload
 
 
@@ -18,10 +18,59 @@ class Frozen(dict[str, Any]):
         return Frozen, (dict(self),)
 
 
+class Awaited(Mapping[str, float | None]):
+    """A mapping that never changes, some values of which are computed when they are read: one alone, then the rest.
+
+    names: of all, in order; known: those that are there; later(names): others, which cost less together. It pickles as
+    a `Frozen`.
+    """
+
+    def __init__(
+        self,
+        names: Iterable[str],
+        known: Mapping[str, float | None],
+        later: Callable[[Sequence[str]], Mapping[str, float | None]],
+    ) -> None:
+        self._names, self._known, self._later = dict.fromkeys(names), dict(known), later
+        self._asked = False
+
+    def __getitem__(self, name: str) -> float | None:
+        if name in self._names and name not in self._known:
+            missing = [each for each in self._names if each not in self._known] if self._asked else [name]
+            self._known, self._asked = {**self._known, **self._later(missing)}, True
+        return self._known[name]
+
+    def items(self) -> ItemsView[str, float | None]:
+        """Return all names with their values, those that were not there computed together."""
+        self._asked = True
+        return {name: self[name] for name in self._names}.items()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __or__(self, other: Mapping[str, float | None]) -> dict[str, float | None]:
+        """Return both as a dict, the other's values where both have one."""
+        return {**self, **other}
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+    def __reduce__(self) -> tuple[type[Frozen], tuple[dict[str, float | None]]]:
+        """Return how to make it again: of its values, computed by now."""
+        return Frozen, (dict(self),)
+
+
 def freeze(record: object, *names: str) -> None:
     """Make the named mappings of a frozen dataclass unchangeable; for its `__post_init__`."""
     for name in names:
-        object.__setattr__(record, name, Frozen(getattr(record, name)))
+        value = getattr(record, name)
+        object.__setattr__(record, name, value if isinstance(value, Awaited) else Frozen(value))
 
 
 Computed = TypeVar("Computed")

@@ -64,6 +64,7 @@ SI_UNIT: dict[str, str] = {
     "number": "1",
     "pressure": "Pa",
     "density": "kg/m^3",
+    "travel velocity": "m/rad",
     "travel acceleration": "m/rad^2",
     "travel jerk": "m/rad^3",
     "curvature": "1/m",

@@ -135,6 +135,18 @@ def atan2(y: Number, x: Number) -> Number:
     return Series(SeriesTerms(intervals.atan2(up.value, right.value), slope, bend))
 
 
+def floor(x: Number) -> Number:
+    """Return the largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    if not isinstance(x, Series):
+        return intervals.floor(x)
+    found = intervals.floor(x.terms.value)
+    worth = found.v if isinstance(found, Enclosure) else found
+    if not (several := worth.low != worth.high).any():
+        return found
+    endless = Interval(np.where(several, -np.inf, 0.0), np.where(several, np.inf, 0.0))
+    return Series(SeriesTerms(found, endless, endless))
+
+
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Return the value at a place that is data: one for all, or one for each node and box."""
     if not any(isinstance(value, Series) for value in values):

@@ -339,6 +339,17 @@ def atan2(y: Number, x: Number) -> Number:
     return Enclosure(_angle(up, right), slopes)
 
 
+def floor(x: Number) -> Number:
+    """Return the largest whole numbers up to what x may be; where these are several, slopes are without bound."""
+    value = x.v if isinstance(x, Enclosure) else interval(x)
+    found = Interval(np.floor(value.low), np.floor(value.high))
+    several = found.low != found.high
+    if not isinstance(x, Enclosure) or not several.any():
+        return found
+    endless = np.broadcast_to(np.where(several, np.inf, 0.0), np.broadcast_shapes(x.g.shape, several.shape))
+    return Enclosure(found, Interval(-endless, endless))
+
+
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Return the value at a place that is data: one for all, or one for each node and box."""
     places = np.asarray(place.low if isinstance(place, Interval) else place, dtype=np.intp)

@@ -208,6 +208,11 @@ def atan2(y: Number, x: Number) -> Number:
     return Jet(angle, _wide(up) * y.g + _wide(right) * x.g, h)
 
 
+def floor(x: Number) -> Number:
+    """Return the largest whole number up to x, which has no slope."""
+    return np.floor(x.v if isinstance(x, Jet) else x)
+
+
 def stacked(values: Sequence[Number]) -> Number:
     """Return scalar numbers as one of shape (count,); a jet where one of them is."""
     own = next((value for value in values if isinstance(value, Jet)), None)

@@ -83,6 +83,44 @@ class PeriodicCubic:
         return within_half_turn(maths, angle - maths.choose(interval, [maths.number(value) for value in self.middles]))
 
 
+@dataclass(frozen=True)
+class PeriodicCubics:
+    """The components of a vector, through samples at the same angles: `PeriodicCubic` says what each word means."""
+
+    curves: tuple[PeriodicCubic, ...]
+
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """The angles where intervals begin, rad."""
+        return self.curves[0].begins
+
+    @property
+    def samples(self) -> int:
+        """How many samples each goes through."""
+        return self.curves[0].samples
+
+    @property
+    def corners(self) -> int:
+        """How many corners each has."""
+        return self.curves[0].corners
+
+    @property
+    def largest(self) -> float:
+        """The largest |value| among the samples of any."""
+        return max(curve.largest for curve in self.curves)
+
+    @property
+    def acting(self) -> tuple[float, ...]:
+        """The intervals in which any is not 0 all over."""
+        return tuple(sorted({interval for curve in self.curves for interval in curve.acting}))
+
+    @property
+    def spread(self) -> float | None:
+        """The largest spread of any."""
+        found = [curve.spread for curve in self.curves if curve.spread is not None]
+        return max(found, default=None)
+
+
 def interval_at(angle: float, begins: Sequence[float]) -> float:
     """Return the interval that an angle lies in on any turn, rad; begins: where intervals begin, in order."""
     return float(sum((angle - begins[0]) % TURN >= begin - begins[0] for begin in begins) - 1)

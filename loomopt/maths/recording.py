@@ -314,5 +314,5 @@ def recorded(tape: Tape, system: int = 0) -> Maths:
         return [tape.record("{0}[{1}]", found, k) for k in range(len(weights))]
 
     sin, cos, sqrt, atan2, number, exp = map(function, ("sin", "cos", "sqrt", "atan2", "number", "exp"))
-    pi, choose = tape.record(f"pi_{system}"), functools.partial(tape.choose, system)
-    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, choose, exp, spread, weighted)
+    pi, choose, floor = tape.record(f"pi_{system}"), functools.partial(tape.choose, system), function("floor")
+    return Maths("recorded", sin, cos, sqrt, atan2, pi, number, choose, exp, spread, weighted, floor=floor)

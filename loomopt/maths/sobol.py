@@ -30,12 +30,15 @@ POLYNOMIALS = (
 """Of the second coordinate and those after it: degree, inner coefficients, first direction numbers [Joe and Kuo]."""
 
 
-def points(count: int, dimensions: int, seed: int = 0) -> Floats:
-    """Return (count, dimensions) points; coordinates beyond the sixteenth are random ones of the seed."""
+def points(count: int, dimensions: int, seed: int = 0, first: int = 0) -> Floats:
+    """Return (count, dimensions) points, the first of them number `first` of the seed's sequence.
+
+    Coordinates beyond the sixteenth are random ones of the seed, and of where the points begin.
+    """
     generator = np.random.default_rng(seed)
     shift = generator.integers(2**BITS, size=dimensions, dtype=np.uint64)
     spread = min(dimensions, len(POLYNOMIALS) + 1)
-    index = np.arange(count, dtype=np.uint64)
+    index = np.arange(first, first + count, dtype=np.uint64)
     gray = index ^ (index >> np.uint64(1))
     found = np.empty((count, dimensions))
     for k in range(spread):
@@ -43,6 +46,7 @@ def points(count: int, dimensions: int, seed: int = 0) -> Floats:
         for bit, direction in enumerate(_directions(k)):
             digits ^= np.where((gray >> np.uint64(bit)) & np.uint64(1), np.uint64(direction), np.uint64(0))
         found[:, k] = (digits ^ shift[k]) / 2.0**BITS
+    generator = np.random.default_rng([seed, first]) if first else generator
     found[:, spread:] = generator.random((count, dimensions - spread))
     return found
 

@@ -1,7 +1,7 @@
 """The number systems formulas run in: float, NumPy arrays, jets, CasADi, mpmath, SymPy, balls, boxes, recordings.
 
-A formula takes a `Maths` as its first argument and uses nothing but its `sin cos exp sqrt atan2 pi choose`, operators
-and integers, so it is written once. Each system is imported only when it is asked for.
+A formula takes a `Maths` as its first argument and uses nothing but its `sin cos exp sqrt atan2 pi choose floor`,
+operators and integers, so it is written once. Each system is imported only when it is asked for.
 """
 
 import functools
@@ -22,12 +22,17 @@ def _as_it_is(x: Number) -> Number:
     return x
 
 
+def _floored(x: Number) -> Number:
+    return float(math.floor(x))
+
+
 @dataclass(frozen=True, eq=False)
 class Maths:
     """One number system.
 
     sin, cos, exp, sqrt: functions of one number; atan2(y, x): angle in (−π, π]; pi: the system's own π.
     number(x): the system's own copy of a float64, exact in every system.
+    floor(x): the largest whole number up to x, which has no slope: of turns, away from where it jumps.
     choose(place, values): the value at a place that is data of a node (0, 1, 2 ... as numbers), never of the design.
     constant(x): a scalar in the form in which arithmetic with what varies is quickest; the results are the same bits.
     spread(numbers, beside): numbers as one array, over which `arrays` runs a formula at once, beside numbers that may
@@ -46,6 +51,7 @@ class Maths:
     spread: Callable[[Sequence[Number], Iterable[Number]], Number]
     weighted: Callable[[Sequence[Sequence[Number]], Number], list[Number]]
     constant: Callable[[Number], Number] = _as_it_is
+    floor: Callable[[Number], Number] = _floored
 
 
 def _chosen(place: Number, values: Sequence[Number]) -> Number:
@@ -95,8 +101,16 @@ FLOAT = Maths(
 
 
 def within_half_turn(maths: Maths, angle: Number) -> Number:
-    """Return an angle, rad, between −π and π: what is no sine of it is periodic so; its branch is half a turn away."""
-    return maths.atan2(maths.sin(angle), maths.cos(angle))
+    """Return an angle, rad, between −π and π: what is no sine of it is periodic so; its branch is half a turn away.
+
+    One that lies there is returned to the last bit.
+    """
+    return within_turn(maths, angle, 0.5)
+
+
+def within_turn(maths: Maths, angle: Number, behind: Number) -> Number:
+    """Return an angle, rad, on the turn that begins so much of a turn before 0; behind: data of a node."""
+    return angle - 2 * maths.pi * maths.floor(angle / (2 * maths.pi) + behind)
 
 
 def arrays(system: Maths) -> Maths:
@@ -111,8 +125,9 @@ def _elementwise(system: Maths) -> Maths:
     """Return a system of scalars whose functions take arrays of objects, element by element."""
     import numpy as np
 
-    sin, cos, sqrt, exp = (np.frompyfunc(each, 1, 1) for each in (system.sin, system.cos, system.sqrt, system.exp))
-    return replace(system, sin=sin, cos=cos, sqrt=sqrt, exp=exp, atan2=np.frompyfunc(system.atan2, 2, 1))
+    single = (system.sin, system.cos, system.sqrt, system.exp, system.floor)
+    sin, cos, sqrt, exp, floor = (np.frompyfunc(each, 1, 1) for each in single)
+    return replace(system, sin=sin, cos=cos, sqrt=sqrt, exp=exp, floor=floor, atan2=np.frompyfunc(system.atan2, 2, 1))
 
 
 FEW, CHOICES = 1024, 16
@@ -141,7 +156,8 @@ def numpy() -> Maths:
         return np.asarray(x, dtype=np.float64) if isinstance(x, int | float) else x
 
     functions = np.sin, np.cos, np.sqrt, np.arctan2
-    return Maths("numpy", *functions, math.pi, np.float64, choose, np.exp, _spread_floats, _weighted_floats, constant)
+    more = _spread_floats, _weighted_floats, constant, np.floor
+    return Maths("numpy", *functions, math.pi, np.float64, choose, np.exp, *more)
 
 
 @functools.cache
@@ -150,7 +166,8 @@ def jets() -> Maths:
     from loomopt.maths import jets
 
     functions = jets.sin, jets.cos, jets.sqrt, jets.atan2
-    return Maths("jets", *functions, math.pi, float, jets.chosen, jets.exp, jets.spread, jets.weighted)
+    more = jets.exp, jets.spread, jets.weighted
+    return Maths("jets", *functions, math.pi, float, jets.chosen, *more, floor=jets.floor)
 
 
 @functools.cache
@@ -170,7 +187,7 @@ def casadi() -> Maths:
         return list(ca.vertsplit(ca.mtimes(ca.DM(weights), values)))
 
     functions = ca.sin, ca.cos, ca.sqrt, ca.atan2
-    return Maths("casadi", *functions, math.pi, float, choose, ca.exp, spread, weighted)
+    return Maths("casadi", *functions, math.pi, float, choose, ca.exp, spread, weighted, floor=ca.floor)
 
 
 @functools.cache
@@ -181,8 +198,8 @@ def mpmath(digits: int = 40) -> Maths:
     """
     mp = importlib.import_module("mpmath").MPContext()
     mp.dps = digits
-    functions = mp.sin, mp.cos, mp.sqrt, mp.atan2
-    return Maths("mpmath", *functions, +mp.pi, mp.mpf, _chosen, mp.exp, _spread_objects, _weighted_objects)
+    functions, more = (mp.sin, mp.cos, mp.sqrt, mp.atan2), (_spread_objects, _weighted_objects)
+    return Maths("mpmath", *functions, +mp.pi, mp.mpf, _chosen, mp.exp, *more, floor=mp.floor)
 
 
 ORDER = 3
@@ -208,6 +225,12 @@ def balls() -> Maths:
         slope = (x * y.derivative() - y * x.derivative()) / (x * x + y * y)
         return arb.atan2(y[0], x[0]) + slope.integral()
 
+    def floor(x: Number) -> Number:
+        whole = (x[0] if isinstance(x, series) else arb(x)).floor()
+        if not whole.is_exact():
+            raise ValueError("a ball of angles lies across the branch cut")
+        return whole
+
     def constant(x: Number) -> Number:
         # Between two series nothing is converted: a third of the time.
         return series([x], ORDER) if isinstance(x, int | float | arb) else x
@@ -225,6 +248,7 @@ def balls() -> Maths:
         _spread_objects,
         _weighted_objects,
         constant,
+        floor,
     )
 
 
@@ -244,9 +268,8 @@ def boxes() -> Maths:
     from loomopt.maths import intervals
 
     functions = intervals.sin, intervals.cos, intervals.sqrt, intervals.atan2
-    return Maths(
-        "boxes", *functions, intervals.PI, intervals.interval, intervals.chosen, _unserved, _unserved, _unserved
-    )
+    more = intervals.chosen, _unserved, _unserved, _unserved
+    return Maths("boxes", *functions, intervals.PI, intervals.interval, *more, floor=intervals.floor)
 
 
 @functools.cache
@@ -256,14 +279,13 @@ def box_series() -> Maths:
 
     own = interval_series
     functions = own.sin, own.cos, own.sqrt, own.atan2
-    return Maths(
-        "box series", *functions, intervals.PI, intervals.interval, own.chosen, _unserved, _unserved, _unserved
-    )
+    more = own.chosen, _unserved, _unserved, _unserved
+    return Maths("box series", *functions, intervals.PI, intervals.interval, *more, floor=own.floor)
 
 
 @functools.cache
 def sympy() -> Maths:
     """SymPy expressions: equations to print and to derive from."""
     sp = importlib.import_module("sympy")
-    functions = sp.sin, sp.cos, sp.sqrt, sp.atan2
-    return Maths("sympy", *functions, sp.pi, sp.Float, _chosen, sp.exp, _spread_objects, _weighted_objects)
+    functions, more = (sp.sin, sp.cos, sp.sqrt, sp.atan2), (_spread_objects, _weighted_objects)
+    return Maths("sympy", *functions, sp.pi, sp.Float, _chosen, sp.exp, *more, floor=sp.floor)

@@ -12,6 +12,9 @@ TURN_SAMPLES, CROSSING_STEPS, CROSSING_WIDTH = 720, 200, 4e-16
 """Samples between which a motion's turn is sought, as many as an extreme; secants and halvings of what brackets it (a
 third of them halve: 66 are past any float), and the share of an angle that two neighbouring floats are apart."""
 
+NEWTON_DONE = 1e-10
+"""Share of an angle after a step of which Newton's method has none left to take: the next would be its square."""
+
 Floats = NDArray[np.float64]
 
 
@@ -30,21 +33,27 @@ def followed(rates: Callable[[Number], tuple[Number, Number, Number]], hint: Num
 def turns(slope: Callable[[Floats], Any]) -> list[float]:
     """Return the crank angles, rad, where slope(angles) changes its sign, the first of them from − to +.
 
-    None where it never does, or where the motion has no real position somewhere.
+    None where it never does, or where the motion has no real position somewhere. A sample where the slope is 0 has no
+    sign: those beside it tell, across the turn's end too.
     """
-    angles = np.linspace(0.0, 2 * np.pi, TURN_SAMPLES + 1)
+    angles = np.linspace(0.0, 2 * np.pi, TURN_SAMPLES + 1)[:-1]
     with np.errstate(invalid="ignore", divide="ignore"):
         slopes = np.asarray(slope(angles), dtype=np.float64)
     if not np.all(np.isfinite(slopes)):
         return []
     found = []
-    for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
-        sign = 1.0 if slopes[k + 1] > slopes[k] else -1.0
+    known = np.flatnonzero(slopes)
+    for before, after in zip(np.roll(known, 1), known, strict=True):
+        if (slopes[before] > 0) == (slopes[after] > 0):
+            continue
+        sign = 1.0 if slopes[after] > 0 else -1.0
 
         def signed(angle: float, sign: float = sign) -> float:
             return sign * float(np.asarray(slope(np.array([angle])))[0])
 
-        found.append((crossing(signed, float(angles[k]), float(angles[k + 1])), sign > 0))
+        begin = float(angles[before]) - (2 * np.pi if after < before else 0.0)
+        found.append((crossing(signed, begin, float(angles[after])) % (2 * np.pi), sign > 0))
+    found.sort()
     first = next((place for place, (_, outward) in enumerate(found) if outward), 0)
     return [angle for angle, _ in found[first:] + found[:first]]
 
@@ -66,6 +75,31 @@ def crossing(excess: Callable[[float], float], low: float, high: float) -> float
         else:
             high, at_high = middle, value
     return low
+
+
+def crossings(excess: Callable[[Floats, NDArray[np.intp]], tuple[Floats, Floats]], low: Floats, high: Floats) -> Floats:
+    """Return where many functions, not positive at `low` and positive at `high`, cross zero, to rounding.
+
+    excess(x, which): value and slope of some of them, each at its own x. Newton's steps, halved where they leave what
+    brackets the root.
+    """
+    low, high = low.copy(), high.copy()
+    found, left = (low + high) / 2, np.arange(len(low))
+    for _ in range(CROSSING_STEPS):
+        at = found[left]
+        value, slope = excess(at, left)
+        inside = value <= 0.0
+        low[left], high[left] = np.where(inside, at, low[left]), np.where(inside, high[left], at)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = at - value / slope
+        kept = (newton >= low[left]) & (newton <= high[left])
+        found[left] = np.where(kept, newton, (low[left] + high[left]) / 2)
+        there = np.abs(found[left] - at) <= NEWTON_DONE * np.maximum(1.0, np.abs(at))
+        there |= ~np.isfinite(value)
+        left = left[~there]
+        if not len(left):
+            break
+    return found
 
 
 SPIKE_WIDEST, SPIKE_HALVINGS, SPIKE_SECTIONS = 0.02, 44, 90

@@ -90,12 +90,15 @@ def with_axes(
         own = program.model.has_row(name) or program.model.has_quantity(name)
         axis, rows = axes[name], axes[name].rows or (name if own else full(name),)
         _demand(program, name, rows)
+        square = program.model.square(rows[0]) if program.model.has_quantity(rows[0]) else ""
+        if square:
+            axis, rows = axis._replace(power=2), (square,)
         form = axis.form or ("peak" if program.model.has_quantity(rows[0]) else "value")
         opposed = FORMS[form] is not Peak and axis.sign * (1 if sense == "least" else -1) < 0
         if opposed:
             program = replace(program, model=opposing(program.model, rows))
             rows = tuple(map(opposite, rows))
-        objective = _objective(name, rows, FORMS[form], size(name), axis.power)
+        objective = _objective(name, rows, FORMS[form], size(name) ** (2 if square else 1), axis.power)
         found.append(Traded(axis, sense, objective))
     levels = (*program.objectives, *(traded.objective for traded in found))
     return replace(program, objectives=levels), tuple(found)
@@ -111,7 +114,8 @@ def _demand(program: Program, name: str, rows: Sequence[str]) -> None:
     model, numbers = program.model, {*program.parameters, *(v.name for v in program.variables)}
     if not all(model.has_quantity(row) or model.has_row(row) or row in numbers for row in rows):
         remedy = "Trade another axis, or add the numbers and effects that it needs."
-        raise BadInput(f"nothing in the scene gives {name}", key=name, remedy=remedy)
+        problem = model.undefined.get(name) or f"nothing in the scene gives {name}"
+        raise BadInput(problem, key=name, remedy=remedy)
 
 
 def opposite(row: str) -> str:

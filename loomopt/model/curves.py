@@ -1,6 +1,7 @@
 """Curves over the cycle, written once: the motion as a job names it, each effect's term, force, torque, checks."""
 
 import itertools
+import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -34,6 +35,7 @@ SAME_ROW = 1e-9
 """rad; an even row this close to a corner stands for it: no plot and no workshop tells them apart."""
 
 STEPS = 720
+FORCE: Formula = operator.attrgetter("force")
 ANGLE = "phi [rad]"
 POWER = "motor_power [W]"
 ALIKE = 1e-12
@@ -99,7 +101,10 @@ def columns_at(sampler: Sampler, columns: Columns, rows: Rows) -> dict[str, Floa
         torque = np.where(unknown, np.nan, _column(columns.torque[1], at, u))
         found |= {columns.torque[0]: torque} | ({} if at.pose.omega is None else {POWER: motor_power(at, torque)})
     for name, unit in columns.checks.items():
-        found[f"{name} [{unit}]"] = _column(sampler.model.formula(name), at, u)
+        column = _column(sampler.model.formula(name), at, u)
+        # What only pushes is 0 where the output would have to be pulled.
+        lost = name in sampler.model.pushes and _column(FORCE, at, u) < 0.0
+        found[f"{name} [{unit}]"] = np.where(lost, 0.0, column)
     return found | {name: _column(formula, at, u) for name, formula in columns.after.items()}
 
 

@@ -94,6 +94,8 @@ class Arcs(NamedTuple):
     """What distinguishes stretches of one name."""
     chain: Chain | None = None
     """What their formulas are made of, where that is a chain."""
+    parting: Callable[[Maths, Given], tuple[Number, ...]] | None = None
+    """Those of the corners that part the cycle, where others of its corners do so already."""
 
 
 class Kinematics(Protocol):

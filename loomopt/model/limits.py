@@ -199,7 +199,11 @@ class CycleLimit(Limit):
 
     def figure(self, sampler: Sampler) -> float:
         """Return what of a design the value is compared with, SI."""
-        return self.sign * (sampler.peak(self.row, self.where) - self.complement)
+        return self.told(sampler.peak(self.row, self.where))
+
+    def told(self, peak: float) -> float:
+        """Return what of a quantity's peak, SI, the value is compared with, SI."""
+        return self.sign * (peak - self.complement)
 
     def near(self, sampler: Sampler) -> list[Extreme]:
         """Return the extremes of the quantity that come near the bound, or exceed it."""

@@ -10,6 +10,9 @@ from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from loomopt.base.records import lazy
 from loomopt.maths.systems import FLOAT, Maths, Number, arrays
 from loomopt.model.kinematics import Arcs, Kinematics, Squares
@@ -27,7 +30,10 @@ from loomopt.physics.effects.kinds import (
     Speed,
     State,
     UnsteadyError,
+    asked,
+    keys,
     label,
+    lacking,
     owned,
 )
 from loomopt.physics.schema import Values
@@ -42,6 +48,7 @@ class Instant:
     def __init__(self, model: "JobModel", maths: Maths, given: Given, node: Node, event: str = "") -> None:
         self.model, self.maths, self.given, self.node, self.event = model, maths, given, node, event
         self._pose: Number = None
+        self._joints: dict[object, Any] = {}
 
     @property
     def values(self) -> Values:
@@ -75,6 +82,15 @@ class Instant:
         found = balance.terms(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
         return {load.name: term for load, term in found}
 
+    def joints(self, check: "Check[Any]") -> Number:
+        """Return what a check reads of the forces in the joints; checks that read the same share it."""
+        if check.joints not in self._joints:
+            loaded = balance.Loaded(self.maths, self.model.loads, self.pose, self.given, self.node.switch)
+            assert check.joints is not None
+            own = self.given.own[check.name]
+            self._joints[check.joints] = check.joints(self.maths, self.pose, self.values, own, loaded)
+        return self._joints[check.joints]
+
     def switched(self, **switch: Number) -> "Instant":
         """Return the same node with other switches."""
         node = Node(self.node.phi, {**self.node.switch, **switch})
@@ -95,7 +111,7 @@ class CycleQuantity(NamedTuple):
 
     signed: the largest value counts, not the largest |value|; bounded: its formula runs on series of balls, so that a
     bound between points is proven with every answer; loaded: it reads the sum of the loads, so that it is known only
-    where all of them are.
+    where all of them are. square: the quantity that is its square, where it has a corner itself, at 0.
     """
 
     formula: Formula
@@ -103,6 +119,7 @@ class CycleQuantity(NamedTuple):
     signed: bool = False
     bounded: bool = False
     loaded: bool = False
+    square: str = ""
 
 
 class DesignRow(NamedTuple):
@@ -111,6 +128,8 @@ class DesignRow(NamedTuple):
     formula: Formula
     needs: tuple[str, ...] = ()
     event: str = ""
+    loaded: bool = True
+    """Whether one at an event reads the sum of the loads on the output: without any there is none."""
 
 
 class Integral(NamedTuple):
@@ -139,6 +158,96 @@ def check_value(check: Check[Any], name: str, at: Instant) -> Number:
     return check.quantities[name](at.maths, at.pose, at.values, at.given.own[check.name])
 
 
+def squared(name: str) -> str:
+    """Return the name of the square of a quantity that is the size of a vector."""
+    return f"{name}^2"
+
+
+COMPONENTS = ("x", "y")
+"""Of a vector, in the mechanism's axes."""
+
+
+def component(check: Check[Any], name: str, axis: str, at: Instant) -> Number:
+    """Return a component of a vector that a check reads, SI."""
+    return getattr(getattr(at.joints(check), name), axis)
+
+
+def square_of(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return the square of a vector's size, SI."""
+    vector = getattr(at.joints(check), name)
+    return vector.x**2 + vector.y**2
+
+
+def size_of(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return the size of a vector that a check reads, SI."""
+    return at.maths.sqrt(square_of(check, name, at))
+
+
+def scalar_of(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return a scalar that a check reads of the forces in the joints, SI."""
+    return getattr(at.joints(check), name)
+
+
+def work_of(check: Check[Any], name: str, at: Instant) -> Number:
+    """Return the work that a check reads of the forces in the joints, J per rad of the crank."""
+    shares = getattr(at.joints(check), name)
+    return sum((share * _magnitude(check, force, at) for force, share in shares.items()), 0 * at.node.phi)
+
+
+def _magnitude(check: Check[Any], name: str, at: Instant) -> Number:
+    return size_of(check, name, at) if name in check.vectors else at.maths.sqrt(scalar_of(check, name, at) ** 2)
+
+
+SLOWNESS = "slowness"
+"""What the time that the crank takes per angle is called."""
+
+
+def slowness(at: Instant) -> Number:
+    """Return the time that the crank takes per angle, s/rad."""
+    return 1 / at.pose.omega + 0 * at.node.phi
+
+
+def heading_name(part: str, axis: str) -> str:
+    """Return what a component of a part's unit direction is called."""
+    return f"direction of {part}_{axis}"
+
+
+def heading_of(check: Check[Any], part: str, axis: str, at: Instant) -> Number:
+    """Return a component of a part's unit direction, as a check reads it."""
+    return getattr(at.joints(check).heading(part), axis) + 0 * at.node.phi
+
+
+FRAME = "frame"
+"""What does not move, among the parts that a force is between."""
+
+
+def jointed(check: Check[Any], known: Collection[str]) -> dict[str, CycleQuantity]:
+    """Return what a check reads of the forces in the joints; known: names of scene numbers that are given."""
+    found: dict[str, CycleQuantity] = {}
+    lacked = lacking(check, known)
+    for name in (name for name in check.vectors if name not in lacked):
+        square = squared(name)
+        found[name] = CycleQuantity(functools.partial(size_of, check, name), loaded=True, square=square)
+        found[square] = CycleQuantity(functools.partial(square_of, check, name), figure=False, loaded=True)
+        for axis in COMPONENTS:
+            part = functools.partial(component, check, name, axis)
+            found[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
+    for body in {body for name, bodies in check.sides.items() if name not in lacked for body in bodies} - {FRAME}:
+        for axis in COMPONENTS:
+            heading = functools.partial(heading_of, check, body, axis)
+            found[heading_name(body, axis)] = CycleQuantity(heading, figure=False, loaded=True)
+    for name, work in check.worked.items():
+        if name not in lacked:
+            found[work] = CycleQuantity(functools.partial(work_of, check, work), figure=False, loaded=True)
+            found[SLOWNESS] = CycleQuantity(slowness, figure=False)
+    for name in (name for name in check.scalars if name not in lacked):
+        found[name] = CycleQuantity(functools.partial(scalar_of, check, name), signed=name in check.signed, loaded=True)
+        for axis in COMPONENTS if name in check.directed else ():
+            part = functools.partial(component, check, check.directed[name], axis)
+            found[f"{name}_{axis}"] = CycleQuantity(part, figure=False, loaded=True)
+    return found
+
+
 def design_value(formula: Callable[[Maths, Values], Number], at: Instant) -> Number:
     """Return a row of the design alone, SI."""
     return formula(at.maths, at.values)
@@ -162,7 +271,7 @@ def cornered(model: "JobModel", maths: Maths, given: Given) -> list[Cornered]:
     found: list[Cornered] = []
     for arc in (*model.kinematics.arcs, *model.arcs):
         angles = arc.corners(maths, given)
-        found.append(Cornered(angles, arc.switch, angles))
+        found.append(Cornered(angles, arc.switch, arc.parting(maths, given) if arc.parting else angles))
     for load in model.loads:
         if isinstance(load, Load) and load.corners:
             angles = load.corners(maths, given.values, given.own[load.name])
@@ -298,12 +407,12 @@ class JobModel:
     @lazy
     def labels(self) -> dict[str, str]:
         """Full name of every number of the effects' tables → what a designer calls it."""
-        return {owned(effect, key): label(effect, key) for effect in self.effects for key in effect.own.model_fields}
+        return {owned(effect, key): label(effect, key) for effect in self.effects for key in keys(effect.own)}
 
     @lazy
     def _full(self) -> dict[str, dict[str, str]]:
         """Keys of each effect's table with the full names of their numbers."""
-        return {each.name: {key: owned(each, key) for key in each.own.model_fields} for each in self.effects}
+        return {each.name: {key: owned(each, key) for key in keys(each.own)} for each in self.effects}
 
     def words_of(self, effect: str) -> dict[str, str]:
         """Return the words of an effect's table by key."""
@@ -319,6 +428,11 @@ class JobModel:
         """Return the pieces where a whole-cycle quantity is known; empty for all of the cycle."""
         return self.known_in if self._quantities[name].loaded else ()
 
+    def counted(self, cycle: Cycle, name: str, where: Where | None = None) -> NDArray[np.bool_]:
+        """Say of each piece of a cycle, of those `where` alone, whether a quantity is known there and counts."""
+        known, asked = [cycle.on(place) for place in self.known_of(name)], cycle.on(where)
+        return asked & np.any(known, axis=0) if known else asked
+
     # Quantities and rows.
 
     @lazy
@@ -330,6 +444,7 @@ class JobModel:
         for check in self.checks:
             for name in check.quantities:
                 found[name] = CycleQuantity(functools.partial(check_value, check, name))
+            found |= jointed(check, self.known) if check.joints else {}
         if not self.states:
             return found
 
@@ -349,7 +464,7 @@ class JobModel:
 
     def _sufficed(self, row: DesignRow) -> bool:
         known = not self.known or self.known.issuperset(row.needs)
-        return known and (not row.event or any(load.acts == "output" for load in self.loads))
+        return known and (not row.event or not row.loaded or any(load.acts == "output" for load in self.loads))
 
     @lazy
     def events_read(self) -> tuple[str, ...]:
@@ -376,6 +491,10 @@ class JobModel:
         """Whole-cycle quantities whose formulas run on series of balls too: a bound between points is proven."""
         return frozenset(name for name, quantity in self._quantities.items() if quantity.bounded)
 
+    def square(self, name: str) -> str:
+        """Return the quantity that is the square of one which has a corner at 0; "" where there is no need of it."""
+        return self._quantities[name].square
+
     def has_quantity(self, name: str) -> bool:
         """Say whether a name is that of a whole-cycle quantity."""
         return name in self._quantities
@@ -386,12 +505,59 @@ class JobModel:
         turned = {row for effect in self.effects if isinstance(effect, Speed) for row in effect.rows}
         return name in {*self._rows, *means, *turned}
 
+    def event_of(self, name: str) -> str:
+        """Return the event that a row stands at; "" for one of the design alone."""
+        return self._rows[name].event
+
     @lazy
     def assembly(self) -> dict[str, tuple[str, float]]:
         """What says that the mechanism assembles at an angle: phrase → (quantity, the largest |value| it may have)."""
         groups = self.kinematics.groups.items()
         closes = {phrase: (prefix + name, 1.0) for prefix, group in groups for phrase, name in group.closes.items()}
         return closes | dict(self.assembled)
+
+    @lazy
+    def told(self) -> dict[str, str]:
+        """What checks tell over the cycle, each with the figure whose kind it is of; of a vector its components too."""
+        found: dict[str, str] = {}
+        for check in self.checks:
+            lacked = lacking(check, self.known)
+            found |= {name: name for name in check.quantities}
+            for name in (name for name in check.vectors if name not in lacked):
+                found |= {f"{name}_{axis}": name for axis in COMPONENTS} | {name: name}
+            for name in (name for name in check.scalars if name not in lacked):
+                found |= {f"{name}_{axis}": name for axis in COMPONENTS if name in check.directed} | {name: name}
+        return found
+
+    @lazy
+    def sides(self) -> dict[str, tuple[str, str]]:
+        """Forces that checks tell, each with the parts that it is between."""
+        return {name: parts for check in self.checks for name, parts in check.sides.items() if name in self.told}
+
+    @lazy
+    def worked(self) -> dict[str, str]:
+        """Figures of checks that are mean powers, each with the quantity, J/rad, that it is of."""
+        checks = [(check, lacking(check, self.known)) for check in self.checks]
+        return {name: work for check, lacked in checks for name, work in check.worked.items() if name not in lacked}
+
+    @lazy
+    def pushes(self) -> frozenset[str]:
+        """What checks tell over the cycle that is 0 where Q is negative, components of vectors too."""
+        pushed = {name for check in self.checks for name in check.pushes}
+        return frozenset(name for name, figure in (self.told | self._works).items() if figure in pushed)
+
+    @property
+    def _works(self) -> dict[str, str]:
+        return {work: figure for figure, work in self.worked.items()}
+
+    @lazy
+    def undefined(self) -> dict[str, str]:
+        """Figures of checks that have no value, and why, each a sentence without its full stop."""
+        found: dict[str, str] = {}
+        for check in self.checks:
+            for name, missing in lacking(check, self.known).items():
+                found[name] = f"{name} needs {asked(missing, self.known)}"
+        return found
 
     @property
     def demands(self) -> tuple[tuple[Check[Any], Demand], ...]:
@@ -414,6 +580,9 @@ class JobModel:
         for effect, full in self._full.items():
             own[effect] = {key: values[name] for key, name in full.items() if name in values}
             own[effect] |= self.words_of(effect)
+        for each in self.effects:
+            if each.instance:
+                own[each.name]["instance"] = each.instance
         given = Given(values, own, frozenset(values), self.kinematics.linkage(maths, values))
         return given._replace(values={**values, **self.kinematics.derived(maths, given, self.called)})
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from loomopt.base.errors import refusal
 from loomopt.maths import periodic_cubic
-from loomopt.maths.periodic_cubic import PeriodicCubic
-from loomopt.physics.effects.kinds import Load, label, owned
+from loomopt.maths.periodic_cubic import PeriodicCubic, PeriodicCubics
+from loomopt.physics.effects.kinds import Load, keys, label, owned, value_at
 from loomopt.physics.schema import Table
 from loomopt.scenes import csv_tables
 from loomopt.scenes.scene import Scene
@@ -19,7 +19,8 @@ def numbers(scene: Scene) -> dict[str, float]:
     """Return every number of the scene by full name, SI."""
     found = {**scene.mechanism, **scene.operation}
     for effect, own in zip(scene.active, scene.effects.values(), strict=True):
-        for key, value in own.model_dump().items():
+        for key in keys(effect.own):
+            value = value_at(own, key)
             if isinstance(value, float | int):
                 found[owned(effect, key)] = float(value)
     return found
@@ -39,7 +40,7 @@ def words(scene: Scene) -> tuple[tuple[str, str, Any], ...]:
     )
 
 
-def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic]:
+def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic | PeriodicCubics]:
     """Return the curves that the scene's loads are, read from its files, by effect and key. Raises BadInput."""
     on = zip(scene.active, scene.effects.values(), strict=True)
     loads = [(effect, own) for effect, own in on if isinstance(effect, Load) and effect.tabulated]
@@ -47,7 +48,7 @@ def curves(scene: Scene) -> dict[tuple[str, str], PeriodicCubic]:
     return {place: curve for place, curve in found.items() if curve is not None}
 
 
-def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | None:
+def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | PeriodicCubics | None:
     """Return the curve that a load's table names; None where it names none. Raises BadInput."""
     table = load.tabulated
     given = getattr(own, table.key) if table else None
@@ -55,9 +56,10 @@ def _curve(scene: Scene, load: Load[Any], own: Table) -> PeriodicCubic | None:
         return None
     key = ".".join(("effects", *load.path, table.key))
     columns, origin = csv_tables.read(scene, given, key, table.columns, (CORNER,), periodic_cubic.FEWEST)
-    angles, values, marked = columns
+    angles, *values, marked = columns
     try:
-        return periodic_cubic.through(angles, values, tuple(map(bool, marked)))
+        found = tuple(periodic_cubic.through(angles, each, tuple(map(bool, marked))) for each in values)
+        return PeriodicCubics(found) if table.beside else found[0]
     except ValueError as error:
         remedy = f"Correct the table: angles are {table.angle}; a column {CORNER} marks corners with 1"
         raise refusal(f"the table is no curve over one turn: {error}", origin, remedy=remedy) from None
@@ -77,7 +79,7 @@ def bounds(scene: Scene, known: Mapping[str, float]) -> dict[str, tuple[float, f
 
 def labels(scene: Scene) -> dict[str, str]:
     """Return what a designer calls each number of the effects that are on, by its full name."""
-    return {owned(effect, key): label(effect, key) for effect in scene.active for key in effect.own.model_fields}
+    return {owned(effect, key): label(effect, key) for effect in scene.active for key in keys(effect.own)}
 
 
 def told(scene: Scene) -> tuple[str, ...]:

@@ -90,7 +90,7 @@ class Objective(abc.ABC):
 
     def figure_of(self, sampler: Sampler) -> float:
         """Return the figure of a design, SI: with its sign where it is a number of its own."""
-        own = sampler.figures.get(self.figure)
+        own = sampler.figure(self.figure)
         return float(self.merit(sampler) ** (1 / self.power)) if own is None else own
 
     def worsening(self, now: float, then: float, most: bool) -> float:

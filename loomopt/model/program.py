@@ -7,7 +7,7 @@ serves every scene of the same structure.
 import abc
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, NamedTuple
 
 from loomopt.base.records import lazy
@@ -19,6 +19,22 @@ from loomopt.physics.tolerances import FEASIBLE
 
 Numbers = Mapping[str, float]
 LEAST_CHANGE = "least change from today"
+
+
+class Alias(str):
+    """What a program calls something that a designer knows by another name, `of`."""
+
+    of: str
+
+    def __new__(cls, text: str, of: str) -> "Alias":
+        """Return the name."""
+        found = super().__new__(cls, text)
+        found.of = of
+        return found
+
+    def __reduce__(self) -> tuple[type["Alias"], tuple[str, str]]:
+        """Return how to make it again."""
+        return Alias, (str(self), self.of)
 
 
 class Preference(NamedTuple):
@@ -230,6 +246,8 @@ class Program:
     """What the target asks of figures, and may find out of reach."""
     added: Added | None = None
     """What is added as mass, where levels may give way for less of it."""
+    any_numbers: bool = False
+    """Whether its variables are numbers of a person's own, of which some may serve no level."""
 
     @lazy
     def structure(self) -> Hashable:
@@ -241,6 +259,34 @@ class Program:
             tuple(limit.structure for limit in self.limits),
             tuple(objective.structure for objective in self.objectives),
         )
+
+    def backed_off(self, off: Mapping[tuple[str, int], float]) -> "Program":
+        """Return the task with limits tightened; off: name and sign of limits → by how much, SI.
+
+        Bounds of variables that stand for figures, such as a dwell that is kept, move with their limits.
+        """
+        if not off:
+            return self
+
+        def tightened(limit: Limit) -> Limit:
+            by = 0.0 if limit.hidden else off.get((limit.name, limit.sign), 0.0)
+            return replace(limit, value=limit.value - limit.sign * by) if by else limit
+
+        limits = tuple(map(tightened, self.limits))
+        moved = {limit.row for limit, old in zip(limits, self.limits, strict=True) if limit is not old}
+
+        def within(variable: Variable) -> Variable:
+            own = [each for each in limits if isinstance(each, BoundLimit) and each.row == variable.name]
+            if variable.name not in moved or not own:
+                return variable
+            low = max([variable.lower, *(each.value for each in own if each.sign < 0)])
+            high = min([variable.upper, *(each.value for each in own if each.sign > 0)])
+            if variable.lower == variable.upper:
+                low = high = next(each.value for each in own if each.row in moved)
+            around = (low, high) if variable.lower == variable.upper else variable.range
+            return replace(variable, lower=low, upper=high, range=around)
+
+        return replace(self, limits=limits, variables=tuple(map(within, self.variables)))
 
     @lazy
     def excess_places(self) -> dict[int, tuple[int, ...]]:

@@ -1,15 +1,16 @@
-"""What a program's rows are worth at one design, in any number system: the one place that says how each is read."""
+"""What a program's rows are worth at one design or at many, in any number system: the one place that says how."""
 
 import abc
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from loomopt.base.records import lazy
 from loomopt.maths import recording
+from loomopt.maths.jets import Jet
 from loomopt.maths.recording import Bind, Program, Recorded, Tape
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.model import Integral, JobModel, Stills
@@ -230,3 +231,109 @@ class Reading(Rows):
             weighted.append(width * self.at(integral.quantity, int(piece), float(u)))
             widths.append(width)
         return total(weighted) / total(widths)
+
+
+class BatchReading(Reading):
+    """Designs read at once: numbers are (designs,), whole-cycle quantities (nodes, designs).
+
+    values: the scene's numbers, any of them (designs,); cycle, stills: of one design, which order their corners.
+    """
+
+    def __init__(
+        self, model: JobModel, maths: Maths, values: Mapping[str, Number], cycle: Cycle, stills: Stills
+    ) -> None:
+        super().__init__(model, maths, model.given(maths, values), cycle, stills)
+        self.values = values
+        self.count = max(np.size(plain(value)) for value in values.values())
+        self._looked: tuple[Pieces, dict[str, Number]] = np.zeros(0, dtype=np.intp), {}
+
+    def node(self, pieces: Pieces, u: Floats) -> Node:
+        """Return nodes (pieces, u), each (nodes,), of all designs; their angles (nodes, 1) where no corner moves."""
+        begin, end = self._begun(pieces), self._begun(pieces + 1)
+        switch = {name: column[:, None] for name, column in self.cycle.switch(pieces).items()}
+        return Node(begin + u[:, None] * (end - begin), switch)
+
+    def own_node(self, pieces: Pieces, u: Floats) -> Node:
+        """Return a node (pieces, u) of each design, its own; pieces: (designs,), u: (…, designs)."""
+        every = np.arange(self.count)
+        starts = np.broadcast_to(self._starts, (len(self._starts), self.count))
+        begin, end = starts[pieces, every], starts[pieces + 1, every]
+        return Node(begin + u * (end - begin), self.cycle.switch(pieces))
+
+    def of(self, places: Pieces) -> "BatchReading":
+        """Return some of the designs, by their places; one may be there several times."""
+        values = {name: value[places] if np.ndim(value) else value for name, value in self.values.items()}
+        return BatchReading(self.model, self.maths, values, self.cycle, self.stills)
+
+    def _begun(self, pieces: Pieces) -> Number:
+        """Return where pieces begin, rad, (pieces, designs), or (pieces, 1) where no design has its own."""
+        return self._starts[pieces]
+
+    @lazy
+    def _starts(self) -> Number:
+        if not any(np.ndim(plain(start)) or isinstance(start, Jet) for start in self.starts):
+            return np.array(self.starts, dtype=np.float64)[:, None]
+        return _stacked([wide(start, self.count) for start in self.starts])
+
+    def quantities(self, names: Sequence[str], node: Node) -> dict[str, Number]:
+        """Return whole-cycle quantities (nodes, designs) at nodes, their poses computed once for all."""
+        read = self.model.together(self.maths, self.given, node)
+        shape = np.broadcast_shapes(np.shape(plain(node.phi)), (self.count,))
+        return {name: _shaped(read(name), shape) for name in names}
+
+    def look(self, names: Sequence[str], pieces: Pieces, u: Floats) -> None:
+        """Look at quantities at nodes (pieces, u) of the whole cycle, their poses computed once for all."""
+        self._looked = pieces, self.quantities(names, self.node(pieces, u))
+
+    def highest(self, name: str, where: Where | None = None) -> Number:
+        """Return the largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
+        pieces, looked = self._looked
+        values, signed = looked[name], name in self.model.signed
+        on = np.flatnonzero(self.model.counted(self.cycle, name, where)[pieces])
+        known = plain(values)[on]
+        heights = known if signed else np.abs(known)
+        top = on[np.argmax(np.where(np.isfinite(heights), heights, np.inf), axis=0)]
+        highest = values[top, np.arange(known.shape[1])]
+        return highest if signed else np.where(plain(highest) < 0.0, -1.0, 1.0) * highest
+
+    def mean(self, integral: Integral) -> Number:
+        """Return a mean by its rule, all nodes of all designs at once, (designs,), SI."""
+        name = integral.quantity
+        if integral.angles:
+            node = Node(np.array(integral.angles)[:, None], {DATUM: np.array(integral.data)[:, None]})
+            return _total(self.quantities((name,), node)[name]) / len(integral.angles)
+        pieces, u, weights = quadrature(self.cycle, integral)
+        widths = weights[:, None] * (self._begun(pieces + 1) - self._begun(pieces))
+        return _total(widths * self.quantities((name,), self.node(pieces, u))[name]) / _total(widths)
+
+
+def plain(value: Number) -> Number:
+    """Return a number's value without its derivatives."""
+    return value.v if isinstance(value, Jet) else value
+
+
+def wide(value: Number, count: int) -> Number:
+    """Return a number of all of so many designs, (designs,)."""
+    return _shaped(value, (count,))
+
+
+def _shaped(value: Number, shape: tuple[int, ...]) -> Number:
+    """Return a number, or a jet, in full shape."""
+    if not isinstance(value, Jet):
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
+    width = value.g.shape[-1]
+    return Jet(np.broadcast_to(value.v, shape), np.broadcast_to(value.g, (*shape, width)))
+
+
+def _stacked(numbers: Sequence[Number]) -> Number:
+    """Return numbers (designs,) as one, (numbers, designs)."""
+    if not any(isinstance(number, Jet) for number in numbers):
+        return np.array(numbers)
+    width = next(number.g.shape[-1] for number in numbers if isinstance(number, Jet))
+    slopes = [number.g if isinstance(number, Jet) else np.zeros((len(number), width)) for number in numbers]
+    return Jet(np.array([plain(number) for number in numbers]), np.array(slopes))
+
+
+def _total(values: Number) -> Number:
+    """Return the sum over the nodes, (designs,)."""
+    return Jet(values.v.sum(axis=0), values.g.sum(axis=0)) if isinstance(values, Jet) else values.sum(axis=0)

@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -105,8 +106,15 @@ class Sampler:
     @lazy
     def figures(self) -> dict[str, float]:
         """Static figures, the model's means over parts of the cycle, and their roots."""
-        means = [name for integral in self.model.integrals for name in (integral.name, integral.root)]
-        return self.static | {name: self.single(name) for name in means}
+        return self.static | {name: self.single(name) for name in self._means}
+
+    def figure(self, name: str) -> float | None:
+        """Return one of the figures, SI; None for what is none of them."""
+        return self.single(name) if name in self.static or name in self._means else None
+
+    @lazy
+    def _means(self) -> tuple[str, ...]:
+        return tuple(name for integral in self.model.integrals for name in (integral.name, integral.root))
 
     def read(self, system: systems.Maths) -> Reading:
         """Return the design in another number system."""
@@ -181,10 +189,13 @@ class Sampler:
         on = self.on(name, where)
         return [e for e in found if on[e.piece]]
 
+    def knows(self, name: str) -> bool:
+        """Say whether the extremes of a quantity have been found already."""
+        return name in self._extremes
+
     def on(self, name: str, where: Where | None = None) -> NDArray[np.bool_]:
         """Say of each piece, of those `where` alone, whether a quantity is known there and counts."""
-        known, asked = [self.cycle.on(place) for place in self.model.known_of(name)], self.cycle.on(where)
-        return asked & np.any(known, axis=0) if known else asked
+        return self.model.counted(self.cycle, name, where)
 
     def search(self, names: Iterable[str]) -> None:
         """Find the extremes of several quantities in one pass, so that they need not be looked for one by one."""
@@ -202,6 +213,22 @@ class Sampler:
             if self.singular:
                 found += self._spikes(name)
             self._extremes[name] = sorted(found, key=lambda extreme: -extreme.height)
+
+    def share(self) -> None:
+        """Take the extremes that were found of this design just now under fewer or other names of its numbers.
+
+        What they were read from are numbers that are the same here, to the last bit and the sign of a zero.
+        """
+        for other in self.session.every(SAMPLERS):
+            if isinstance(other, Sampler) and other is not self and self._holds(other):
+                self._extremes = {**other._extremes, **self._extremes}
+
+    def _holds(self, other: "Sampler") -> bool:
+        """Say whether all that another sampler knows of its design is known here, and is the same."""
+        if other.model is not self.model or other.samples != self.samples:
+            return False
+        mine = self.given.values
+        return all(_is_same(mine.get(name), value) for name, value in other.given.values.items())
 
     def _peaks(self, size: Floats) -> Pieces | None:
         """Return where heights on the sampler's own grid are locally largest; None where one is no number."""
@@ -248,8 +275,12 @@ class Sampler:
         return found
 
     def at_angles(self, name: str, angles: Floats) -> Floats:
-        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves."""
+        """Return a quantity at crank angles, rad, as they are: a spike may be narrower than u resolves.
+
+        Those of another turn are told as of the cycle's own: a cam's formulas hold on the turn that it begins.
+        """
         self.session.positions += len(angles)
+        angles = angles - TURN * np.floor((angles - self.cycle.starts[0]) / TURN)
         node = Node(angles, self.cycle.switch(self.cycle.located(angles)[0]))
         with np.errstate(invalid="ignore", divide="ignore"):
             (values,) = self.quantities((name,), node)
@@ -314,6 +345,15 @@ class Sampler:
         """Return the largest |quantity| (of a signed one, value) over the cycle or the pieces `where`, SI; else 0."""
         return max((extreme.height for extreme in self.extremes(name, where)), default=0.0)
 
+    def pushed(self, name: str) -> float:
+        """Return the largest |quantity| where Q is not negative, SI; of what only pushes that is its peak."""
+        found = [each for each in self.extremes(name) if each.height > 0.0]
+        if not found:
+            return 0.0
+        node = self.node(np.array([each.piece for each in found]), np.array([each.u for each in found]))
+        force = np.asarray(self.model.instant(systems.numpy(), self.given, node).force)
+        return max((each.height for each, own in zip(found, force, strict=True) if own >= 0.0), default=0.0)
+
     def mean(self, integral: Integral) -> float:
         """Return the mean of an integral's quantity over its pieces, or at its own angles, SI."""
         if integral.angles:
@@ -321,12 +361,26 @@ class Sampler:
             return float(np.mean(self.quantities((integral.quantity,), node)[0]))
         pieces, u, weights = quadrature(self.cycle, integral)
         widths = np.diff(self.cycle.starts)[pieces] * weights
-        return float(np.dot(widths, self.at(integral.quantity, pieces, u)) / np.sum(widths))
+        values = self.at(integral.quantity, pieces, u)
+        if integral.quantity in self.model.pushes:
+            values = np.where(self._pushing(pieces, u), values, 0.0)
+        return float(np.dot(widths, values) / np.sum(widths))
+
+    def _pushing(self, pieces: Pieces, u: Floats) -> NDArray[np.bool_]:
+        """Say where Q is not negative."""
+        force = self.model.instant(systems.numpy(), self.given, self.node(pieces, u)).force
+        return np.broadcast_to(np.asarray(force) >= 0.0, u.shape)
 
 
-SAMPLERS, KEPT = "samplers", 32
+def _is_same(one: Number, other: Number) -> bool:
+    """Say whether two numbers are the same float, to the sign of a zero."""
+    floats = isinstance(one, float) and isinstance(other, float)
+    return floats and one == other and math.copysign(1.0, one) == math.copysign(1.0, other)
+
+
+SAMPLERS, KEPT = "samplers", 128
 """What a session calls samplers, and how many it keeps: more than the designs that one start, its silent levels and its
-certificate look at."""
+certificate look at, and those of all designs that are certified together."""
 
 
 def sampled(model: JobModel, values: Mapping[str, float], samples: int = SAMPLES) -> Sampler:
@@ -351,7 +405,7 @@ class _SampledRows(Rows):
         self.sampler = sampler
 
     def _value(self, name: str) -> Number:
-        static = self.sampler.static
+        static = self.sampler.__dict__.get("static", {})
         return static[name] if name in static else super()._value(name)
 
     def highest(self, name: str, where: Where | None = None) -> float:

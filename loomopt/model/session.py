@@ -50,13 +50,18 @@ class Session:
                 found[key] = make()
             return cast(Made, found[key])
 
+    def every(self, what: str) -> list[object]:
+        """Return all that are kept of one sort, the one used least recently first."""
+        return list(self._kept.get(what, {}).values())
+
     def count(self, what: str) -> int:
         """Return how many are kept."""
         return len(self._kept.get(what, ()))
 
-    def forget(self, what: str) -> None:
-        """Let go of all that is kept of one sort."""
-        self._kept.pop(what, None)
+    def forget(self, *sorts: str) -> None:
+        """Let go of all that is kept of these sorts."""
+        for what in sorts:
+            self._kept.pop(what, None)
 
 
 OF_PROCESS = Session()

@@ -8,11 +8,15 @@ Only loads that stand in the scene are in the sums. Each term is written in its 
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from loomopt.base.records import lazy
 from loomopt.maths.systems import Maths, Number
-from loomopt.physics.effects.kinds import Load, Motion, State
+from loomopt.physics.effects.kinds import Applied, LinkMass, Load, Motion, State
 from loomopt.physics.schema import Values
+
+if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.dyad import Vector
 
 Acting = Load[Any] | State
 
@@ -60,6 +64,10 @@ def terms(
         own = given.own[load.name]
         if isinstance(load, State):
             yield load, load.force(maths, pose, given.values, own, replied(maths, load, loads, pose, given, switch))
+        elif load.upon:
+            others = [each for each in loads if each is not load]
+            loaded = Loaded(maths, others, pose, given, switch)
+            yield load, load.upon(maths, pose, given.values, own, switch.get(load.name, 0), loaded)
         else:
             yield load, load.force(maths, pose, given.values, own, switch.get(load.name, 0))
 
@@ -104,3 +112,89 @@ def crank_torque(maths: Maths, loads: Sequence[Acting], pose: Motion, given: Giv
     output = [term for load, term in found if load.acts == "output"]
     drive = [term for load, term in found if load.acts == "drive"]
     return total([total(output) * pose.q1, *drive] if output else drive)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What acts on a mechanism at one instant, for whoever reads the forces in its joints; each when first read."""
+
+    maths: Maths
+    loads: Sequence[Acting]
+    pose: Motion
+    given: Given
+    switch: Values
+
+    @lazy
+    def terms(self) -> Sequence[tuple[Acting, Number]]:
+        """Each load with its term, as if all moved with the output."""
+        return list(terms(self.maths, self.loads, self.pose, self.given, self.switch))
+
+    @lazy
+    def force(self) -> Number:
+        """Q, N or N·m."""
+        gone = carried(self.loads)
+        return total([term for load, term in self.terms if load.acts == "output" and load.name not in gone])
+
+    @lazy
+    def carried(self) -> Motion:
+        """The motion of what moves with the output; where a state carries that, its own."""
+        state = next((load for load in self.loads if isinstance(load, State) and load.moved), None)
+        if state is None or state.moved is None:
+            return self.pose
+        values, own = self.given.values, self.given.own
+        reply = replied(self.maths, state, self.loads, self.pose, self.given, self.switch)
+        coordinate = state.coordinate(self.maths, self.pose, values, own[state.name], reply)
+        moving = [(load, term) for load, term in self.terms if load.name in state.carries and isinstance(load, Load)]
+        inertia = total([load.moved(values, own[load.name]) for load, _ in moving if load.moved])
+        pushed = total([term for load, term in moving if not load.moved])
+        acceleration = (self.force - pushed) / inertia
+        found: Motion = state.moved(self.pose, own[state.name], coordinate, self.force, acceleration)
+        return found
+
+    @lazy
+    def masses(self) -> Sequence[tuple[LinkMass, Motion]]:
+        """What the loads move, each with its motion."""
+        return masses(self.maths, self.loads, self.given, (self.pose, self.carried))
+
+    @lazy
+    def pushes(self) -> "Sequence[Vector]":
+        """Forces on the output's link itself, N."""
+        return pushes(self.maths, self.terms, self.given, (self.pose, self.carried))
+
+    @lazy
+    def applied(self) -> Sequence[Applied]:
+        """Forces on links and joints by name."""
+        found: list[Applied] = []
+        for load in (load for load in self.loads if isinstance(load, Load) and load.applied):
+            own, switch = self.given.own[load.name], self.switch.get(load.name, 0)
+            assert load.applied is not None
+            found += load.applied(self.maths, self.pose, self.given.values, own, switch)
+        return found
+
+
+def masses(
+    maths: Maths, loads: Sequence[Acting], given: Given, motions: tuple[Motion, Motion]
+) -> list[tuple[LinkMass, Motion]]:
+    """Return what loads move, inertia alone where one tells no mass; motions: the output's, and of what is carried."""
+    found = []
+    gone, values = carried(loads), given.values
+    for load in (load for load in loads if isinstance(load, Load)):
+        own, motion = given.own[load.name], motions[load.name in gone]
+        if load.mass:
+            found.append((load.mass(maths, values, own), motion))
+        elif load.moved:
+            found.append((LinkMass("", 0, 0, 0, load.moved(values, own)), motion))
+    return found
+
+
+def pushes(
+    maths: Maths, terms: Sequence[tuple[Acting, Number]], given: Given, motions: tuple[Motion, Motion]
+) -> "list[Vector]":
+    """Return the forces that loads tell of their terms, N; motions: the output's, and of what is carried."""
+    found = []
+    gone = carried([load for load, _ in terms])
+    for load, term in terms:
+        if isinstance(load, Load) and load.push:
+            push = load.push(maths, motions[load.name in gone], given.values, given.own[load.name], term)
+            found += [] if push is None else [push]
+    return found

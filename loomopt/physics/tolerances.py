@@ -85,10 +85,10 @@ FLAT = 1e-7
 """Curvature, and slope of a touching row, that counts as none: ACTIVE's effect on a slope, where curvature is 1."""
 
 JET_ERROR, DOUBT = 1e-10, 10.0
-"""Error of jets, relative to the largest derivative of a row where that exceeds 1: a hundred times what is seen. 1500
-certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 6e-13 (see
-test_derivatives_jets.py). And the factor from its threshold within which a figure that decides is looked at again in
-40 digits."""
+"""Error of jets, relative to the largest derivative of a row where that exceeds 1: eighty times what is seen. 1500
+certificates of adversaries and hard cases show 2e-13, rapier drives beside their optimum 1.2e-12, where an extreme is
+read 6e-13 beside its place (see test_derivatives_jets.py). And the factor from its threshold within which a figure that
+decides is looked at again in 40 digits."""
 
 CORRECTIONS, PRECISE = 4, 1e-9
 """Newton's steps after a solve, each of which doubles the digits (1e-6 needs two), and the residual that ends them."""

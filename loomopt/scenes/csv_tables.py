@@ -11,7 +11,7 @@ from typing import NamedTuple
 from loomopt.base.errors import BadInput, near_file, refusal
 from loomopt.base.quantities import is_beyond, plain_number
 from loomopt.base.units import DISPLAY_UNIT, QuantityError, factor, fits
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Scene, reads
 
 LARGEST_FILE, FEWEST_ROWS, MOST_ROWS = 1_000_000, 8, 2000
 UNITS = {
@@ -45,15 +45,31 @@ def read(
     given: the file as the scene names it, under `key`; kinds: column name → kind of quantity; marks: columns without a
     unit that may be there, 1 (or x) in the rows that are meant, 0 in all without one; fewest: rows there must be.
     """
+    rows = _named(scene, given, key, header(kinds))
+    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+
+
+def columns(scene: Scene, given: str, key: str, allowed: str) -> tuple[str, ...]:
+    """Return the names of a table's columns that have a unit; allowed: the header it should have. Raises BadInput.
+
+    given: the file as the scene names it, under `key`.
+    """
+    rows = _named(scene, given, key, allowed)
+    found = [_HEADING.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
+    return tuple(heading[1] for heading in found if heading)
+
+
+def _named(scene: Scene, given: str, key: str, allowed: str) -> list[list[str]]:
+    """Return the cells of a file that a scene names, or that came with it, row by row. Raises BadInput."""
     held = scene.paths.text(key)
+    reads(scene, given)
 
     def raw() -> bytes:
         if held is not None:
             return held.encode()
         return _bytes(scene.paths.located(given, key, scene.origin), given, scene.origin, key)
 
-    rows = _rows(raw, given, header(kinds))
-    return [*_columns(rows, kinds, given, fewest), *(_marked(rows, name, given) for name in marks)], given
+    return _rows(raw, given, allowed)
 
 
 def measured(path: Path, kinds: Mapping[str, str]) -> dict[str, tuple[float, ...]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from loomopt.base.errors import BadInput, Faults, clean, misread, near_file, refusal, shown, unknown
-from loomopt.base.quantities import Quantity, described, quantity_of
+from loomopt.base.quantities import Quantity, described, quantities_of, quantity_of
 from loomopt.base.records import Frozen
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, show
 from loomopt.physics.effects.kinds import label
@@ -140,6 +140,11 @@ def checked(data: object, scene: Scene, origin: str = "<design>") -> dict[str, f
         listed = next((lists[of] for of in lists if _place(str(name), of) is not None), None)
         if listed:
             kinds[name] = listed
+        of, member, _ = str(name).partition("[")
+        if member and of in kinds:
+            problem = f"{of} is of one member of a family, and this takes one machine"
+            remedy = "Give members[0].design of the answer, or another's, with that member's numbers set"
+            raise refusal(problem, origin, f"design.{name}", remedy=remedy)
         if name not in kinds:
             raise unknown("design variable", str(name), [*kinds, *lists], origin, f"design.{name}")
         design[name] = _read(value, kinds[name], origin, f"design.{name}")
@@ -176,8 +181,8 @@ def _largest(scene: Scene, name: str, kind: str) -> float:
     """Return how large a number without a unit may be before it is taken for one in another unit than SI."""
     if kind not in MEANT:
         return LARGEST
-    quantities = {key: quantity_of(scene.schema.mechanism, key) for key in scene.mechanism}
-    sizes = [abs(scene.mechanism[key]) for key, quantity in quantities.items() if quantity and quantity.kind == kind]
+    quantities = quantities_of(scene.schema.mechanism)
+    sizes = [abs(scene.mechanism[key]) for key in scene.mechanism if quantities[key].kind == kind]
     known = 2 * math.pi if kind == "angle" else OUTGROWN * max(sizes, default=LARGEST)
     bound = scene.bounds.get(name)
     return max(known, abs(bound.min), abs(bound.max)) if bound else known
@@ -210,7 +215,7 @@ def _numbers(scene: Scene) -> dict[str, Quantity]:
     """Return what kind of quantity each number of a scene is that a design may hold."""
     found: dict[str, Quantity | None] = {}
     for model in (scene.schema.mechanism, scene.schema.operation):
-        found |= {name: quantity_of(model, name) for name in model.model_fields}
+        found |= quantities_of(model)
     for effect in scene.active:
         found |= {label(effect, key): quantity_of(effect.own, key) for key in effect.own.model_fields}
     first = {name: found[name] for name in scene.schema.variables}
@@ -396,7 +401,8 @@ def document_values(document: Mapping[str, Any]) -> Iterator[tuple[str, object]]
     """Yield what decides an answer, and how it is shown, by dotted key; values of effects that are on or off alike."""
     if (name := looked_up(document, ("problem", "name"))) is not None:
         yield "problem.name", name
-    for table in ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets"):
+    own = ("operation", "mechanism", "available", "effects", "bounds", "limits", "display", "targets")
+    for table in (*own, *(name for name in document if name not in ("problem", *own))):
         whole = "effects" if table == "available" else table
         for parts, value in _leaves(document.get(table, {})):
             if table != "targets" or "expected" not in parts:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from loomopt.base.errors import Faults, misread, refusal, unknown
-from loomopt.base.quantities import misfit, quantity_of, unit_of
+from loomopt.base.quantities import misfit, quantities_of, unit_of
 from loomopt.base.units import DISPLAY_UNIT, SI_UNIT, QuantityError, ascii_unit, fits, parse_unit
 from loomopt.physics.effects.kinds import Effect
 from loomopt.physics.schema import Table
@@ -89,9 +89,9 @@ def _written(
     ]
     tables += [(("effects", *effect.path), effect.own) for effect in active]
     for path, own in tables:
-        for key in own.model_fields:
-            quantity, text = quantity_of(own, key), looked_up(document, (*path, key))
-            if quantity and isinstance(text, str):
+        for key, quantity in quantities_of(own).items():
+            text = looked_up(document, (*path, *key.split(".")))
+            if isinstance(text, str):
                 yield quantity.kind, unit_of(text)
     bounds, limits = ranges
     yield from ((schema.variables[name], bound.unit) for name, bound in bounds.items() if name in schema.variables)

@@ -4,13 +4,16 @@ import contextlib
 import re
 from collections.abc import Iterator, Mapping
 from decimal import Decimal, localcontext
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from loomopt.base.errors import BadInput, refusal, unknown
 from loomopt.base.quantities import Quantity, plain_number, quantity_of
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.schema import Table
 from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from loomopt.scenes.sizes import Sizes
 
 WITHOUT_FILES = ("problem", "display")
 """Tables whose texts are never names of files."""
@@ -44,7 +47,8 @@ def _quantities(scene: Scene) -> Iterator[tuple[str, Quantity]]:
     for effect in scene.active:
         for key, found in _fields(effect.own):
             yield ".".join(("effects", *effect.path, key)), found
-            labels.setdefault(label(effect, key), found)
+            if getattr(scene.effects[effect.name], key) is not None:
+                labels.setdefault(label(effect, key), found)
     for name, target in schema.targets.items():
         for key, found in _fields(target.own):
             yield f"targets.{name}.{key}", found
@@ -144,3 +148,16 @@ def range_ends(text: str, key: str) -> tuple[str, str]:
 
 def _refused(problem: str, key: str, text: str, remedy: str = "Correct the range", allowed: str = _ALLOWED) -> BadInput:
     return refusal(problem, "", key, text, allowed, remedy)
+
+
+def sizes(scene: Scene) -> "Sizes":
+    """Return what a scene says of sizes that can be ordered. Raises BadInput."""
+    from loomopt.base.errors import Faults
+    from loomopt.scenes import sizes as ordered
+    from loomopt.scenes import tables
+
+    on, faults = dict(zip(scene.active, scene.effects.values(), strict=True)), Faults()
+    places = list(tables.places(scene.schema, scene.tables, on, {}))
+    found = ordered.read(scene.document, scene.schema, places, scene.origin, faults)
+    faults.tell()
+    return found

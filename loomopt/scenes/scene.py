@@ -1,9 +1,9 @@
 """A scene: one loom job with its numbers, checked and in SI; every change of it is a new scene."""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 from loomopt.base import arguments
 from loomopt.base.errors import MACHINE, SAME, BadInput, Faults, clean, nearest, refusal, shown, unknown
@@ -18,8 +18,12 @@ from loomopt.scenes.document import Paths, copied, looked_up, removed, replaced
 from loomopt.scenes.tables import Bound, JobNames, LimitRange, SceneSchema
 
 _Own = TypeVar("_Own", bound=Table)
+_Made = TypeVar("_Made")
 
-TABLES = ("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "display", "targets")
+TABLES = (
+    *("problem", "operation", "mechanism", "effects", "available", "bounds", "limits", "tolerances", "accept"),
+    *("steps", "stock", "display", "targets"),
+)
 
 _KEY = "a dotted key", 'Write "operation.M0"'
 _SI = "an SI unit", 'Write "N*m"'
@@ -154,17 +158,32 @@ class Scene(Shown):
         """Return the table of an effect that is on, by the model of its values; None where it is off."""
         return next((table for table in self.effects.values() if isinstance(table, model)), None)
 
+    @lazy
+    def _kept(self) -> dict[Hashable, object]:
+        """What was made of it, by what that is."""
+        return {}
+
+    @lazy
+    def _files(self) -> list[str]:
+        """Files that were read for it by now: they may change, where it does not."""
+        return []
+
     def table(self, model: type[_Own]) -> _Own:
         """Return [operation], [mechanism] or the table of a target, by its model."""
         return next(each for each in (*self.tables.values(), *self.targets.values()) if isinstance(each, model))
 
     def full(self, name: str) -> str:
-        """Return the full name of a number by what a designer calls it; any other name is one already."""
+        """Return the full name of a number by what a designer calls it; any other name is one already.
+
+        Where effects that are on have numbers of one name, it is the first that is given.
+        """
         arguments.text(name, "name", "the name of a number", 'Write "l1"')
         if name in self.mechanism or name in self.operation:
             return name
-        labels = {label(e, key): owned(e, key) for e in reversed(self.active) for key in e.own.model_fields}
-        return labels.get(name, name)
+        tables = [(effect, self.effects[effect.name]) for effect in self.active]
+        called = [(e, key, own) for e, own in tables for key in e.own.model_fields if label(e, key) == name]
+        called.sort(key=lambda found: getattr(found[2], found[1]) is None)
+        return owned(*called[0][:2]) if called else name
 
     def given(self, key: str) -> str | None:
         """Return the raw text of a dotted key such as "mechanism.l1"; None for a table or nothing."""
@@ -320,24 +339,26 @@ class Scene(Shown):
             "operation": self.tables["operation"].model_dump(exclude_none=True),
             "mechanism": self.tables["mechanism"].model_dump(exclude_none=True),
             "effects": {
-                effect.name: own.model_dump(exclude=_no_curve(effect, own))
+                effect.name: own.model_dump(exclude_none=True)
                 for effect, own in zip(self.active, self.effects.values(), strict=True)
             },
             "bounds": {name: (bound.min, bound.max, bound.free) for name, bound in self.bounds.items()},
             "limits": {name: (limit.min, limit.max) for name, limit in self.limits.items()},
             "targets": {name: _deciding(own) for name, own in self.targets.items()},
+            **{name: self.document.get(name, {}) for name in self.schema.tables},
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
 
     def _path(self, key: str) -> list[str]:
         """Return the names of a dotted key."""
         parts = key.split(".")
-        if all(parts) and (len(parts) > 1 or key in TABLES):
+        known = (*TABLES, *self.schema.tables)
+        if all(parts) and (len(parts) > 1 or key in known):
             return parts
         problem = f"unknown table {shown(key)}" if len(parts) == 1 else "a name in the key is empty"
         meant = " or ".join(self._keys_of(key)) if len(parts) == 1 else ""
         remedy = f"Name the table too: {meant}" if meant else "Name the table and the key, such as operation.M0"
-        raise refusal(problem, self.origin, key, allowed=", ".join(TABLES), remedy=remedy)
+        raise refusal(problem, self.origin, key, allowed=", ".join(known), remedy=remedy)
 
     def _keys_of(self, name: str) -> list[str]:
         """Return the dotted keys under which what a designer calls so may stand."""
@@ -369,12 +390,6 @@ class Scene(Shown):
         return name.split(".")
 
 
-def _no_curve(effect: Effect, own: Table) -> set[str]:
-    """Return the key of a curve that an effect's table could name and does not."""
-    curve = effect.tabulated if isinstance(effect, Load) else None
-    return {curve.key} if curve and getattr(own, curve.key) is None else set()
-
-
 def _stood_for(effect: Effect | None, key: list[str]) -> tuple[str, ...]:
     """Return the keys of an effect's table that say otherwise what the one that is set says."""
     curve = effect.tabulated if isinstance(effect, Load) else None
@@ -404,19 +419,19 @@ def build(
     that were read. Raises BadInput that names all that is wrong, the worst first.
     """
     original, faults = copied(document, origin), Faults()
-    raw: dict[str, Any] = {name: {} for name in TABLES} | original
-    for name in original:
-        if name not in TABLES:
-            faults.add(unknown("table", name, TABLES, origin, name, given=original))
-            near = nearest(name, TABLES, original, SAME)
-            raw |= {near: original[name]} if near not in original else {}
+    raw = _meant(original, TABLES)
     problem = read.problem(raw["problem"], jobs, origin, faults)
     named = [name for table in ("effects", "available") if isinstance(raw[table], Mapping) for name in raw[table]]
     try:
         schema = jobs.schema(problem.job, original, named)
     except BadInput as error:
-        faults.add(error)
+        faults.add(error.placed(origin, original))
         raise faults.told() from None
+    known = (*TABLES, *schema.tables)
+    raw = _meant(original, known)
+    for name in original:
+        if name not in known:
+            faults.add(unknown("table", name, known, origin, name, given=original))
     tables = {
         "operation": read.checked(schema.operation, raw["operation"], origin, "operation", faults),
         "mechanism": read.checked(schema.mechanism, raw["mechanism"], origin, "mechanism", faults),
@@ -448,6 +463,15 @@ def build(
         paths=paths or Paths(),
         call=call or Call(),
     )
+    if raw["tolerances"] or raw["accept"]:
+        from loomopt.scenes import tolerances
+
+        tolerances.read(raw["tolerances"], schema, places, origin, faults)
+        tolerances.accepted(raw["accept"], schema, origin, faults)
+    if raw["steps"] or raw["stock"]:
+        from loomopt.scenes import sizes
+
+        sizes.read(raw, schema, places, origin, faults)
     if _judged(scene, faults):
         try:
             jobs.check(scene)
@@ -457,6 +481,16 @@ def build(
                 faults.add(fault)
     faults.tell()
     return scene
+
+
+def _meant(original: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
+    """Return raw tables, empty ones too; one whose name nobody knows stands for the near one that is not there."""
+    raw: dict[str, Any] = {name: {} for name in known} | dict(original)
+    for name in original:
+        if name not in known:
+            near = nearest(name, known, original, SAME)
+            raw |= {near: original[name]} if near not in original else {}
+    return raw
 
 
 def _judged(scene: Scene, faults: Faults) -> bool:
@@ -480,5 +514,23 @@ def given(table: Table) -> dict[str, Any]:
 
 
 def _numbers(table: Table) -> dict[str, float]:
-    """Return the numbers of a table that are given or defaulted."""
-    return {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}
+    """Return the numbers of a table that are given or defaulted; of a table inside it as "table.key"."""
+    found = {name: value for name, value in table if isinstance(value, float) and not math.isnan(value)}
+    for name, inner in table:
+        found |= {f"{name}.{key}": value for key, value in _numbers(inner).items()} if isinstance(inner, Table) else {}
+    return found
+
+
+def kept(scene: Scene, key: Hashable, make: Callable[[], _Made]) -> _Made:
+    """Return what is made of a scene, kept with it by a key: made once, unless files are read for the scene."""
+    if key in scene._kept:
+        return cast(_Made, scene._kept[key])
+    found = make()
+    if not scene._files:
+        scene._kept[key] = found
+    return found
+
+
+def reads(scene: Scene, file: str) -> None:
+    """Note that a file is read for a scene."""
+    scene._files.append(file)

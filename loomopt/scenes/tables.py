@@ -25,10 +25,10 @@ from loomopt.base.errors import (
     shown,
     unknown,
 )
-from loomopt.base.quantities import Quantity, quantity_of, unit_of
+from loomopt.base.quantities import Quantity, quantities_of, unit_of
 from loomopt.base.records import lazy
 from loomopt.base.units import QuantityError, ShowValue
-from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label, needed, required
+from loomopt.physics.effects.kinds import Check, Effect, Event, Load, Speed, instance, label, model_of, needed, required
 from loomopt.physics.schema import Axis, Conflict, Figure, Sense, Table, Target
 
 
@@ -46,6 +46,7 @@ class SceneSchema:
     partly_known: whether the job honours loads that are known on some pieces of the cycle only.
     parts: whether the job honours effects by which the output may part from the mechanism.
     lists: parts of a design that are lists of numbers → their kind of quantity; inside, NAME_0, NAME_1 ...
+    tables: names of further tables, which the job reads and checks itself, in its `schema` of the raw scene.
     instead: keys of [mechanism] → those that each stands for: a scene gives it, or them.
     own_axes: axes that are read otherwise than under their own name.
     conflict: the two axes whose front stands among the reference results, for the scene that is named after its job.
@@ -68,6 +69,7 @@ class SceneSchema:
     partly_known: bool = False
     parts: bool = False
     own_axes: Mapping[str, Axis] = field(default_factory=dict)
+    tables: tuple[str, ...] = ()
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     conflict: Conflict | None = None
 
@@ -96,8 +98,12 @@ class SceneSchema:
         return found
 
 
+FAMILY = "family"
+"""What the target of several machines at once is called in every job."""
+
 _Model = TypeVar("_Model", bound=Table)
 _NAME = re.compile(r"[^\W_][\w-]{0,63}")
+_ENDS = {"min", "max", "free"}
 _TAKEN = {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in "0123456789¹²³")}
 """Names that Windows keeps for its devices."""
 
@@ -262,7 +268,11 @@ def effects(raw: object, schema: SceneSchema, origin: str, path: str, faults: Fa
             if not effect.many:
                 found[effect] = _checked_effect(effect, given[name], origin, f"{path}.{name}", faults)
                 continue
-            for each, values in table(given[name], origin, f"{path}.{name}").items():
+            instances = dict(table(given[name], origin, f"{path}.{name}"))
+            if effect.alone and not all(isinstance(values, Mapping) for values in instances.values()):
+                own = {key: instances.pop(key) for key in list(instances) if not isinstance(instances[key], Mapping)}
+                found[effect.alone] = _checked_effect(effect.alone, own, origin, f"{path}.{name}", faults)
+            for each, values in instances.items():
                 key = f"{path}.{name}.{each}"
                 found[instance(effect, each)] = _checked_effect(effect, values, origin, key, faults)
     return found
@@ -308,6 +318,8 @@ def demand(
             problem = f"{key} and {', '.join(given)} say the same twice"
             remedy = f"Take {key} out, or {', '.join(given)}"
             faults.add(refusal(problem, origin, f"mechanism.{key}", remedy=remedy))
+    for effect, own_values in active.items():
+        _modelled(effect, own_values, origin, faults)
     if any(effect.beside or effect.clashes for effect in active):
         _combined(active, origin, faults)
     for effect, own in active.items():
@@ -318,6 +330,19 @@ def demand(
             problem = f"effect {effect.name} is known in part of the cycle only, which job {schema.name} cannot judge"
             remedy = "Take it off, or choose other values"
             faults.add(refusal(problem, origin, f"effects.{effect.name}", remedy=remedy))
+
+
+def _modelled(effect: Effect, own: Table, origin: str, faults: Faults) -> None:
+    """Find where an effect lacks a number of its model, or has one of another."""
+    path, found = f"effects.{effect.name}", model_of(effect, own)
+    for key in found.keys:
+        if getattr(own, key) is None:
+            faults.add(missing(effect.own, origin, path, key))
+    for word, other in effect.models.items():
+        for key in set(other.keys) - {*found.keys, *found.may}:
+            if getattr(own, key) is not None:
+                problem, remedy = f"{key} is of model {word}", f'Write model = "{word}", or take {key} out'
+                faults.add(refusal(problem, origin, f"{path}.{key}", remedy=remedy))
 
 
 def _combined(active: Mapping[Effect, Table], origin: str, faults: Faults) -> None:
@@ -344,19 +369,52 @@ def places(
 
 
 def _places(path: str, model: type[Table], own: Table | None) -> Iterator[Place]:
-    for key in model.model_fields:
-        quantity = quantity_of(model, key)
-        if quantity:
-            yield Place(path, key, key, quantity, own is not None and getattr(own, key) is not None)
+    for key, quantity in quantities_of(model).items():
+        yield Place(path, key, key, quantity, own is not None and value_of(own, key) is not None)
+
+
+def value_of(own: Table, key: str) -> object:
+    """Return a value of a table; of one inside it by "table.key"; None where it is not given."""
+    found: object = own
+    for name in key.split("."):
+        found = getattr(found, name, None)
+    return found
 
 
 def flat(raw: Mapping[str, Any], known: Iterable[str]) -> dict[str, Any]:
-    """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m"."""
-    found: dict[str, Any] = {}
+    """Return a table whose keys are labels, which TOML parts at their dots: [bounds.rod] m is "rod.m".
+
+    Beside what is of a label itself may stand what is of longer ones: mass.max, and mass.rod.mass.max. A key beside
+    known ones that begin alike is one too: of rod.m a slip is rod.n, not rod.
+    """
+    names, found = set(known), dict[str, Any]()
+    begun = {name[:place] for name in names for place, sign in enumerate(name) if sign == "."}
     for name, value in raw.items():
-        inner = {f"{name}.{key}": each for key, each in value.items()} if isinstance(value, Mapping) else {}
-        found |= inner if name not in known and inner.keys() & set(known) else {name: value}
+        for called, each in _parted(name, value, names, begun):
+            found[called] = _together(found.get(called), each)
     return found
+
+
+def _together(one: object, other: object) -> object:
+    """Return what two entries of one label say: both where they are tables, else the later one."""
+    return {**one, **other} if isinstance(one, Mapping) and isinstance(other, Mapping) else other
+
+
+def _parted(name: str, value: object, known: Collection[str], begun: Collection[str]) -> Iterator[tuple[str, Any]]:
+    """Yield what of a table's entry is of which label; the entry itself where no part of it is of a longer one.
+
+    begun: what stands before a dot of a known label.
+    """
+    if not isinstance(value, Mapping):
+        yield name, value
+        return
+    slips = value.keys() - _ENDS if name not in known and name in begun else ()
+    inner = [key for key in value if key in slips or f"{name}.{key}" in known or f"{name}.{key}" in begun]
+    own = {key: each for key, each in value.items() if key not in inner}
+    if own or not inner:
+        yield name, own
+    for key in inner:
+        yield from _parted(f"{name}.{key}", value[key], known, begun)
 
 
 def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, faults: Faults) -> dict[str, Bound]:
@@ -365,9 +423,13 @@ def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, fa
     A bound on a number of an effect that is off waits for it: it is checked and left out.
     """
     found = {}
-    given_bounds: Mapping[str, Any] = {}
+    given_bounds: dict[str, Any] = {}
     with faults:
-        given_bounds = flat(table(raw, origin, "bounds"), [*schema.variables, *(place.label for place in known)])
+        labels = {f"{place.table}.{place.key}".removeprefix("effects."): place.label for place in known}
+        whole = flat(table(raw, origin, "bounds"), [*schema.variables, *labels, *labels.values()])
+        for name, value in whole.items():
+            called = name if name in schema.variables else labels.get(name, name)
+            given_bounds[called] = _together(given_bounds.get(called), value)
     missed = {fault.key for fault in faults.found}
     for name, each in given_bounds.items():
         if f"mechanism.{name}" in missed:
@@ -375,16 +437,21 @@ def bounds(raw: object, schema: SceneSchema, known: list[Place], origin: str, fa
         with faults:
             waiting = [p for p in known if p.label == name and p.waits]
             given = any(place.label == name and place.given for place in known)
-            quantity = waiting[0].quantity if waiting and not given else _bounded(name, schema, known, origin)
-            bound = _bound(each, quantity, origin, f"bounds.{name}")
+            key = f"bounds.{name}"
+            quantity = waiting[0].quantity if waiting and not given else bounded(name, schema, known, origin, key)
+            bound = _bound(each, quantity, origin, key)
             if given or not waiting:
                 found[name] = bound
     return found
 
 
-def _bounded(name: str, schema: SceneSchema, known: list[Place], origin: str) -> Quantity:
-    """Return what a number to bound may be: a design variable, or the one number of that name."""
-    key = f"bounds.{name}"
+def bounded(
+    name: str, schema: SceneSchema, known: list[Place], origin: str, key: str, what: str = "number to bound"
+) -> Quantity:
+    """Return what a number to bound may be: a design variable, or the one number of that name; what: it is for.
+
+    Raises BadInput.
+    """
     found = [place for place in known if place.label == name]
     given = [place for place in found if place.given]
     if name in schema.variables:
@@ -392,13 +459,13 @@ def _bounded(name: str, schema: SceneSchema, known: list[Place], origin: str) ->
         return next((place.quantity for place in found if place.table == "mechanism"), kind)
     if not found:
         names = [*schema.variables, *sorted({place.label for place in known if place.given} - set(schema.variables))]
-        raise unknown("number to bound", name, names, origin, key)
+        raise unknown(what, name, names, origin, key)
     if not given:
         where = " or ".join(f"{place.table}.{place.key}" for place in found)
-        raise refusal(f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take the bound out")
+        raise refusal(f"{name} has no value in this scene", origin, key, remedy=f"Give {where}, or take {key} out")
     if len(given) > 1:
         where = ", ".join(f"{place.table}.{place.key}" for place in given)
-        raise refusal(f"{name} may mean {where}", origin, key, remedy="Take the bound out")
+        raise refusal(f"{name} may mean {where}", origin, key, remedy=f"Take {key} out")
     return given[0].quantity
 
 
@@ -436,13 +503,23 @@ def limits(
     found = {}
     for name in (name for name in given_limits if name in limitable):
         with faults:
-            for other, effect in schema.effects.items():
-                given = isinstance(effect, Check | Speed) and name in {*getattr(effect, "quantities", ()), *effect.rows}
-                if given and other not in on:
-                    remedy = f"Put {other} on, or take the limit out"
-                    raise refusal(f"effect {other} is off: it gives {name}", origin, f"limits.{name}", remedy=remedy)
+            givers = [other for other, effect in schema.effects.items() if name in _told_by(effect)]
+            if givers and not on.intersection(givers):
+                off = (
+                    f"effect {givers[0]} is off: it" if len(givers) == 1 else f"effects {' and '.join(givers)} are off:"
+                )
+                problem = f"{off} gives {name}" if len(givers) == 1 else f"{off} each of them gives {name}"
+                remedy = f"Put {' or '.join(givers)} on, or take the limit out"
+                raise refusal(problem, origin, f"limits.{name}", remedy=remedy)
             found[name] = _limit(given_limits[name], schema.figures[name], name, origin)
     return found
+
+
+def _told_by(effect: Effect) -> Collection[str]:
+    """Return the figures that an effect gives by rows or over the cycle."""
+    if isinstance(effect, Check):
+        return {*effect.over_cycle, *effect.rows}
+    return effect.rows if isinstance(effect, Speed) else ()
 
 
 def _limit(raw: object, figure: Figure, name: str, origin: str) -> LimitRange:

@@ -8,13 +8,15 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 from loomopt.base.units import ShowValue
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.schema import Figure, Table, Values
 
 if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.chain import Chain
+    from loomopt.physics.mechanisms.dyad import Vector
     from loomopt.physics.motion.flight import Cam, Course
     from loomopt.physics.motion.free import Body
     from loomopt.physics.motion.turning import Turning
@@ -54,6 +56,64 @@ class Force(Protocol[Pose]):
 
     def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, switch: Number, /) -> Number:
         """Return the term, N or N·m."""
+
+
+class PushFormula(Protocol[Pose]):
+    """push(maths, pose, given, own, term): the force itself that a load's term is the moment, or the work, of."""
+
+    def __call__(self, maths: Maths, pose: Pose, given: Values, own: Values, term: Number, /) -> "Vector | None":
+        """Return it in the mechanism's axes, N; None where the table does not tell it."""
+
+
+class LinkMass(NamedTuple):
+    """What a load moves of one rigid link, by its joint nearest the drive or the frame; numbers of one system.
+
+    link: as the mechanism calls it; mass: kg; along, across: mass times the way from that joint to its centre, kg·m,
+    along the link and to its left; second: inertia about the joint, kg·m².
+    """
+
+    link: str
+    mass: Number
+    along: Number
+    across: Number
+    second: Number
+
+
+class Applied(NamedTuple):
+    """A load: on a link, on a joint or on the slider of a part; its force, N, at a place, m, and its couple, N·m.
+
+    place: None for a joint's own; inertial: whether it is what a mass resists with.
+    """
+
+    on: str
+    force: "Vector | None" = None
+    place: "Vector | None" = None
+    couple: Number | None = None
+    inertial: bool = False
+
+
+class Loading(Protocol):
+    """What acts on a mechanism at one instant, for a check that reads the forces in its joints."""
+
+    @property
+    def force(self) -> Number:
+        """Q, N or N·m: what the mechanism must supply at its output."""
+
+    @property
+    def carried(self) -> Number:
+        """Motion of what moves with the output; where a state carries that, its own."""
+
+    @property
+    def masses(self) -> "Sequence[tuple[LinkMass, Any]]":
+        """What the loads move, each with its motion."""
+
+    @property
+    def pushes(self) -> "Sequence[Vector]":
+        """Forces on the output's link itself, N."""
+
+    @property
+    def applied(self) -> Sequence[Applied]:
+        """Forces on links and joints by name."""
 
 
 class ResponseFormula(Protocol[Pose]):
@@ -99,6 +159,30 @@ class Demand(NamedTuple):
     value: float | str
 
 
+class FlatNumber(NamedTuple):
+    """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
+
+    name: str
+    key: str
+
+
+class ModelNeeds(NamedTuple):
+    """What an effect needs with one word of its key `model`: keys of its table, scene keys, design variables.
+
+    may: keys of its table that it may have too.
+    """
+
+    keys: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    may: tuple[str, ...] = ()
+
+
+def model_of(effect: "Effect", own: Table) -> ModelNeeds:
+    """Return what an effect needs with the model that its table names; nothing where it has one model only."""
+    return effect.models.get(str(getattr(own, "model", "")), ModelNeeds())
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Effect:
     """What all kinds declare.
@@ -110,7 +194,11 @@ class Effect:
     examples: tables it may have, as a scene writes them, for tests and templates.
     letters: keys of its table → their symbols in equations, a key's own name without one.
     figures, margins: numbers a designer reads of it, and what every design keeps while it is on (phrase → kind).
+    least: what a job makes least where its own target leaves room: a key of its table, or of a check one of its rows.
+    axes: numbers of its table that may change nothing.
+    models: what it needs with each word of its key `model`, which its numbers differ by.
     many: whether the table holds one table for each of several instances; kind, instance: of one of them its table.
+    alone: of such an effect what values mean that stand in its table by themselves; None where that is a mistake.
     """
 
     name: str
@@ -125,9 +213,13 @@ class Effect:
     letters: Mapping[str, str] = field(default_factory=dict)
     figures: tuple[Figure, ...] = ()
     margins: Mapping[str, str] = field(default_factory=dict)
+    least: str = ""
+    axes: tuple[FlatNumber, ...] = ()
+    models: Mapping[str, ModelNeeds] = field(default_factory=dict)
     many: bool = False
     kind: str = ""
     instance: str = ""
+    alone: "Effect | None" = None
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -140,7 +232,8 @@ class LoadTable(NamedTuple):
 
     column, kind: what of the file is the curve, and its kind of quantity; angle: what its angles count from, in words.
     instead: keys of the effect's table that it stands for; needless: of what the effect needs, what it does without.
-    Its words (`own[key]` of the formulas) are the curve itself, a `PeriodicCubic`.
+    beside: another column of the file, of the same kind, with which the first one makes a vector.
+    Its words (`own[key]` of the formulas) are the curve itself, a `PeriodicCubic`, or the vector's `PeriodicCubics`.
     """
 
     column: str
@@ -149,26 +242,30 @@ class LoadTable(NamedTuple):
     instead: tuple[str, ...]
     needless: tuple[str, ...] = ()
     key: str = "table"
+    beside: str = ""
 
     @property
     def columns(self) -> dict[str, str]:
         """Columns of the file, with their kinds of quantity."""
-        return {"angle": "angle", self.column: self.kind}
+        return {"angle": "angle", self.column: self.kind} | ({self.beside: self.kind} if self.beside else {})
 
 
 def needed(effect: "Effect", own: Table) -> tuple[str, ...]:
     """Return the scene keys that an effect needs with the values of its table."""
     table = effect.tabulated if isinstance(effect, Load) else None
     given = table is not None and getattr(own, table.key) is not None
-    return tuple(key for key in effect.needs if not (given and table and key in table.needless))
+    own_needs = (*effect.needs, *model_of(effect, own).needs)
+    return tuple(key for key in own_needs if not (given and table and key in table.needless))
 
 
 def required(effect: "Effect") -> tuple[str, ...]:
     """Return the keys of an effect's table without which it is none, those that a curve may stand for included."""
     table = effect.tabulated if isinstance(effect, Load) else None
     for_curve = table.instead if table else ()
-    fields = effect.own.model_fields.items()
-    return tuple(key for key, info in fields if info.is_required() or (key in for_curve and info.default is None))
+    fields = effect.own.model_fields
+    usual = effect.models.get(str(fields["model"].default), ModelNeeds()) if effect.models else ModelNeeds()
+    asked = {*for_curve, *usual.keys}
+    return tuple(key for key, info in fields.items() if info.is_required() or (key in asked and info.default is None))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,14 +278,19 @@ class Load(Effect, Generic[Pose]):
     holds at a crank angle inside a piece, as a number the force is handed.
     response: what an oscillator that carries the load makes of it; one with corners cannot be carried without.
     known_in(words): where the term is known, by the words of its table; empty for all over the cycle.
+    upon(maths, pose, given, own, switch, loading): the term instead, where it depends on what all others do.
     moved(given, own): the inertia, kg·m² or kg, that it adds to what moves with the output.
     symbol: what its column of the curves is called, its name without one.
     told: switch → where that formula holds, in words for its equation; by its corners without them.
     tabulated: the curve of one's own that it may be; None for none.
+    mass(maths, given, own): what it moves of one link; push: the force on the output's link that its term is of;
+    applied(maths, pose, given, own, switch): its forces on links and joints, where those have names. All of them are
+    read where forces in joints are asked for, and nowhere else.
     """
 
     acts: Literal["output", "drive"]
     force: Force[Pose]
+    upon: "Callable[[Maths, Pose, Values, Values, Number, Loading], Number] | None" = None
     corners: Corners | None = None
     switch: Callable[[float, tuple[float, ...]], float] = constant_switch
     known_in: Callable[[Mapping[str, str]], tuple[Place, ...]] = nothing_unknown
@@ -197,13 +299,14 @@ class Load(Effect, Generic[Pose]):
     symbol: str = ""
     told: Mapping[float, str] = field(default_factory=dict)
     tabulated: LoadTable | None = None
+    mass: Callable[[Maths, Values, Values], LinkMass] | None = None
+    push: PushFormula[Pose] | None = None
+    applied: Callable[[Maths, Pose, Values, Values, Number], Sequence[Applied]] | None = None
 
-
-class FlatNumber(NamedTuple):
-    """A number of an effect's table that may change nothing, and then stays nearest to today's; name: as settled."""
-
-    name: str
-    key: str
+    def __post_init__(self) -> None:
+        """Raise ValueError for what no job could make least."""
+        if self.least and self.least not in self.own.model_fields:
+            raise ValueError(f"effect {self.name}: {self.least} is no key of the table")
 
 
 def nothing_sold(own: Any) -> Mapping[str, Sequence[float]]:
@@ -233,8 +336,19 @@ class Check(Effect, Generic[Pose]):
 
     quantities: name → value(maths, pose, given, own) over the cycle; the figure is the largest |value|.
     rows: name → value(maths, given, own) of the design alone; demands: what rows or quantities must keep while it is
-    on. least: the row that a job makes least where its own target leaves room. axes: numbers that may change nothing.
+    on.
     sold(own): numbers of its table that come in sizes → those sold, SI, ascending.
+    joints(maths, pose, given, own, loading): an object whose attributes are read by their names: `vectors`, whose size
+    is the quantity and whose components stand beside it, and `scalars`; wanted: which of them, or of the quantities,
+    needs scene keys, and has no value without; between: what acts on links by their mass, told apart in equations;
+    sides: force → the parts that it is between, of the first on the second one, "frame" for what does not move; their
+    unit directions are what `heading(part)` of the object returns.
+    directed: scalars that are sizes of a vector, each with the attribute that is it: its components are told too.
+    signed: scalars of which the largest value counts; pushes: those that are 0 where Q is negative: contact is lost
+    there. worked: figure, a mean power over a turn → what of them tells by each vector's name the work of
+    its size, per rad of the crank.
+    The same name in two checks is the same quantity. fitted(chain): the check of a linkage of one's own;
+    said: its equations in words, where the symbols of a pose do not tell its links.
     remark(given, own, shown): what to know beside its figures, "" for nothing, in the reader's units.
     explain(known, bounds, own, clash, shown): what physics says of why limits (names) clash, in the reader's units.
     """
@@ -242,28 +356,44 @@ class Check(Effect, Generic[Pose]):
     quantities: Mapping[str, ReadingFormula[Pose]] = field(default_factory=dict)
     rows: Mapping[str, Callable[[Maths, Values, Values], Number]] = field(default_factory=dict)
     demands: tuple[Demand, ...] = ()
-    least: str = ""
-    axes: tuple[FlatNumber, ...] = ()
     sold: Callable[[Any], Mapping[str, Sequence[float]]] = nothing_sold
+    joints: Callable[[Maths, Pose, Values, Values, Loading], Any] | None = None
+    vectors: tuple[str, ...] = ()
+    scalars: tuple[str, ...] = ()
+    sides: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    directed: Mapping[str, str] = field(default_factory=dict)
+    signed: tuple[str, ...] = ()
+    pushes: tuple[str, ...] = ()
+    worked: Mapping[str, str] = field(default_factory=dict)
+    wanted: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    fitted: "Callable[[Chain], Check[Any]] | None" = None
+    between: tuple[str, ...] = ()
+    said: str = ""
     remark: Callable[[Values, Values, ShowValue], str] = nothing_remarked
     explain: Callable[
         [Mapping[str, float], Mapping[str, tuple[float, float]], Any, Collection[str], ShowValue], str
     ] = nothing_explained
 
+    @property
+    def over_cycle(self) -> tuple[str, ...]:
+        """Figures that are the largest |value| of something over the cycle."""
+        return (*self.quantities, *self.vectors, *self.scalars)
+
     def __post_init__(self) -> None:
         """Raise ValueError for what no job could keep."""
         sides = {figure.name: figure.sides for figure in self.figures}
-        faults = [f"quantity {name} is no figure" for name in self.quantities if name not in sides]
-        faults += [f"quantity {name} has no least" for name in self.quantities if "min" in sides.get(name, ())]
+        faults = [f"quantity {name} is no figure" for name in self.over_cycle if name not in sides]
+        faults += [f"mean power {name} is no figure" for name in self.worked if name not in sides]
+        faults += [f"quantity {name} has no least" for name in self.over_cycle if "min" in sides.get(name, ())]
         for demand in self.demands:
-            if demand.row in self.quantities and demand.sign <= 0:
+            if demand.row in self.over_cycle and demand.sign <= 0:
                 faults.append(f"quantity {demand.row} has no least")
-            if demand.row not in {*self.quantities, *self.rows}:
+            if demand.row not in {*self.over_cycle, *self.rows}:
                 faults.append(f"{demand.row} is neither a quantity nor a row")
             if isinstance(demand.value, str) and demand.value not in self.own.model_fields:
                 faults.append(f"{demand.value} is no key of the table")
-        if self.least and self.least not in self.rows:
-            faults.append(f"{self.least} is no row")
+        if self.least and self.least not in {*self.rows, *self.own.model_fields}:
+            faults.append(f"{self.least} is neither a row nor a key of the table")
         if faults:
             raise ValueError(f"effect {self.name}: {faults[0]}")
 
@@ -291,6 +421,7 @@ class State(Effect):
     fixed(given, own, carried): words that choose formulas at a design, in floats; `own` has those of its neighbours, if
     any, and what serves them is kept. Raises UnsteadyError.
     samples(given, own): of one turn, from which extremes are refined.
+    moved(pose, own, coordinate, force, acceleration): the motion of what it carries, whose q¨ is known already.
     peaks: figure → what it is of; columns: of the curves, with unit → what is read.
     motion(written, own): both sides of its equation of motion; term(written, own): `force` in the same symbols.
     between: the symbols that z is the difference of, what moves first. rests(own): what neither proofs nor studies of
@@ -308,6 +439,7 @@ class State(Effect):
     oscillator: "Callable[[Maths, Values, Values], SteadyOscillator]" = no_oscillator
     fixed: "Callable[[Values, Values, Carried], Mapping[str, str]]" = lambda given, own, carried: {}
     samples: Callable[[Values, Values], float] = lambda given, own: 0.0
+    moved: Callable[[Motion, Values, Number, Number, Number], Any] | None = None
     peaks: Mapping[str, StatePeak] = field(default_factory=dict)
     columns: "Mapping[str, Callable[[Moved], Number]]" = field(default_factory=dict)
     acts: Literal["output"] = "output"
@@ -453,9 +585,48 @@ class Replied(Protocol):
         """Return the value, SI."""
 
 
+@functools.lru_cache(maxsize=256)
+def keys(table: type[Table]) -> tuple[str, ...]:
+    """Return the keys of a table's values, those of the tables inside it dotted."""
+    found: list[str] = []
+    for key, info in table.model_fields.items():
+        kinds = (info.annotation, *get_args(info.annotation))
+        inner = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Table)), None)
+        found += [f"{key}.{each}" for each in keys(inner)] if inner else [key]
+    return tuple(found)
+
+
+def value_at(table: Table, key: str) -> object:
+    """Return a table's value by a dotted key; None where it, or the table that it would stand in, is not given."""
+    found: object = table
+    for part in key.split("."):
+        found = None if found is None else getattr(found, part)
+    return found
+
+
 def owned(effect: Effect, key: str) -> str:
     """Return the full name of a number of an effect's table, unique in a scene."""
     return f"{effect.name}.{key}"
+
+
+def lacking(check: Check[Any], known: Collection[str]) -> dict[str, tuple[str, ...]]:
+    """Return the figures of a check that have no value, each with the scene keys that it needs and that are missing.
+
+    known: names of scene numbers that are given; empty for all of them.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for name, keys in check.wanted.items():
+        missing = tuple(key for key in keys if known and key.split(".", 1)[1] not in known)
+        found |= {name: missing} if missing else {}
+    return found
+
+
+def asked(missing: Collection[str], known: Collection[str]) -> str:
+    """Return scene keys in words; of a table within an effect's table that gives nothing the table alone."""
+    given = {tuple(name.split(".")[:2]) for name in known}
+    cut = {key: key.split(".") for key in missing}
+    named = (".".join(parts[: len(parts) if tuple(parts[1:3]) in given else 3]) for parts in cut.values())
+    return " and ".join(dict.fromkeys(named))
 
 
 def label(effect: Effect, key: str) -> str:
@@ -464,12 +635,16 @@ def label(effect: Effect, key: str) -> str:
 
 
 @functools.cache
-def of(package: str) -> Mapping[str, Effect]:
-    """Return the effects that the modules of a package declare as EFFECT, by name, the lowest rank first."""
+def of(package: str, variant: str = "EFFECT") -> Mapping[str, Effect]:
+    """Return the effects that the modules of a package declare as EFFECT, by name, the lowest rank first.
+
+    variant: another name under which a module may declare it, or None where it then has no effect.
+    """
     folder = importlib.import_module(package)
     names = [found.name for found in pkgutil.iter_modules(folder.__path__)]
     modules = [importlib.import_module(f"{package}.{name}") for name in names]
-    return ranked(module.EFFECT for module in modules if hasattr(module, "EFFECT"))
+    found = (getattr(module, variant, module.EFFECT) for module in modules if hasattr(module, "EFFECT"))
+    return ranked(effect for effect in found if effect is not None)
 
 
 class Fault(NamedTuple):

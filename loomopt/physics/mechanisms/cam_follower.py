@@ -66,6 +66,11 @@ class Contact:
         """Angle b between arm and centre line, rad."""
         return self.phi + self.follower.start_angle(self.maths)
 
+    @property
+    def sides(self) -> tuple[Number, Number]:
+        """Tangent d(centre)/dθ, m: along the arm (from roller to pivot) and across it."""
+        return self._local
+
     @lazy
     def _local(self) -> tuple[Number, Number]:
         """Tangent d(centre)/dθ, m: along the arm (from roller to pivot) and across it."""
@@ -110,6 +115,14 @@ class Contact:
         """
         along, across = self._local
         return self.maths.atan2(-across, along)
+
+    @lazy
+    def rolling(self) -> Number:
+        """How a roller that does not slip turns on its arm, per rad of the cam.
+
+        On a cam at rest it turns by its centre's way over its radius, and its arm goes round with it.
+        """
+        return self.speed / self.follower.roller_radius - (1 + self.phi_1)
 
     @lazy
     def curvature(self) -> Number:

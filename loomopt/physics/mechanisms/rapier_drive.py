@@ -20,7 +20,7 @@ from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.mechanisms import crank_rocker, dyad
 from loomopt.physics.mechanisms.crank_rocker import Lengths
-from loomopt.physics.mechanisms.dyad import Vector, dot
+from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
 
 
 @dataclass(frozen=True)
@@ -242,11 +242,35 @@ class RapierPose:
         return self.maths.atan2(angle.x, -self.stand.mirror * angle.y)
 
     @lazy
+    def _along(self) -> Vector:
+        """Unit vector A0→B0."""
+        return polar(self.maths, 1, self.stand.frame_angle)
+
+    def _placed(self, vector: Vector) -> Vector:
+        """Return a vector of the sley four-bar in the drive's axes."""
+        along = self._along
+        return Vector(vector.x * along.x - vector.y * along.y, vector.x * along.y + vector.y * along.x)
+
+    @lazy
+    def main_shaft(self) -> Vector:
+        """Where A0 is, m, from B0."""
+        return Vector(-self.dimensions.l71 * self._along.x, -self.dimensions.l71 * self._along.y)
+
+    @lazy
+    def main_crank(self) -> Vector:
+        """Vector A0→A, m."""
+        return self._placed(self.four_bar.crank)
+
+    @lazy
+    def sley_dyad(self) -> Dyad:
+        """Rod (A→B1) and sley (B0→B1)."""
+        found = self.four_bar.dyad
+        return Dyad(self._placed(found.link1), self._placed(found.link2), found.area4)
+
+    @lazy
     def joints(self) -> dict[str, Vector]:
         """Every joint by the paper's name, m, from B0."""
-        d, along = self.dimensions, polar(self.maths, 1, self.stand.frame_angle)
-        A0, crank = Vector(-d.l71 * along.x, -d.l71 * along.y), self.four_bar.crank
-        pin = Vector(crank.x * along.x - crank.y * along.y, crank.x * along.y + crank.y * along.x)
+        d, A0, pin = self.dimensions, self.main_shaft, self.main_crank
         return {
             "A0": A0,
             "A": Vector(A0.x + pin.x, A0.y + pin.y),

@@ -1,23 +1,31 @@
 """Friction in the rocking shaft's bearings: Coulomb and viscous.
 
-Output term T_c sgn q˙ + c q˙. The Coulomb torque jumps at both dead centres; there it may be any value in [−T_c, T_c],
-and both one-sided values are shown. The crank turns forward, so sgn q˙ depends on the crank angle alone.
+Output term T_c sgn q˙ + c q˙; with model "load" T_c = μ r |F_D|, F_D the force in the joint D. The Coulomb torque jumps
+at both dead centres; there it may be any value in [−T_c, T_c], and both one-sided values are shown. The crank turns
+forward, so sgn q˙ depends on the crank angle alone.
 """
+
+from typing import Literal
 
 from pydantic import Field
 
-from loomopt.base.quantities import RotaryDamping, Torque
+from loomopt.base.quantities import PositiveLength, PureNumber, RotaryDamping, Torque
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import Load, Loading, ModelNeeds
 from loomopt.physics.schema import Table, Values
 
 
 class Own(Table):
     """Values of the friction."""
 
-    coulomb: Torque = Field(description="constant friction torque of the rocking shaft, T_c")
-    viscous: RotaryDamping = Field(description="friction torque per angular speed, c")
+    coulomb: Torque | None = Field(None, description="constant friction torque of the rocking shaft, T_c")
+    viscous: RotaryDamping | None = Field(None, description="friction torque per angular speed, c")
+    mu: PureNumber | None = Field(None, description="coefficient of friction of its bearings, with their load")
+    radius: PositiveLength | None = Field(None, description="radius of its journals")
+    model: Literal["constant", "load"] = Field(
+        "constant", description="a constant torque, or one that grows with the force in the bearings"
+    )
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
@@ -33,8 +41,31 @@ def switch(angle: float, corners: tuple[float, ...]) -> float:
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
-    """Return T_c sgn q˙ + c q˙, N·m."""
-    return own["coulomb"] * switch + own["viscous"] * pose.velocity
+    """Return T_c sgn q˙ + c q˙, N·m; with the load T = μ r |F_D| where the force is known by its name."""
+    if own.get("model") != "load":
+        return own["coulomb"] * switch + own["viscous"] * pose.velocity
+    friction = own["mu"] * own["radius"] * given["force_D"] * switch
+    return friction + own["viscous"] * pose.velocity if "viscous" in own else friction
+
+
+def upon(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number, loading: Loading) -> Number:
+    """Return the term, N·m; with the load in closed form, for the force in D that friction itself adds to.
+
+    F_D = H + T e, T = a |F_D|, a = μ r, e = −sgn q˙ r1/(r1 × r2), H what all else gives: one root, while a |e| < 1.
+    """
+    if own.get("model") != "load":
+        return force(maths, pose, given, own, switch)
+    from loomopt.physics.effects.beatup.joint_forces import CrankRockerForces
+    from loomopt.physics.mechanisms.dyad import Vector, dot
+
+    found = CrankRockerForces(maths, pose, given, loading)
+    share, dyad = own["mu"] * own["radius"], found.linkage.dyad
+    across, H = Vector(-2 * dyad.link1.x / dyad.area4, -2 * dyad.link1.y / dyad.area4), found.force_D
+    drag = own["viscous"] * pose.velocity if "viscous" in own else None
+    H = H if drag is None else Vector(H.x + drag * across.x, H.y + drag * across.y)
+    along, left = switch * dot(H, across) * share, 1 - share**2 * dot(across, across)
+    torque = share * (along + maths.sqrt(along**2 + left * dot(H, H))) / left
+    return torque * switch if drag is None else torque * switch + drag
 
 
 EFFECT = Load(
@@ -45,6 +76,11 @@ EFFECT = Load(
     rank=70,
     acts="output",
     force=force,
+    upon=upon,
+    models={
+        "constant": ModelNeeds(("coulomb", "viscous")),
+        "load": ModelNeeds(("mu", "radius"), ("mechanism.m4", "mechanism.r4"), ("m4e", "r4e"), ("viscous",)),
+    },
     needs=("operation.speed",),
     reads=("front dead centre", "rear dead centre"),
     corners=corners,

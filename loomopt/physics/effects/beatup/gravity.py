@@ -9,7 +9,8 @@ from pydantic import Field
 from loomopt.base.quantities import Angle
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import LinkMass, Load
+from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.schema import Table, Values
 
 STANDARD_GRAVITY = 9.80665
@@ -29,6 +30,19 @@ def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Numb
     return -STANDARD_GRAVITY * moment * maths.cos(own["offset"] + own["tilt"] - pose.q)
 
 
+def push(maths: Maths, pose: ReedPose, given: Values, own: Values, term: Number) -> Vector:
+    """Return the weight of reed and counterweight, N; x along the line from A to D."""
+    weight = STANDARD_GRAVITY * (given["m4"] + given["m4e"])
+    return Vector(-weight * maths.sin(own["tilt"]), -weight * maths.cos(own["tilt"]))
+
+
+def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+    """Return reed and counterweight, whose centre lies aside of the rocker's line."""
+    moment = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
+    aside = maths.cos(own["offset"]), maths.sin(own["offset"])
+    return LinkMass("reed", given["m4"] + given["m4e"], moment * aside[0], moment * aside[1], 0)
+
+
 EFFECT = Load(
     name="gravity",
     summary="weight of reed system and counterweight",
@@ -37,6 +51,8 @@ EFFECT = Load(
     rank=60,
     acts="output",
     force=force,
+    mass=mass,
+    push=push,
     reads=("m4e", "r4e"),
     needs=("mechanism.m4", "mechanism.r4"),
     examples=({"tilt": "-67 deg", "offset": "0 deg"},),

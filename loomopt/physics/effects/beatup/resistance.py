@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from loomopt.base.quantities import PulseAngle
+from loomopt.base.quantities import Angle, PositiveLength, PulseAngle
 from loomopt.maths.periodic_cubic import TURN, PeriodicCubic, interval_at
-from loomopt.maths.systems import Maths, Number
+from loomopt.maths.systems import Maths, Number, within_turn
 from loomopt.physics.effects.beatup import ReedPose
 from loomopt.physics.effects.kinds import Load, LoadTable
+from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.schema import Table, Values
 
 if TYPE_CHECKING:
@@ -29,6 +30,10 @@ class Own(Table):
     table: str | None = Field(
         None, description="CSV file of M_R instead: angle [deg] from front dead centre, M [N*m], corner"
     )
+    reach: PositiveLength | None = Field(
+        None, description="distance from the rocking shaft D at which the cloth pushes, for the force there"
+    )
+    reach_angle: Angle | None = Field(None, description="angle of that place from the rocker's line D to C, 0 without")
 
 
 def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
@@ -50,7 +55,20 @@ def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Numb
     """Return M_R, N·m."""
     if "table" in own:
         return own["table"].at(maths, pose.phi - given["beta"], switch)
-    return switch * given["M0"] * maths.cos(maths.pi * (pose.phi - given["beta"]) / own["pulse"])
+    return switch * given["M0"] * maths.cos(maths.pi * _from_front(maths, pose, given, switch) / own["pulse"])
+
+
+def _from_front(maths: Maths, pose: ReedPose, given: Values, switch: Number) -> Number:
+    """Return φ−β on any turn, rad: inside the pulse from −π to π, outside from 0 to 2π, so that it jumps in neither."""
+    return within_turn(maths, pose.phi - given["beta"], switch / 2)
+
+
+def push(maths: Maths, pose: ReedPose, given: Values, own: Values, term: Number) -> Vector | None:
+    """Return the force of the cloth on the reed, N, across the line from D to where it pushes; None: a couple."""
+    if "reach" not in own:
+        return None
+    size, angle = term / own["reach"], own.get("reach_angle", 0) - pose.q
+    return Vector(-size * maths.sin(angle), size * maths.cos(angle))
 
 
 def response(
@@ -65,9 +83,7 @@ def response(
         return _tabulated(maths, oscillator, own["table"], pose.phi - given["beta"], pose.omega, switch)
     frequency, half = maths.pi * pose.omega / own["pulse"], own["pulse"] / (2 * pose.omega)
     along, across = (given["M0"] * share for share in oscillator.steady(frequency))
-    angle, side = pose.phi - given["beta"], 2 * switch - 1
-    turned = maths.atan2(side * maths.sin(angle), side * maths.cos(angle)) + (1 - switch) * maths.pi
-    time = turned / pose.omega
+    time = _from_front(maths, pose, given, switch) / pose.omega
     cosine, sine = maths.cos(frequency * time), maths.sin(frequency * time)
     corner = oscillator.repeated(across, -along * frequency)
     first = oscillator.ringing(corner, time + half)
@@ -116,6 +132,7 @@ EFFECT = Load(
     rank=20,
     acts="output",
     force=force,
+    push=push,
     needs=("operation.M0",),
     corners=corners,
     response=response,

@@ -1,14 +1,15 @@
 """Inertia of the rocker itself.
 
-Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis.
+Output term J3 q¨ [Yuan24, eq 2]; rigid rocker, fixed axis. Its mass m3 at s3 along D→C loads the joint D alone.
 """
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from loomopt.base.quantities import PositiveInertia
+from loomopt.base.quantities import Length, Mass, PositiveInertia
+from loomopt.base.units import QuantityError
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import LinkMass, Load
 from loomopt.physics.schema import Table, Values
 
 
@@ -16,11 +17,28 @@ class Own(Table):
     """Values of the rocker."""
 
     J3: PositiveInertia = Field(description="inertia of the rocker about the rocking shaft D")
+    s3: Length | None = Field(None, description="centre of mass of the rocker from the rocking shaft D, towards C")
+    m3: Mass | None = Field(None, description="mass of the rocker, for the forces in the joints; none without it")
+
+    @field_validator("m3")
+    @classmethod
+    def _where(cls, m3: float | None, given: ValidationInfo) -> float | None:
+        if m3 is not None and given.data.get("s3", 0.0) is None:
+            problem, allowed = "s3 is missing: m3 alone places no mass", "neither, or both"
+            raise QuantityError(problem, allowed, 'Add s3, such as "77.5 mm"')
+        return m3
 
 
 def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Number) -> Number:
     """Return J3 q¨, N·m."""
     return own["J3"] * pose.acceleration
+
+
+def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+    """Return the rocker; one that tells no mass is balanced about D."""
+    if "m3" not in own or "s3" not in own:
+        return LinkMass("rocker", 0, 0, 0, own["J3"])
+    return LinkMass("rocker", own["m3"], own["m3"] * own["s3"], 0, own["J3"])
 
 
 EFFECT = Load(
@@ -30,6 +48,7 @@ EFFECT = Load(
     rank=30,
     acts="output",
     force=force,
+    mass=mass,
     needs=("operation.speed",),
     examples=({"J3": "0.05 kg*m^2"},),
 )

@@ -13,7 +13,7 @@ from loomopt.base.quantities import Length, PositiveInertia, PositiveMass
 from loomopt.base.units import QuantityError
 from loomopt.maths.systems import Maths, Number
 from loomopt.physics.effects.beatup import ReedPose
-from loomopt.physics.effects.kinds import Load
+from loomopt.physics.effects.kinds import LinkMass, Load
 from loomopt.physics.schema import Table, Values
 
 
@@ -67,6 +67,13 @@ def force(maths: Maths, pose: ReedPose, given: Values, own: Values, switch: Numb
     return MODELS[own["model"]](maths, pose, given, own)
 
 
+def mass(maths: Maths, given: Values, own: Values) -> LinkMass:
+    """Return the rod by its joint B; two point masses have the inertia m2 s2 (l2 − s2) about their centre."""
+    m2, s2 = own["m2"], own["s2"] * given["l2"] / given["today.l2"]
+    second = m2 * s2 * given["l2"] if own["model"] == "lumped" else m2 * s2**2 + own["JS2"]
+    return LinkMass("rod", m2, m2 * s2, 0, second)
+
+
 EFFECT = Load(
     name="rod_inertia",
     summary="connecting rod",
@@ -74,6 +81,7 @@ EFFECT = Load(
     rank=50,
     acts="drive",
     force=force,
+    mass=mass,
     needs=("operation.speed",),
     examples=(
         {"m2": "1.5 kg", "s2": "32.5 mm", "JS2": "0.0005 kg*m^2", "model": "lumped"},

@@ -8,7 +8,7 @@ inertia stays with ψ.
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from pydantic import Field
 
@@ -100,6 +100,21 @@ def coordinate(maths: Maths, pose: "Motion", given: Values, own: Values, reply: 
     return _series(TWIST, given, own).at(maths, pose.phi) + reply[0]
 
 
+class Reed(NamedTuple):
+    """The reed's own motion: q = −ψ_r, rad, with its speed and acceleration."""
+
+    phi: Number
+    q: Number
+    velocity: Number
+    acceleration: Number
+
+
+def moved(pose: "Motion", own: Values, coordinate: Number, force: Number, acceleration: Number) -> Reed:
+    """Return the reed's motion: z˙ follows from k z + c z˙."""
+    rate = (force - own["stiffness"] * coordinate) / own["damping"]
+    return Reed(pose.phi, pose.q - coordinate, pose.velocity - rate, acceleration)
+
+
 def samples(given: Values, own: Values) -> float:
     """Return how many samples of a turn show every swing of the shaft, or what decays faster than it would swing."""
     square = given[f"{NAME}.stiffness"] / given[f"{NAME}.inertia"]
@@ -148,6 +163,7 @@ EFFECT = State(
     oscillator=oscillator,
     fixed=fixed,
     samples=samples,
+    moved=moved,
     force=force,
     coordinate=coordinate,
     motion=motion,

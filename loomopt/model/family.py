@@ -1,0 +1,672 @@
+"""One machine for several sets of scene numbers: the members' programs as one, some variables shared, some their own.
+
+Members are counted by index. What no number of a member's own can change stands in the program once, under its own
+name; all else once for each member. The worst over members, or their sum, is what each level seeks.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Literal, NamedTuple
+
+from loomopt.base.records import lazy
+from loomopt.maths.recording import Tape, recorded
+from loomopt.maths.systems import Maths, Number
+from loomopt.model.kinematics import Arcs, Group
+from loomopt.model.limits import CycleLimit, DesignLimit, Limit, RatioLimit
+from loomopt.model.model import CycleQuantity, DesignRow, Formula, Instant, Integral, JobModel, cornered
+from loomopt.model.objectives import Objective, Piece, Sought, Value, Worst
+from loomopt.model.program import Alias, Move, Numbers, Preference, Program, Variable
+from loomopt.model.reading import DATUM
+from loomopt.model.sampling import Sampler, sampled
+from loomopt.physics.balance import Given, total
+from loomopt.physics.cycle import Node, Where
+from loomopt.physics.effects.kinds import Load
+from loomopt.physics.schema import Values
+from loomopt.scenes.family import member_name, sum_name
+
+Combine = Literal["worst", "sum"]
+"""What of the members' figures is sought the least of."""
+
+
+def of_member(name: str, member: int) -> Alias:
+    """Return what the whole calls a member's own: members are counted from 1 where a person reads it."""
+    return Alias(member_name(name, member), name)
+
+
+# One model, several sets of numbers.
+
+
+class Scenario(NamedTuple):
+    """One member: its model, and what the whole calls its numbers and switches."""
+
+    model: JobModel
+    values: Mapping[str, str]
+    switches: Mapping[str, str]
+
+    def given(self, maths: Maths, values: Values) -> Given:
+        """Return its numbers and what follows from them, SI; values: of the whole."""
+        return self.model.given(maths, {own: values[name] for own, name in self.values.items() if name in values})
+
+    def node(self, node: Node) -> Node:
+        """Return a node of the whole as its own."""
+        switch = {own: node.switch[name] for own, name in self.switches.items() if name in node.switch}
+        return Node(node.phi, switch | {name: node.switch[name] for name in (DATUM,) if name in node.switch})
+
+
+def members_of(given: Given) -> tuple[Given, ...]:
+    """Return the numbers of each member."""
+    found = given.linkage
+    assert isinstance(found, tuple)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """The motions of all members; events: of which (member, name) each event of the whole is."""
+
+    scenarios: tuple[Scenario, ...]
+    structure: Hashable
+    groups: Mapping[str, Group]
+    occurring: Mapping[str, tuple[int, str]]
+    arcs: tuple[Arcs, ...] = ()
+    breaks: frozenset[str] = frozenset()
+
+    def linkage(self, maths: Maths, values: Values) -> tuple[Given, ...]:
+        """Return the numbers of each member."""
+        return tuple(scenario.given(maths, values) for scenario in self.scenarios)
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
+        """Return nothing: each member has its own."""
+        return {}
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        """Return where each member's events lie that no formula gives."""
+        pairs = zip(self.scenarios, members_of(given), strict=True)
+        return {each.values[name]: at for each, own in pairs for name, at in each.model.hints(own).items()}
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> Number:
+        """Return every member at a node; what no formula reads is not computed."""
+        pairs = zip(self.scenarios, members_of(given), strict=True)
+        return tuple(each.model.instant(maths, own, each.node(node)) for each, own in pairs)
+
+    def still(self, maths: Maths, given: Given, event: str, switch: Values) -> Number:
+        """Return every member at an event of one of them."""
+        return self.pose(maths, given, Node(self.events(maths, given)[event], switch))
+
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return the crank angles, rad, of members' events."""
+        own = members_of(given)
+        return {
+            name: self.scenarios[k].model.event(maths, own[k], event) for name, (k, event) in self.occurring.items()
+        }
+
+
+def _quantity(member: int, name: str, at: Instant) -> Number:
+    instant: Instant = at.pose[member]
+    return instant.model.formula(name)(instant)
+
+
+def _row(scenario: Scenario, member: int, name: str, event: str, at: Instant) -> Number:
+    stills = {event: scenario.node(at.node).switch} if event else {}
+    return scenario.model.static(at.maths, members_of(at.given)[member], stills, (name,))[name]
+
+
+def _derived(member: int, name: str, at: Instant) -> Number:
+    return members_of(at.given)[member].values[name]
+
+
+def _beyond(formula: Formula, sign: float, least: str, at: Instant) -> Number:
+    return sign * formula(at) - at.values[least]
+
+
+def _sum(formulas: Sequence[Formula], at: Instant) -> Number:
+    return total([formula(at) for formula in formulas])
+
+
+def _number(name: str, at: Instant) -> Number:
+    return at.values[name]
+
+
+def _corners(scenario: Scenario, member: int, place: int, maths: Maths, given: Given) -> tuple[Number, ...]:
+    return cornered(scenario.model, maths, members_of(given)[member])[place].angles
+
+
+def _parting(scenario: Scenario, member: int, place: int, maths: Maths, given: Given) -> tuple[Number, ...]:
+    return cornered(scenario.model, maths, members_of(given)[member])[place].placed
+
+
+# What no number of a member's own can change.
+
+
+class Roots:
+    """Which numbers of a model its values follow from; known: their names. None where a formula cannot be recorded."""
+
+    def __init__(self, model: JobModel, known: Collection[str]) -> None:
+        self.model, self.tape = model, Tape()
+        self.maths, self.there = (recorded(self.tape, system) for system in range(2))
+        self.inputs = {name: self.tape.input() for name in sorted(known)}
+        self._found: dict[str, frozenset[str]] = {}
+
+    @lazy
+    def given(self) -> Given:
+        """The numbers, not known yet. Raises what a formula raises that cannot be recorded."""
+        return self.model.given(self.maths, self.inputs)
+
+    @lazy
+    def switches(self) -> dict[str, Number]:
+        """What a node tells beside its angle, not known yet."""
+        return {name: self.tape.input() for name in (*self.model.switches, DATUM)}
+
+    def of(self, name: str) -> frozenset[str]:
+        """Return the numbers that a row, a whole-cycle quantity or a mean follows from."""
+        if name in self.inputs:
+            return frozenset({name})
+        if name not in self._found:
+            self._found[name] = self._of(lambda: self._read(name))
+        return self._found[name]
+
+    def of_switch(self, place: int) -> frozenset[str]:
+        """Return the numbers that the corners of a switch follow from, by its place in the model's."""
+        return self._of(lambda: cornered(self.model, self.maths, self.given)[place].angles)
+
+    def _read(self, name: str) -> tuple[Number, ...]:
+        mean = next((mean for mean in self.model.integrals if name in (mean.name, mean.root)), None)
+        if mean or self.model.has_quantity(name):
+            node = Node(self.tape.input(), self.switches)
+            found = self.model.quantity(self.there, self.given, mean.quantity if mean else name, node)
+            # The pieces that a mean is taken over move with their corners.
+            return (found, *(self.model.corners(self.maths, self.given) if mean and not mean.angles else ()))
+        known = self.model.static(self.maths, self.given, {}, (name,))
+        return (known[name] if name in known else self.given.values[name],)
+
+    def _of(self, read: Callable[[], tuple[Number, ...]]) -> frozenset[str]:
+        try:
+            outputs = read()
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+            return frozenset(self.inputs)
+        needed = self.tape.needed(outputs, len(self.tape.operations))
+        turned = [place for place, name in enumerate(self.model.switches) if self.switches[name].place in needed]
+        own = frozenset(name for name, value in self.inputs.items() if value.place in needed)
+        return own.union(*(self.of_switch(place) for place in turned))
+
+
+# What is sought of the members together.
+
+
+@dataclass(frozen=True)
+class WorstOf(Objective):
+    """The least of the worst of what members seek; of: theirs."""
+
+    _: KW_ONLY
+    of: tuple[Objective, ...]
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """All rows and quantities that they read."""
+        return tuple(row for each in self.of for row in each.rows)
+
+    @property
+    def sides(self) -> tuple[tuple[str, float], ...]:
+        """Their rows, with their signs."""
+        return tuple(side for each in self.of for side in each.sides)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Their quantities."""
+        return tuple(name for each in self.of for name in each.quantities)
+
+    @property
+    def sought(self) -> Sought:
+        """Which end of the figure each of them seeks."""
+        return self.of[0].sought
+
+    def worsening(self, now: float, then: float, most: bool) -> float:
+        """Return by how much the figure becomes worse from now to then, SI."""
+        return self.of[0].worsening(now, then, most)
+
+    def pieces(self, sampler: Sampler) -> list[Piece]:
+        """Return the smooth functions of all of them."""
+        return [piece for each in self.of for piece in each.pieces(sampler)]
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Return what keeps every one of them at `most`, SI."""
+        return [limit for each in self.of for limit in each.limits(name, most)]
+
+
+class WorstMagnitude(WorstOf):
+    """The least of the worst magnitude."""
+
+    is_magnitude, least = True, 0.0
+
+
+# The members' programs as one.
+
+
+class Part(NamedTuple):
+    """A member's share of the whole: its program, and what the whole calls its variables and limits.
+
+    names: of variables; limits: of those of its limits that are its own, by name.
+    """
+
+    program: Program
+    names: Mapping[str, str]
+    limits: Mapping[str, str]
+
+    def own(self, x: Numbers) -> dict[str, float]:
+        """Return its variables, SI, of the whole's."""
+        return {name: x[whole] for name, whole in self.names.items()}
+
+    def sampler(self, x: Numbers) -> Sampler:
+        """Return its design of the whole's variables, SI."""
+        return sampled(self.program.model, {**self.program.parameters, **self.own(x)})
+
+
+class Family(NamedTuple):
+    """The program of all members, and the share of each."""
+
+    program: Program
+    parts: tuple[Part, ...]
+
+
+def standing_for(program: Program, name: str) -> frozenset[str]:
+    """Return the variables by which a program tells a number of the design: itself, or what its limits are read as."""
+    if any(variable.name == name for variable in program.variables):
+        return frozenset({name})
+    return frozenset(limit.row for limit in program.limits if limit.name == name and limit.is_of_variable)
+
+
+def together(programs: Sequence[Program], own: Collection[str], combine: Combine) -> Family:
+    """Return the program of a family; own: variables of which each member has its own.
+
+    The members' programs are of one structure: they differ in numbers only.
+    """
+    if len(programs) == 1:
+        names = {variable.name: variable.name for variable in programs[0].variables}
+        return Family(programs[0], (Part(programs[0], names, {}),))
+    return _Combining(programs, own, combine).family()
+
+
+UNLIKE = 1e-3
+"""Share of its bounds by which one member's own variable stands beside another's, to see what that moves."""
+
+
+class _Combining:
+    """The members' programs on the way to one."""
+
+    def __init__(self, programs: Sequence[Program], own: Collection[str], combine: Combine) -> None:
+        self.programs, self.combine = tuple(programs), combine
+        self.first, self.model = programs[0], programs[0].model
+        self.variables = [variable.name for variable in self.first.variables]
+        self.hinted = self._hinted(own)
+        self.roots = Roots(self.model, [*self.first.parameters, *self.variables, *self.hinted])
+        self.apart = self._apart(own)
+        self.rows: dict[str, DesignRow] = {}
+        self.quantities: dict[str, CycleQuantity] = {}
+        self.integrals: dict[str, Integral] = {}
+        self.events: dict[str, tuple[int, str]] = {}
+        self.extra: list[Variable] = []
+        self.extra_limits: list[Limit] = []
+        self.measured: dict[str, tuple[int, Objective]] = {}
+
+    def _hinted(self, own: Collection[str]) -> dict[str, bool]:
+        """Return the events that no formula gives, by name of value, and whether any number of a member's own moves it.
+
+        They are found by iteration: that is seen at the first start, at which each member's own variables differ.
+        """
+        found = list[Mapping[str, float]]()
+        for k, program in enumerate(self.programs):
+            start = dict(self.first.starts[0])
+            for v in self.first.variables:
+                if v.name in own and math.isfinite(v.upper - v.lower):
+                    start[v.name] += (k + 1) * UNLIKE * (v.upper - v.lower)
+            try:
+                found.append(sampled(program.model, {**program.parameters, **program.completed(start)}).hints)
+            except (ValueError, ArithmeticError):
+                found.append({})
+        return {name: any(each.get(name) != value for each in found) for name, value in found[0].items()}
+
+    def _apart(self, own: Collection[str]) -> frozenset[str]:
+        """Return the numbers that are not the same for all members, and variables that hang on them by an equality."""
+        numbers = [program.parameters for program in self.programs]
+        found = {*own} | {name for name in numbers[0] if any(each[name] != numbers[0][name] for each in numbers)}
+        found |= {name for name, moves in self.hinted.items() if moves}
+        for each in zip(*(program.variables for program in self.programs), strict=True):
+            found |= {each[0].name} if max(v.lower for v in each) > min(v.upper for v in each) else set()
+        tied = [(limit.reads, limit.value) for limit in self.first.limits if limit.sign == 0]
+        sides = [[limit.value for limit in program.limits if limit.sign == 0] for program in self.programs]
+        while True:
+            more = set[str]()
+            for place, (reads, _) in enumerate(tied):
+                read = frozenset[str]().union(*map(self.roots.of, reads))
+                differs = any(values[place : place + 1] != sides[0][place : place + 1] for values in sides)
+                if differs or read & found:
+                    more |= {name for name in read if name in self.variables and name not in self.known}
+            for name, quantity in self.first.tops.items():
+                more |= {name} if self.roots.of(quantity) & found else set()
+            if more <= found:
+                return frozenset(found)
+            found |= more
+
+    @lazy
+    def known(self) -> frozenset[str]:
+        """Variables that a designer chooses: those with a bound among the limits, or that stand for one."""
+        limited = {limit.row for limit in self.first.limits if limit.is_of_variable}
+        return frozenset(limited | {v.name for v in self.first.variables if v.lower == v.upper})
+
+    # Names.
+
+    def name(self, member: int, name: str) -> str:
+        """Return what the whole calls a number of a member."""
+        return of_member(name, member) if name in self.apart else name
+
+    def is_shared(self, name: str) -> bool:
+        """Say whether a row or quantity is the same for all members."""
+        return self.roots.of(name).isdisjoint(self.apart)
+
+    def read(self, member: int, name: str) -> str:
+        """Return what the whole calls a row, quantity, mean or number of a member, which it has from then on."""
+        if name in self.first.parameters or name in self.variables:
+            return self.name(member, name)
+        shared, model = self.is_shared(name), self.model
+        called = name if shared else of_member(name, member)
+        if called in self.rows or called in self.quantities or called in self.integrals:
+            return called
+        mean = next((mean for mean in self.programs[member].model.integrals if name in (mean.name, mean.root)), None)
+        if mean:
+            where = self.where(member, mean.where)
+            whole = mean._replace(
+                name=mean.name if shared else of_member(mean.name, member),
+                root=mean.root if shared else of_member(mean.root, member),
+                quantity=self.read(member, mean.quantity),
+                where=where,
+            )
+            self.integrals[whole.name] = self.integrals[whole.root] = whole
+        elif model.has_quantity(name):
+            square = model.square(name)
+            self.quantities[called] = CycleQuantity(
+                functools.partial(_quantity, member, name),
+                signed=name in model.signed,
+                bounded=name in model.bounded,
+                square=self.read(member, square) if square else "",
+            )
+        elif model.has_row(name):
+            event = model.event_of(name)
+            at = event and (event if shared else of_member(event, member))
+            self.events |= {at: (member, event)} if at else {}
+            formula = functools.partial(_row, self.scenarios[member], member, name, event)
+            self.rows[called] = DesignRow(formula, event=at, loaded=False)
+        else:
+            self.rows[called] = DesignRow(functools.partial(_derived, member, name))
+        return called
+
+    def where(self, member: int, where: Where | None) -> Where | None:
+        """Return pieces of a member's cycle as pieces of the whole's."""
+        return where and (self.scenarios[member].switches[where[0]], where[1])
+
+    # The model.
+
+    @lazy
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """The members by index."""
+        names = [*self.first.parameters, *self.variables, *self.hinted]
+        turning = {
+            switch: bool(self.roots.of_switch(place) & self.apart) for place, switch in enumerate(self.model.switches)
+        }
+        return tuple(
+            Scenario(
+                program.model,
+                {name: self.name(k, name) for name in names},
+                {switch: of_member(switch, k) if apart else switch for switch, apart in turning.items()},
+            )
+            for k, program in enumerate(self.programs)
+        )
+
+    def arcs(self) -> list[tuple[bool, Arcs]]:
+        """Return the switches of the whole, and whether each changes a formula."""
+        model, found = self.model, dict[str, tuple[bool, Arcs]]()
+        loads = [load for load in model.loads if isinstance(load, Load) and load.corners]
+        reads = [arc.switch for arc in (*model.kinematics.arcs, *model.arcs)] + [load.switch for load in loads]
+        for k, scenario in enumerate(self.scenarios):
+            for place, (own, switch) in enumerate(zip(model.switches, reads, strict=True)):
+                if (name := scenario.switches[own]) not in found:
+                    corners, parting = (functools.partial(of, scenario, k, place) for of in (_corners, _parting))
+                    found[name] = own in model.formula_switches, Arcs(name, corners, switch, parting=parting)
+        return list(found.values())
+
+    def closing(self) -> tuple[dict[str, Group], dict[str, tuple[str, float]]]:
+        """Return what says that members assemble: as groups of links, and beside them."""
+        closes, beside = dict[str, str](), dict[str, tuple[str, float]]()
+        groups = self.model.kinematics.groups
+        for k in range(len(self.programs)):
+            for prefix, group in groups.items():
+                for phrase, name in group.closes.items():
+                    read = self.read(k, prefix + name)
+                    closes[phrase if read == prefix + name else of_member(phrase, k)] = read
+            for phrase, (name, most) in self.model.assembled.items():
+                read = self.read(k, name)
+                beside[phrase if read == name else of_member(phrase, k)] = read, most
+        angles = [group.closest for group in groups.values()]
+        closest = tuple(dict.fromkeys(angle for each in angles for angle in each)) if all(angles) else ()
+        return {"": Group({}, closes, closest=closest)}, beside
+
+    def whole(self) -> JobModel:
+        """Return the model of all members, with what was read of it."""
+        groups, beside = self.closing()
+        arcs = self.arcs()
+        scenarios = tuple(
+            (each.model.key, tuple(each.values.items()), tuple(each.switches.items())) for each in self.scenarios
+        )
+        motion = Together(
+            self.scenarios,
+            ("family", scenarios),
+            groups,
+            dict(self.events),
+            tuple(arc for changes, arc in arcs if changes),
+        )
+        return JobModel(
+            motion,
+            own_quantities=dict(self.quantities),
+            own_rows=dict(self.rows),
+            arcs=tuple(arc for changes, arc in arcs if not changes),
+            integrals=tuple({mean.name: mean for mean in self.integrals.values()}.values()),
+            assembled=beside,
+        )
+
+    # Variables, limits, objectives.
+
+    def variable(self, member: int, place: int) -> Variable:
+        """Return a variable of a member as one of the whole."""
+        each = [program.variables[place] for program in self.programs]
+        own = each[member]
+        if own.name in self.apart:
+            return replace(own, name=of_member(own.name, member), label=of_member(own.called, member))
+        lower, upper = max(v.lower for v in each), min(v.upper for v in each)
+        return replace(own, lower=lower, upper=max(lower, upper))
+
+    def limit(self, member: int, limit: Limit) -> Limit:
+        """Return a limit of a member as one of the whole."""
+        found: Limit = replace(limit, row=self.read(member, limit.row))
+        if isinstance(found, RatioLimit):
+            found = replace(found, weight=self.read(member, found.weight))
+        if isinstance(found, CycleLimit):
+            found = replace(found, where=self.where(member, found.where))
+        same = found.reads == limit.reads and getattr(found, "where", None) == getattr(limit, "where", None)
+        return found if same else replace(found, name=of_member(limit.name, member))
+
+    def limits(self) -> list[Limit]:
+        """Return the limits of all members, those that are the same once."""
+        found: dict[Hashable, Limit] = {}
+        for k, program in enumerate(self.programs):
+            for limit in program.limits:
+                whole = self.limit(k, limit)
+                found.setdefault(replace(whole, scale=1.0), whole)
+        return list(found.values())
+
+    def objective(self, member: int, objective: Objective) -> Objective:
+        """Return what a member seeks as a part of what the whole does."""
+        found = replace(objective, row=self.read(member, objective.row))
+        if isinstance(found, Worst):
+            found = replace(found, others=tuple(self.read(member, row) for row in found.others))
+        return found
+
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the levels: of each of the members' the worst or the sum.
+
+        Of a magnitude the sum too, after the worst: who does not decide the worst comes as near as can be.
+        """
+        found: list[Objective] = []
+        for level in zip(*(program.objectives for program in self.programs), strict=True):
+            each = [self.objective(k, own) for k, own in enumerate(level)]
+            scale = max(own.scale for own in each)
+            each = [replace(own, scale=scale) for own in each]
+            first = each[0]
+            if all(own == first for own in each):
+                found.append(first)
+                continue
+            if self.combine == "worst":
+                kind = WorstMagnitude if first.is_magnitude else WorstOf
+                found.append(kind(first.figure, first.row, scale, power=first.power, of=tuple(each)))
+            if self.combine == "sum" or first.is_magnitude:
+                found.append(self.summed(each))
+        return tuple(found)
+
+    def summed(self, each: Sequence[Objective]) -> Objective:
+        """Return the sum of what members seek: of what is not smooth, of variables that are no less."""
+        first = each[0]
+        figure = Alias(sum_name(first.figure, first.is_magnitude, first.power), first.figure)
+        direct = first.is_smooth and not any(own.row in self.integrals or self.stands(own.row) for own in each)
+        rows = [own.row if direct else self.least(k, own) for k, own in enumerate(each)]
+        terms = [self.rows[row].formula if row in self.rows else functools.partial(_number, row) for row in rows]
+        self.rows[figure] = DesignRow(functools.partial(_sum, terms))
+        return Value(figure, figure, first.scale, power=first.power)
+
+    def stands(self, row: str) -> bool:
+        """Say whether a row stands at an event, of which a sum has none."""
+        return row in self.rows and bool(self.rows[row].event)
+
+    def least(self, member: int, own: Objective) -> str:
+        """Return the variable that is no less than what a member seeks, with the limits that say so."""
+        name = of_member(f"most {own.figure}", member)
+        self.extra.append(Variable(name, -math.inf, math.inf, own.scale, (0.0, 2 * own.scale)))
+        self.measured[name] = member, self.programs[member].objectives[self.place(own)]
+        for place, (row, sign) in enumerate(own.sides):
+            called, of = f"{name} {place}", self.rows.get(row)
+            firm = {"relaxable": False, "hidden": True}
+            if of is None:
+                self.extra_limits.append(RatioLimit(called, 1, row, 1.0, own.scale, name, **firm))
+                continue
+            formula = functools.partial(_beyond, of.formula, sign, name)
+            self.rows[called] = DesignRow(formula, event=of.event, loaded=False)
+            self.extra_limits.append(DesignLimit(called, 1, called, 0.0, own.scale, **firm))
+        for row in own.quantities:
+            signs = (1.0,) if row in self.signed else (1.0, -1.0)
+            for sign in signs:
+                called = f"{name} {row} {sign:+g}"
+                formula = functools.partial(_beyond, self.quantities[row].formula, sign, name)
+                self.quantities[called] = CycleQuantity(formula, signed=True)
+                self.extra_limits.append(CycleLimit(called, 1, called, 0.0, own.scale, relaxable=False, hidden=True))
+        return name
+
+    def place(self, own: Objective) -> int:
+        """Return the place of a level among the members' own."""
+        return next(k for k, level in enumerate(self.first.objectives) if level.figure == own.figure)
+
+    @property
+    def signed(self) -> frozenset[str]:
+        """Quantities of the whole of which the largest value counts."""
+        return frozenset(name for name, quantity in self.quantities.items() if quantity.signed)
+
+    # The program.
+
+    def family(self) -> Family:
+        """Return the whole, and each member's share of it."""
+        limits, objectives = self.limits(), self.objectives()
+        places = range(len(self.variables))
+        variables = {
+            v.name: v for k in range(len(self.programs)) for v in (self.variable(k, place) for place in places)
+        }
+        values = {
+            self.name(k, name): value
+            for k, program in enumerate(self.programs)
+            for name, value in program.parameters.items()
+        }
+        tops = {
+            self.name(k, name): self.read(k, of)
+            for k in range(len(self.programs))
+            for name, of in self.first.tops.items()
+        }
+        parts = tuple(self.part(k) for k in range(len(self.programs)))
+        whole = Program(
+            self.whole(),
+            (*variables.values(), *self.extra),
+            values,
+            (*limits, *self.extra_limits),
+            objectives,
+            (),
+            tuple(self.moves()),
+            functools.partial(_followed, parts, dict(self.measured)),
+            tops,
+            {self.name(k, name): value for k, each in enumerate(self.programs) for name, value in each.today.items()},
+            any_numbers=self.first.any_numbers,
+        )
+        return Family(replace(whole, starts=self.starts(whole)), parts)
+
+    def part(self, member: int) -> Part:
+        """Return a member's share."""
+        own = {limit.name: self.limit(member, limit).name for limit in self.programs[member].limits}
+        return Part(
+            self.programs[member],
+            {name: self.name(member, name) for name in self.variables},
+            {name: whole for name, whole in own.items() if name != whole},
+        )
+
+    def starts(self, whole: Program) -> tuple[dict[str, float], ...]:
+        """Return the members' own starts: those of one place together, what is shared from each member in turn."""
+        found: list[dict[str, float]] = []
+        for place in range(max(len(program.starts) for program in self.programs)):
+            each = [program.starts[min(place, len(program.starts) - 1)] for program in self.programs]
+            own = {self.name(k, name): value for k, start in enumerate(each) for name, value in start.items()}
+            for start in each:
+                shared = {name: value for name, value in start.items() if name not in self.apart}
+                given = {**own, **shared}
+                inside = {v.name: min(max(given[v.name], v.lower), v.upper) for v in whole.variables if v.name in given}
+                completed = whole.completed(inside)
+                if completed not in found:
+                    found.append(completed)
+        return tuple(found)
+
+    def moves(self) -> list[Move]:
+        """Return the members' moves, those along shared variables once, with what all members wish."""
+        found: dict[Hashable, Move] = {}
+        for k, program in enumerate(self.programs):
+            for move in program.moves:
+                along = tuple(self.name(k, name) for name in move.along)
+                wishes = tuple(wish._replace(when=self.name(k, wish.when) if wish.when else "") for wish in move.wishes)
+                today = {self.name(k, name): value for name, value in move.today.items()}
+                bounds = {self.name(k, name): ends for name, ends in move.bounds.items()}
+                own = along != move.along
+                key = move.name, along
+                wishes = _wished((*found[key].wishes, *wishes)) if key in found else wishes
+                named = of_member(move.name, k) if own else move.name
+                found[key] = replace(move, name=named, along=along, wishes=wishes, today=today, bounds=bounds)
+        return list(found.values())
+
+
+def _wished(wishes: Iterable[Preference]) -> tuple[Preference, ...]:
+    """Return wishes without repeats, those that always hold last."""
+    return tuple(sorted(dict.fromkeys(wishes), key=lambda wish: not wish.when))
+
+
+def _followed(
+    parts: Sequence[Part], measured: Mapping[str, tuple[int, Objective]], model: JobModel, values: Numbers
+) -> dict[str, float]:
+    """Return the variables that follow from the others: the members' own, and what is no less than what they seek."""
+    found: dict[str, float] = {}
+    for part in parts:
+        own = part.program.follow(part.program.model, {**part.program.parameters, **part.own(values)})
+        found |= {part.names[name]: value for name, value in own.items() if name in part.names}
+    for name, (member, objective) in measured.items():
+        found[name] = objective.merit(parts[member].sampler({**values, **found}))
+    return found

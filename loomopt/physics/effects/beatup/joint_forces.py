@@ -1,0 +1,258 @@
+"""Forces in the joints of the beat-up, A to D, and what all moving masses do to the frame: figures only.
+
+F_J is the force of the part nearer the drive on the next one: frame → crank (A) → rod (B) → rocker (C), frame → rocker
+(D); x along A→D, y towards C. Output terms are couples on the rocker, and load D by themselves only where they tell
+their force; weights of rod and rocker are in no effect. Shaking force −Σ m a_S, moment −Σ (p_S × m a_S + J α) about A.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from loomopt.base.records import lazy
+from loomopt.base.units import ShowValue
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects import pins
+from loomopt.physics.effects.beatup import ReedPose
+from loomopt.physics.effects.kinds import Check, LinkMass, Loading
+from loomopt.physics.schema import Figure, Values
+
+if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.crank_rocker import CrankRockerPose
+    from loomopt.physics.mechanisms.dyad import Vector
+    from loomopt.physics.mechanisms.joint_forces import PairForces, Wrench
+
+PLACED = ("mechanism.m4", "mechanism.r4")
+"""Without which it is not known where the reed's mass is."""
+SHAKING_FORCE = Figure("shaking_force", "force", "peak inertia force of all moving masses on the frame", sides=("max",))
+
+
+PINS = {
+    "A": "crank shaft's bearings",
+    "B": "crank pin",
+    "C": "joint of rod and rocker",
+    "D": "rocking shaft's bearings",
+}
+
+
+SIDES = {
+    "force_A": ("frame", "crank"),
+    "force_B": ("crank", "rod"),
+    "force_C": ("rod", "rocker"),
+    "force_D": ("frame", "rocker"),
+}
+
+
+class Swinging(Protocol):
+    """What of a motion the masses on the rocking shaft read."""
+
+    @property
+    def q(self) -> Number:
+        """−ψ, rad."""
+
+    @property
+    def velocity(self) -> Number:
+        """q˙, rad/s."""
+
+    @property
+    def acceleration(self) -> Number:
+        """q¨, rad/s²."""
+
+
+@dataclass(frozen=True)
+class CrankRockerForces:
+    """Forces in the joints A to D, N, and on the frame, at one instant; each when it is first read."""
+
+    maths: Maths
+    pose: ReedPose
+    given: Values
+    loading: Loading
+    own: Values = field(default_factory=dict)
+
+    @property
+    def linkage(self) -> "CrankRockerPose":
+        """The linkage itself."""
+        found: CrankRockerPose = self.pose.joints  # type: ignore[assignment]  # it is one, whole or in symbols
+        return found
+
+    @lazy
+    def rod(self) -> "Wrench | None":
+        """What acts on the rod by its own mass, about B; None for a rod without mass."""
+        from loomopt.physics.mechanisms import joint_forces
+
+        linkage, rods = self.linkage, [each for each, _ in self.loading.masses if each.link == "rod"]
+        if not rods:
+            return None
+        along, length = linkage.dyad.link1, linkage.lengths.l2
+        direction = type(along)(along.x / length, along.y / length)
+        return joint_forces.together(
+            joint_forces.inertia(
+                own.mass,
+                joint_forces.turned(direction, own.along, own.across),
+                own.second,
+                self._turning(linkage.rod_1, linkage.rod_2),
+                self._carried(linkage.crank),
+            )
+            for own in rods
+        )
+
+    def _turning(self, rate: Number, second: Number) -> tuple[Number, Number]:
+        """Return a link's angular speed, rad/s, and acceleration, rad/s², from its derivatives."""
+        omega, change = self.pose.omega, self.pose.omega_dot
+        steady = second * omega**2
+        return rate * omega, steady if change is None else steady + rate * change
+
+    def _carried(self, arm: "Vector") -> "Vector":
+        """Return the acceleration, m/s², of what turns with the crank."""
+        square, change = self.pose.omega**2, self.pose.omega_dot
+        x, y = -square * arm.x, -square * arm.y
+        return type(arm)(x, y) if change is None else type(arm)(x - change * arm.y, y + change * arm.x)
+
+    @lazy
+    def swung(self) -> "Wrench":
+        """What acts on the rocker by the masses on the rocking shaft, about D."""
+        from loomopt.physics.mechanisms import joint_forces
+        from loomopt.physics.mechanisms.dyad import Vector
+
+        return joint_forces.together(self._swinging()) or joint_forces.Wrench(Vector(0, 0), 0)
+
+    def _swinging(self) -> "Iterator[Wrench]":
+        from loomopt.physics.mechanisms import joint_forces
+        from loomopt.physics.mechanisms.dyad import Vector
+
+        for own, motion in self._on_shaft():
+            turning = -motion.velocity, -motion.acceleration
+            first = Vector(0, 0)
+            if motion is self.pose:
+                rocker, length = self.linkage.dyad.link2, self.linkage.lengths.l3
+                first = joint_forces.turned(Vector(rocker.x / length, rocker.y / length), own.along, own.across)
+            else:
+                reed = Vector(self.maths.cos(motion.q), -self.maths.sin(motion.q))
+                first = joint_forces.turned(reed, own.along, own.across)
+            yield joint_forces.inertia(own.mass, first, own.second, turning)
+
+    def _on_shaft(self) -> Iterator[tuple[LinkMass, Swinging]]:
+        """Yield what swings about D, each with its motion: reed and counterweight first, in line with the rocker."""
+        given, found = self.given, [each for each in self.loading.masses if each[0].link != "rod"]
+        if "m4" in given and "r4" in given and not any(own.link == "reed" for own, _ in found):
+            first = given["m4"] * given["r4"] - given["m4e"] * given["r4e"]
+            yield LinkMass("reed", given["m4"] + given["m4e"], first, 0, 0), self.loading.carried
+        yield from found
+
+    @lazy
+    def group(self) -> "PairForces":
+        """The group of rod and rocker, loaded by M3 and all masses."""
+        from loomopt.physics.mechanisms import joint_forces
+
+        force = joint_forces.plus(self.swung.force, *self.loading.pushes)
+        return joint_forces.two_links(self.linkage.dyad, self.rod, joint_forces.Wrench(force, self.loading.force))
+
+    @lazy
+    def crank(self) -> "Vector | None":
+        """The force of the crank's own mass, N, at A alone; None for a balanced crank."""
+        given, crank = self.given, self.linkage.crank
+        if "crank.mass" not in given or "crank.centre" not in given:
+            return None
+        share = given["crank.mass"] * given["crank.centre"] / self.linkage.lengths.l1
+        carried = self._carried(crank)
+        return type(crank)(-share * carried.x, -share * carried.y)
+
+    @lazy
+    def force_A(self) -> "Vector":
+        """Of the frame on the crank."""
+        pin, own = self.group.outer1, self.crank
+        return pin if own is None else type(pin)(pin.x - own.x, pin.y - own.y)
+
+    @property
+    def force_B(self) -> "Vector":
+        """Of the crank on the rod."""
+        return self.group.outer1
+
+    @property
+    def force_C(self) -> "Vector":
+        """Of the rod on the rocker."""
+        return self.group.inner
+
+    @property
+    def force_D(self) -> "Vector":
+        """Of the frame on the rocker."""
+        return self.group.outer2
+
+    @lazy
+    def shaking_force(self) -> "Vector":
+        """Of all moving masses on the frame."""
+        from loomopt.physics.mechanisms import joint_forces
+
+        others = [self.rod.force] if self.rod else []
+        return joint_forces.plus(self.swung.force, *others, *([self.crank] if self.crank else []))
+
+    @lazy
+    def shaking_moment(self) -> Number:
+        """Of all moving masses on the frame, about A, N·m."""
+        from loomopt.physics.mechanisms import joint_forces
+
+        about = self.swung.moment + self.linkage.lengths.l4 * self.swung.force.y
+        if self.rod is None:
+            return about
+        return about + self.rod.moment + joint_forces.cross(self.linkage.crank, self.rod.force)
+
+    def heading(self, part: str) -> "Vector":
+        """Return the unit direction of crank, rod or rocker."""
+        linkage = self.linkage
+        vectors = {"crank": (linkage.crank, linkage.lengths.l1), "rod": (linkage.dyad.link1, linkage.lengths.l2)}
+        vector, length = {**vectors, "rocker": (linkage.dyad.link2, linkage.lengths.l3)}[part]
+        return type(vector)(vector.x / length, vector.y / length)
+
+    @lazy
+    def friction_work(self) -> Mapping[str, Number]:
+        """What a newton in each joint takes by friction, m per rad of the crank: μ r |δ'|, δ' how the pin turns."""
+        rod, rocker = self.linkage.rod_1, -self.pose.q1
+        turned = {"A": 1, "B": rod - 1, "C": rocker - rod, "D": rocker}
+        return pins.works(self.maths, self.own, {joint: (f"force_{joint}", turn) for joint, turn in turned.items()})
+
+
+def forces(maths: Maths, pose: ReedPose, given: Values, own: Values, loading: Loading) -> CrankRockerForces:
+    """Return the forces at an instant."""
+    return CrankRockerForces(maths, pose, given, loading, own)
+
+
+def remark(given: Values, own: Values, shown: ShowValue) -> str:
+    """Say that the cloth's couple has no place yet."""
+    if given.get("resistance.pulse") is None or given.get("resistance.reach") is not None:
+        return ""
+    return (
+        "force_D takes the resistance of the cloth for a couple: where the cloth pushes is not told, and it changes "
+        "the force in D, though in no other joint. Give effects.resistance.reach, its distance from the rocking shaft"
+    )
+
+
+EFFECT = Check(
+    name="joint_forces",
+    summary="forces in the joints, and of all moving masses on the frame",
+    own=pins.own(PINS),
+    rank=85,
+    joints=forces,
+    between=("rod", "swung"),
+    vectors=("force_A", "force_B", "force_C", "force_D", SHAKING_FORCE.name),
+    scalars=("shaking_moment",),
+    sides=SIDES,
+    worked={pins.LOSS: "friction_work"},
+    wanted={
+        **dict.fromkeys(("force_D", SHAKING_FORCE.name), PLACED),
+        "shaking_moment": (*PLACED, "effects.inertia.J4"),
+        pins.LOSS: (*PLACED, *pins.read("joint_forces", PINS)),
+    },
+    reads=("m4e", "r4e"),
+    needs=("operation.speed",),
+    figures=(
+        Figure("force_A", "force", "peak force in the crank shaft's bearings", sides=("max",)),
+        Figure("force_B", "force", "peak force in the crank pin", sides=("max",)),
+        Figure("force_C", "force", "peak force in the joint of rod and rocker", sides=("max",)),
+        Figure("force_D", "force", "peak force in the rocking shaft's bearings", sides=("max",)),
+        SHAKING_FORCE,
+        Figure("shaking_moment", "torque", "peak moment of all moving masses about the crank shaft", sides=("max",)),
+        pins.FIGURE,
+    ),
+    remark=remark,
+    examples=({},),
+)

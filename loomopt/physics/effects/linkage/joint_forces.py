@@ -1,0 +1,186 @@
+"""Forces in every pin of a linkage, in its guides and gears, and of all moving masses on the frame: figures only.
+
+Solved from the output back to the crank. A force is that on the part that is named with it, or, of a pin between two
+links of one group, on the second; the frame feels the opposite. Output terms act on the output's link, or on what
+slides; what only turns with the output, or slides with it, shakes the frame with its inertia. About the crank shaft.
+"""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from loomopt.base.records import lazy
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects import pins
+from loomopt.physics.effects.kinds import Applied, Check, Loading
+from loomopt.physics.effects.linkage import LinkagePose
+from loomopt.physics.schema import Figure, Table, Values
+
+if TYPE_CHECKING:
+    from loomopt.physics.mechanisms.chain import Chain
+    from loomopt.physics.mechanisms.chain_forces import Walk
+    from loomopt.physics.mechanisms.dyad import Vector
+    from loomopt.physics.mechanisms.joint_forces import Wrench
+
+
+SAID = (
+    "every group from the last part back to the crank: of a dyad R = (N2 r1 + N1 r2)/(r1 x r2), N the moment of all "
+    "that acts on a link about its outer joint, masses included; of a slider and of a slot what keeps each link still"
+)
+
+
+class Own(Table):
+    """No values of its own."""
+
+
+class LinkageForces:
+    """Forces at one instant, by the names of their figures; each when it is first read."""
+
+    def __init__(self, linked: "Chain", pose: Number, loading: Loading, own: Values) -> None:
+        self.linked, self.pose, self.loading, self.own = linked, pose, loading, own
+
+    def output(self, size: Number, inertial: bool = False) -> list[Applied]:
+        """Return the loads that a force or torque at the output is; size: as the output counts it."""
+        from loomopt.physics.mechanisms.chain_forces import Walk, slider_of
+        from loomopt.physics.mechanisms.dyad import Vector
+        from loomopt.physics.mechanisms.moving import scaled
+
+        out, walk = self.pose.output, Walk(self.linked, self.pose.joints)
+        size = size if out.sign > 0 else -size
+        size = size if self.pose.factor is None else size * self.pose.factor
+        if out.measure == "angle":
+            against = [Applied(out.against, None, None, -size, inertial)] if out.against else []
+            return [Applied(out.name, None, None, size, inertial), *against]
+        if out.measure != "slide":
+            direction = Vector(1, 0) if out.measure == "x" else Vector(0, 1)
+            return [Applied(out.name, scaled(size, direction), None, None, inertial)]
+        part = next(each for each in self.linked.parts if each.name == out.name)
+        if part.kind == "slider":
+            on, under, place = slider_of(part.name), part.word("guide") or "frame", walk.at(part.word("pin"))
+            push = scaled(size, walk.sliding(part))
+        else:
+            on, under, place = part.word("through"), part.word("link"), walk.at(part.word("through"))
+            push = scaled(size, self.pose.joints.links[under].unit())
+        return [Applied(on, push, place, None, inertial), Applied(under, scaled(-1, push), place)]
+
+    @lazy
+    def inertial(self) -> list[Applied]:
+        """What moves with the output resists with this, as loads."""
+        moving = [own.second for own, _ in self.loading.masses]
+        if not moving:
+            return []
+        total = moving[0]
+        for own in moving[1:]:
+            total = total + own
+        return self.output(-total * self.pose.acceleration, True)
+
+    @lazy
+    def walk(self) -> "Walk":
+        """The chain with all its loads, solved."""
+        from loomopt.physics.mechanisms import chain_forces
+
+        loads = [*self.loading.applied, *self.output(-self.loading.force)]
+        return chain_forces.walked(self.linked, self.pose.joints, loads)
+
+    @lazy
+    def _called(self) -> dict[str, tuple[str, str]]:
+        from loomopt.physics.mechanisms import chain_forces
+
+        return {f"force_{name}": place for place, name in chain_forces.names(self.linked).items()}
+
+    def __getattr__(self, name: str) -> "Vector | Number":
+        if name.startswith("teeth_"):
+            return self.walk.teeth[name.removeprefix("teeth_")]
+        if not name.startswith("force_"):
+            raise AttributeError(name)
+        return self.walk.forces[self._called[name]]
+
+    def heading(self, part: str) -> "Vector":
+        """Return the unit direction of a body; of a slider that of its guide."""
+        from loomopt.physics.mechanisms import chain_forces
+
+        body = chain_forces.guides(self.linked).get(part, part)
+        found: Vector = self.pose.joints.links[body].unit()
+        return found
+
+    @lazy
+    def friction_work(self) -> Mapping[str, Number]:
+        """What a newton in each pin takes by friction, m per rad of the crank."""
+        from loomopt.physics.mechanisms import chain_forces
+
+        turned = {
+            name: (f"force_{name}", chain_forces.turned(self.linked, self.pose.joints, place))
+            for place, name in chain_forces.pinned(self.linked).items()
+        }
+        return pins.works(self.pose.joints.maths, self.own, turned)
+
+    @lazy
+    def _shaken(self) -> "Wrench":
+        from loomopt.physics.mechanisms import chain_forces
+
+        shaft = next(part.word("at") for part in self.linked.parts if part.kind in ("crank", "cam"))
+        place = self.pose.joints.joints[shaft].place
+        return chain_forces.shaken([*self.loading.applied, *self.inertial], self.pose.joints, place)
+
+    @property
+    def shaking_force(self) -> "Vector":
+        """Of all moving masses on the frame, N."""
+        return self._shaken.force
+
+    @property
+    def shaking_moment(self) -> Number:
+        """Of all moving masses on the frame, about the crank shaft, N·m."""
+        return self._shaken.moment
+
+
+def forces(
+    linked: "Chain | None", maths: Maths, pose: LinkagePose, given: Values, own: Values, loading: Loading
+) -> LinkageForces:
+    """Return the forces at an instant."""
+    assert linked is not None
+    return LinkageForces(linked, pose, loading, own)
+
+
+@functools.lru_cache(maxsize=64)
+def fitted(linked: "Chain") -> Check[LinkagePose]:
+    """Return the check of a linkage, with a figure for every force that it has."""
+    from loomopt.physics.mechanisms import chain_forces
+
+    vectors, teeth = {}, {f"teeth_{gear}": gear for gear in chain_forces.geared(linked)}
+    parts, places = {part.name: part for part in linked.parts}, chain_forces.names(linked)
+    for (joint, part), name in places.items():
+        where = f"in joint {joint}" if joint != part else f"in the guide of {part}"
+        shared = f", of {part}" if joint != name and parts[part].kind != "pivot" else ""
+        vectors[f"force_{name}"] = f"peak force {where}{shared}"
+    shaking = {"shaking_force": "peak inertia force of all moving masses on the frame"}
+    told = [Figure(name, "force", text, sides=("max",)) for name, text in (vectors | shaking).items()]
+    told += [
+        Figure(name, "force", f"peak force of the teeth of {gear}", sides=("max",)) for name, gear in teeth.items()
+    ]
+    rubbed = {name: f"joint {joint}" for (joint, _), name in chain_forces.pinned(linked).items()}
+    moment = "peak moment of all moving masses about the crank shaft"
+    return replace(
+        EFFECT,
+        own=pins.own(rubbed),
+        sides={f"force_{name}": chain_forces.joined(linked, place) for place, name in places.items()},
+        worked={pins.LOSS: "friction_work"},
+        wanted={pins.LOSS: ("operation.speed", *pins.read("joint_forces", rubbed))},
+        joints=functools.partial(forces, linked),
+        vectors=(*vectors, *shaking),
+        scalars=(*teeth, "shaking_moment"),
+        figures=(*told, Figure("shaking_moment", "torque", moment, sides=("max",)), pins.FIGURE),
+        fitted=None,
+    )
+
+
+EFFECT: Check[LinkagePose] = Check(
+    name="joint_forces",
+    summary="forces in the joints, and of all moving masses on the frame",
+    own=Own,
+    rank=90,
+    joints=functools.partial(forces, None),
+    fitted=fitted,
+    said=SAID,
+    examples=({},),
+)

@@ -1,0 +1,66 @@
+"""The mass of a link, or of what sits on a joint, after which its table is named: drive term of its inertia.
+
+(m p'·p'' + J θ' θ'') ω² + (m p'·p' + J θ'²) ω̇, the change of its kinetic energy by crank angle; p: its centre of mass,
+θ: its angle.
+"""
+
+from pydantic import Field
+
+from loomopt.base.quantities import Coordinate, Inertia, PositiveMass
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.physics.effects.linkage import LinkagePose, centre
+from loomopt.physics.mechanisms.dyad import dot
+from loomopt.physics.mechanisms.moving import less, plus, scaled, times, total
+from loomopt.physics.schema import Table, Values
+
+
+class Own(Table):
+    """Values of the link, or of what sits on the joint."""
+
+    mass: PositiveMass = Field(description="mass")
+    along: Coordinate | None = Field(None, description="centre of mass from the link's first joint, along its line")
+    across: Coordinate | None = Field(None, description="centre of mass to the left of the link's line")
+    J: Inertia | None = Field(None, description="inertia about the centre of mass")
+
+
+def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return the crank torque that moves it, N·m."""
+    link = pose.joints.links.get(own["instance"])
+    at = centre(pose.joints, own["instance"], own.get("along"), own.get("across"))
+    p1, p2, inertia = at.at(1), at.at(2), own.get("J")
+    w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
+    gained = total(None if p1 is None or p2 is None else own["mass"] * dot(p1, p2), times(inertia, w1, w2))
+    torque = None if gained is None else gained * pose.omega**2
+    if pose.omega_dot is not None:
+        carried = total(None if p1 is None else own["mass"] * dot(p1, p1), times(inertia, w1, w1))
+        torque = total(torque, times(carried, pose.omega_dot))
+    return 0 if torque is None else torque
+
+
+def applied(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+    """Return what the mass resists with, in its centre."""
+    link = pose.joints.links.get(own["instance"])
+    at = centre(pose.joints, own["instance"], own.get("along"), own.get("across"))
+    square, change, inertia = pose.omega**2, pose.omega_dot, own.get("J")
+    p1, p2 = at.at(1), at.at(2)
+    faster = None if p1 is None or change is None else scaled(change, p1)
+    pulled = plus(None if p2 is None else scaled(square, p2), faster)
+    push = None if pulled is None else scaled(-own["mass"], pulled)
+    w1, w2 = (link.rates(1), link.rates(2)) if link is not None else (None, None)
+    turned = total(times(square, w2), times(change, w1))
+    return [Applied(own["instance"], push, at.place, less(times(inertia, turned)), True)]
+
+
+EFFECT = Load(
+    name="mass",
+    summary="mass of a link or on a joint",
+    own=Own,
+    rank=40,
+    acts="drive",
+    force=force,
+    applied=applied,
+    needs=("operation.speed",),
+    many=True,
+    examples=({"mass": "1.5 kg", "along": "60 mm", "J": "0.002 kg*m^2"},),
+)

@@ -1,0 +1,94 @@
+"""Resistance at the output: a half cosine of crank angle about an event, or a curve of one's own.
+
+Output term M cos(π (φ − φ_event)/δ) for |φ − φ_event| ≤ δ/2, else 0, as [Yuan24, eq 3-4] has it of a fabric; or
+M(φ − φ_event) through the samples of a table. The corners move with the event.
+"""
+
+from pydantic import Field
+
+from loomopt.base.quantities import Force, PulseAngle, Torque
+from loomopt.maths.periodic_cubic import interval_at
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.cycle import TURN
+from loomopt.physics.effects.kinds import Load, LoadTable
+from loomopt.physics.effects.linkage import LinkagePose, event_angle
+from loomopt.physics.schema import Table, Values
+
+PULSE, AT = "crank angle δ through which it acts, about the event", "event about which it acts"
+SAID = "CSV file of it instead: angle [deg] from the event, {}, corner"
+
+
+class Own(Table):
+    """Values of the resistance, of an output that turns."""
+
+    torque: Torque | None = Field(None, description="largest torque")
+    pulse: PulseAngle | None = Field(None, description=PULSE)
+    at: str = Field(description=AT)
+    table: str | None = Field(None, description=SAID.format("M [N*m]"))
+
+
+class Sliding(Table):
+    """Values of the resistance, of an output that slides."""
+
+    force: Force | None = Field(None, description="largest force")
+    pulse: PulseAngle | None = Field(None, description=PULSE)
+    at: str = Field(description=AT)
+    table: str | None = Field(None, description=SAID.format("F [N]"))
+
+
+def corners(maths: Maths, given: Values, own: Values) -> tuple[Number, ...]:
+    """Return where the pulse begins and ends, rad; of a table where its intervals begin."""
+    middle = event_angle(given, own["at"])
+    if "table" in own:
+        return tuple(middle + maths.number(begin) for begin in own["table"].begins)
+    return middle - own["pulse"] / 2, middle + own["pulse"] / 2
+
+
+def switch(angle: float, corners: tuple[float, ...]) -> float:
+    """Return 1 inside the pulse and 0 outside, of a table the interval; angle in rad, anywhere on the turn."""
+    if len(corners) != 2:
+        return interval_at(angle, corners)
+    begin, end = corners
+    return 1.0 if (angle - begin) % TURN < end - begin else 0.0
+
+
+def force(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return the resistance, N·m or N, against q.
+
+    The branch of the angle since the event jumps where the other formula holds: half a turn away inside the pulse, at
+    the event itself outside.
+    """
+    angle = pose.phi - event_angle(given, own["at"])
+    if "table" in own:
+        return own["table"].at(maths, angle, switch)
+    side = 2 * switch - 1
+    since = maths.atan2(side * maths.sin(angle), side * maths.cos(angle))
+    return switch * own["torque" if "torque" in own else "force"] * maths.cos(maths.pi * since / own["pulse"])
+
+
+EFFECT = Load(
+    name="resistance",
+    summary="resistance at the output about an event",
+    own=Own,
+    letters={"pulse": "delta"},
+    rank=20,
+    acts="output",
+    force=force,
+    corners=corners,
+    switch=switch,
+    tabulated=LoadTable("M", "torque", "counted from the event", ("torque", "pulse")),
+    examples=({"torque": "745 N*m", "pulse": "29.8 deg", "at": "front"},),
+)
+SLIDING = Load(
+    name="resistance",
+    summary="resistance at the output about an event",
+    own=Sliding,
+    letters={"pulse": "delta"},
+    rank=20,
+    acts="output",
+    force=force,
+    corners=corners,
+    switch=switch,
+    tabulated=LoadTable("F", "force", "counted from the event", ("force", "pulse")),
+    examples=({"force": "5 kN", "pulse": "60 deg", "at": "front"},),
+)

@@ -1,0 +1,118 @@
+"""A spring: on the output, or between two joints.
+
+On the output it pushes against q: output term P + k (q − q_event), P its preload at the event. Between two joints it
+pulls them together: drive term k (L − L0) L', L their distance.
+"""
+
+from pydantic import Field
+
+from loomopt.base.quantities import Force, Length, RotaryStiffness, Stiffness, Torque
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.effects.kinds import Applied, Load
+from loomopt.physics.effects.linkage import LinkagePose
+from loomopt.physics.mechanisms.dyad import Vector, dot
+from loomopt.physics.mechanisms.moving import minus
+from loomopt.physics.schema import Table, Values
+
+AT = "event from which the output's travel counts"
+
+
+class Joining(Table):
+    """Values of a spring between two joints."""
+
+    begins: str = Field(description="joint where it begins")
+    ends: str = Field(description="joint where it ends")
+    stiffness: Stiffness = Field(description="stiffness")
+    free: Length = Field(description="its length without force")
+
+
+class Own(Table):
+    """Values of a spring on an output that turns."""
+
+    stiffness: RotaryStiffness = Field(description="stiffness")
+    at: str = Field(description=AT)
+    preload: Torque = Field(0.0, description="its torque at that event")
+
+
+class Sliding(Table):
+    """Values of a spring on an output that slides."""
+
+    stiffness: Stiffness = Field(description="stiffness")
+    at: str = Field(description=AT)
+    preload: Force = Field(0.0, description="its force at that event")
+
+
+def stretched(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return the crank torque that stretches a spring between two joints, N·m."""
+    a, b = (pose.joints.joints[own[key]] for key in ("begins", "ends"))
+    base, rate = minus(b.at(0), a.at(0)), minus(b.at(1), a.at(1))
+    if base is None or rate is None:
+        return 0
+    length = maths.sqrt(dot(base, base))
+    return own["stiffness"] * (length - own["free"]) * dot(base, rate) / length
+
+
+def pulls(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> list[Applied]:
+    """Return what a spring between two joints pulls them with."""
+    a, b = (pose.joints.joints[own[key]].place for key in ("begins", "ends"))
+    base = Vector(b.x - a.x, b.y - a.y)
+    length = maths.sqrt(dot(base, base))
+    share = own["stiffness"] * (length - own["free"]) / length
+    return [
+        Applied(own["begins"], Vector(share * base.x, share * base.y)),
+        Applied(own["ends"], Vector(-share * base.x, -share * base.y)),
+    ]
+
+
+def pushed(maths: Maths, pose: LinkagePose, given: Values, own: Values, switch: Number) -> Number:
+    """Return what a spring on the output takes, N·m or N, against q."""
+    return own["preload"] + own["stiffness"] * pose.travelled(given, own["at"])
+
+
+PLACES = "output at events"
+"""What the motion must tell: where the output is at its events."""
+TURNING = Load(
+    name="spring",
+    summary="spring on the output",
+    own=Own,
+    rank=65,
+    acts="output",
+    force=pushed,
+    reads=(PLACES,),
+    examples=({"stiffness": "50 N*m/rad", "at": "rear"},),
+)
+PUSHED = Load(
+    name="spring",
+    summary="spring on the output",
+    own=Sliding,
+    rank=65,
+    acts="output",
+    force=pushed,
+    reads=(PLACES,),
+    examples=({"stiffness": "5 N/mm", "at": "top"},),
+)
+JOINED = {"begins": "G", "ends": "E", "stiffness": "2 N/mm", "free": "120 mm"}
+EFFECT = Load(
+    name="spring",
+    summary="spring between two joints, or on the output",
+    own=Joining,
+    rank=65,
+    acts="drive",
+    force=stretched,
+    applied=pulls,
+    many=True,
+    alone=TURNING,
+    examples=(JOINED,),
+)
+SLIDING = Load(
+    name="spring",
+    summary="spring between two joints, or on the output",
+    own=Joining,
+    rank=65,
+    acts="drive",
+    force=stretched,
+    applied=pulls,
+    many=True,
+    alone=PUSHED,
+    examples=(JOINED,),
+)

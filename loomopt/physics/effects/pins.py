@@ -1,0 +1,45 @@
+"""What friction in pins takes, by their loads: μ r |F| times how a pin turns, F without friction [one explicit step].
+
+On slender pins that is close to what pins that brake each other take: at μ = 0.1 within a percent on a beat-up.
+"""
+
+from collections.abc import Mapping
+
+from pydantic import Field, create_model
+
+from loomopt.base.quantities import PositiveLength, PureNumber
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.schema import Figure, Table, Values
+
+LOSS = "friction_loss"
+FIGURE = Figure(LOSS, "power", "mean power that friction in the pins takes, by their loads", sides=())
+
+
+class Pin(Table):
+    """Friction of one pin."""
+
+    mu: PureNumber | None = Field(None, description="coefficient of friction, for what it loses under its load")
+    radius: PositiveLength | None = Field(None, description="radius of the pin or journal")
+
+
+def own(pins: Mapping[str, str]) -> type[Table]:
+    """Return the table of an effect that tells what pins lose; pins: name → what it is."""
+    fields = {name: (Pin | None, Field(None, description=text)) for name, text in pins.items()}
+    inner = create_model("Pins", __base__=Table, __module__=__name__, __doc__="Friction of each pin.", **fields)  # type: ignore[call-overload]
+    whole = (inner | None, Field(None, description="friction of the pins, for what they lose: a figure only"))
+    doc = "What only the loss by friction reads."
+    found: type[Table] = create_model("Own", __base__=Table, __module__=__name__, __doc__=doc, pins=whole)  # type: ignore[arg-type]
+    return found
+
+
+def read(effect: str, pins: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the scene keys that the loss by friction reads."""
+    return tuple(f"effects.{effect}.pins.{name}.{key}" for name in pins for key in Pin.model_fields)
+
+
+def works(maths: Maths, own: Values, turned: Mapping[str, tuple[str, Number]]) -> dict[str, Number]:
+    """Return what a newton of each force takes, m per rad of the crank; turned: pin → its force, and how it turns."""
+    size = {name: maths.sqrt(turn**2) for name, (_, turn) in turned.items()}
+    return {
+        force: own[f"pins.{name}.mu"] * own[f"pins.{name}.radius"] * size[name] for name, (force, _) in turned.items()
+    }

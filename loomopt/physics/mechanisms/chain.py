@@ -1,0 +1,520 @@
+"""A planar linkage of one degree of freedom: a chain of parts, each placed by one formula on those before it.
+
+What a caller uses:
+    linked = Chain(parts)                              parts in an order in which each hangs on those before it
+    pose = linked.pose(maths, values, phi, switch)     the linkage at crank angles φ, rad, in any number system
+    pose.joints[name].at(k), .place                    k-th derivative of a joint, m (None: zero); its place
+    pose.links[name].unit(), .rates(k), .point(a, b)   direction; derivatives of its angle; a point of it as a joint
+    pose.slides[name].at(k)                            place of a slider, or in a slot, m, and its derivatives
+    pose.vector(link), pose.obliquity(part)            direction of any length; π/2 less the transmission angle, rad
+    pose.margins[part].spans[name]()                   1 where a group is singular; `closes(part)` says them in words
+    fault(linked, values, shown)                       the part that does not close, and at which crank angle, in words
+    linked.joints, .links, .slides, .pivots            names; .bars, .bodies: what is drawn
+    provides(part), wants(part)                        names that a part places, and hangs on
+    linked.cams, .corners(cam, …), .switch(…)          cams: the node's switch says in which stretch each of them is
+A part's number is a name in `values`, its opposite, or a literal (Ref); the literal 0 is in no formula.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from loomopt.base.records import Frozen, lazy
+from loomopt.base.units import ShowValue, usual
+from loomopt.maths.systems import FLOAT, Maths, Number, numpy
+from loomopt.physics.mechanisms.assur_groups import Closure, OnGuide, Slide, Slotted, TwoLinks
+from loomopt.physics.mechanisms.dwell_cam import DwellCam, Stretches, stretches
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.moving import (
+    FRAME,
+    Joint,
+    Link,
+    X,
+    polar,
+    scaled,
+    seen_from,
+    times,
+    total,
+    turned_by,
+)
+from loomopt.physics.schema import Values
+
+if TYPE_CHECKING:
+    from loomopt.maths.turning_points import Floats
+
+SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
+FRAME_NAME = "frame"
+NO_SWITCH: Values = Frozen()
+
+
+class Ref(NamedTuple):
+    """A number of the scene by its name, or its opposite (sign −1); without a name the literal `value`, SI."""
+
+    name: str
+    sign: int = 1
+    value: float = 0.0
+
+
+NOTHING = Ref("")
+"""The literal 0."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part.
+
+    kind: a key of KINDS; words: by key, what it hangs on and what it places; refs: by key, its numbers (a link's length
+    under the link's name).
+    """
+
+    kind: str
+    name: str
+    words: tuple[tuple[str, Hashable], ...] = ()
+    refs: tuple[tuple[str, Ref], ...] = ()
+
+    @lazy
+    def _words(self) -> dict[str, Hashable]:
+        return dict(self.words)
+
+    @lazy
+    def numbers(self) -> dict[str, Ref]:
+        """Its numbers by key."""
+        return dict(self.refs)
+
+    def word(self, key: str) -> str:
+        """Return a word by its key; "" without it."""
+        found = self._words.get(key, "")
+        return found if isinstance(found, str) else ""
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Return a list of words by its key."""
+        found = self._words.get(key, ())
+        return found if isinstance(found, tuple) else ()
+
+    @property
+    def ratio(self) -> int | float:
+        """How often it turns for one turn of what drives it."""
+        found = self._words.get("ratio", 1)
+        return found if isinstance(found, int | float) else 1
+
+
+@dataclass
+class Pose:
+    """The linkage at crank angles φ, rad, any shape; values: numbers by name, SI; switch: the cams' pieces there."""
+
+    maths: Maths
+    values: Values
+    phi: Number
+    switch: Values = field(default_factory=Frozen)
+    joints: dict[str, Joint] = field(default_factory=dict)
+    links: dict[str, Link] = field(default_factory=lambda: {FRAME_NAME: FRAME})
+    slides: dict[str, Slide] = field(default_factory=dict)
+    margins: dict[str, Closure] = field(default_factory=dict)
+
+    def number(self, part: Part, key: str) -> Number | None:
+        """Return a part's number; None for one that is not given, and for a literal 0."""
+        ref = part.numbers.get(key)
+        if ref is None:
+            return None
+        if not ref.name:
+            return self.maths.number(ref.value) if ref.value else None
+        return self.values[ref.name] if ref.sign > 0 else -self.values[ref.name]
+
+    def vector(self, link: str) -> Vector:
+        """Return a link's direction, of any length."""
+        return self.links[link].heading()
+
+    def obliquity(self, part: str) -> Number:
+        """Return by how much a group's transmission angle falls short of a right angle, rad; negative beyond it."""
+        margin = self.margins[part]
+        return self.maths.atan2(margin.inward(), margin.across())
+
+    def place(self, part: Part) -> None:
+        """Put a part on those that are there."""
+        KINDS[part.kind](self, part)
+
+
+def _pivot(pose: Pose, part: Part) -> None:
+    """Place a point of the frame; without coordinates it is the origin, whose zeros are in no formula."""
+    x, y = pose.number(part, "x"), pose.number(part, "y")
+    here = None if x is None and y is None else Vector(0 if x is None else x, 0 if y is None else y)
+    pose.joints[part.name] = Joint(lambda order: None if order else here)
+
+
+def _crank(pose: Pose, part: Part) -> None:
+    """Place what turns with φ: angle = start + ratio φ. Another ratio is a gear on the main shaft."""
+    ratio, start, phi = part.ratio, pose.number(part, "start"), pose.phi
+
+    def angle() -> Number:
+        return total(phi if ratio == 1 else ratio * phi, start)
+
+    _by_angle(pose, part, angle, lambda order: ratio if order == 1 else None)
+
+
+def _by_angle(
+    pose: Pose, part: Part, angle: Callable[[], Number | None], rates: Callable[[int], Number | None]
+) -> None:
+    """Place a link whose angle from x is known, rad, with its derivatives."""
+    maths = pose.maths
+    _turning(pose, part, Link(pose.joints[part.word("at")], lambda: polar(maths, angle()), rates, angle=angle))
+
+
+def _turning(pose: Pose, part: Part, link: Link) -> None:
+    """Add a link that turns about a joint, and the pin at its end."""
+    pose.links[part.name] = link
+    if part.word("pin"):
+        pose.joints[part.word("pin")] = link.point(pose.number(part, "length"))
+
+
+def _gear(pose: Pose, part: Part) -> None:
+    """Place a gear: its angle from the carrier is start + ratio (angle of its mate from the carrier − zero).
+
+    ratio < 0: they mesh from outside. A whole ratio needs no angle: unit vectors are multiplied as complex numbers.
+    Another one takes the mate's angle from the carrier between zero − π and zero + π.
+    """
+    mate, carrier = pose.links[part.word("with")], pose.links[part.word("carrier") or FRAME_NAME]
+    ratio, start, zero, maths = part.ratio, pose.number(part, "start"), pose.number(part, "zero"), pose.maths
+    rest = total(start, times(-ratio, zero))
+
+    def rates(order: int) -> Number | None:
+        return total(times(ratio, mate.rates(order)), times(1 - ratio, carrier.rates(order)))
+
+    if mate.angle is not None and carrier.angle is not None:
+        of_mate, of_carrier = mate.angle, carrier.angle
+        _by_angle(pose, part, lambda: total(times(ratio, of_mate()), times(1 - ratio, of_carrier()), rest), rates)
+        return
+
+    def heading() -> Vector:
+        v = carrier.unit()
+        if isinstance(ratio, int):
+            return turned_by(polar(maths, rest), turned_by(v, _power(seen_from(v, mate.unit()), ratio)))
+        between = _counted(maths, mate, carrier, zero)
+        swung = ratio * maths.atan2(between.y, between.x)
+        return turned_by(v, polar(maths, total(swung, start)))
+
+    _turning(pose, part, Link(pose.joints[part.word("at")], heading, rates))
+
+
+def _counted(maths: Maths, mate: Link, carrier: Link, zero: Number | None) -> Vector:
+    """Return the direction of a gear's mate as seen from its carrier, counted from zero."""
+    seen = seen_from(carrier.unit(), mate.unit())
+    return seen if zero is None else seen_from(polar(maths, zero), seen)
+
+
+def _power(unit: Vector, exponent: int) -> Vector:
+    """Return the unit vector whose angle is a whole multiple of another's."""
+    if exponent < 0:
+        unit, exponent = Vector(unit.x, -unit.y), -exponent
+    found = X
+    while exponent:
+        if exponent & 1:
+            found = turned_by(unit, found)
+        unit, exponent = turned_by(unit, unit), exponent >> 1
+    return found
+
+
+def _cam(pose: Pose, part: Part) -> None:
+    """Place a link that a cam turns; which stretch of its turn it is in is data of the node: `Chain.corners`."""
+    start, lift = pose.number(part, "start"), pose.number(part, "lift")
+    at = DwellCam(pose.maths, _lasts(pose, part), lift, pose.phi, pose.switch[cam_switch(part)])
+    _by_angle(pose, part, lambda: total(at.angle(0), start), at.angle)
+
+
+def cam_switch(part: Part) -> str:
+    """Return the name under which a node says in which stretch of its turn a cam is."""
+    return f"cam {part.name}"
+
+
+def _lasts(pose: Pose, part: Part) -> Stretches:
+    begins, rise, dwell, fall = (pose.number(part, key) for key in ("begins", "rise", "far_dwell", "return"))
+    return Stretches(part.word("law"), 0 if begins is None else begins, rise, 0 if dwell is None else dwell, fall)
+
+
+def _point(pose: Pose, part: Part) -> None:
+    """Place a point of a link: by radius and angle from its line, or along its line and across it to the left."""
+    link, radius = pose.links[part.word("on")], pose.number(part, "radius")
+    if radius is None:
+        pose.joints[part.name] = link.point(pose.number(part, "along"), pose.number(part, "across"))
+    elif pose.number(part, "angle") is None:
+        pose.joints[part.name] = link.point(radius)
+    else:
+        pose.joints[part.name] = link.point(*scaled(radius, polar(pose.maths, pose.number(part, "angle"))))
+
+
+def _dyad(pose: Pose, part: Part) -> None:
+    """Place an Assur group RRR."""
+    (first, second), names = (pose.joints[name] for name in part.names("joins")), part.names("links")
+    r1, r2 = (pose.number(part, name) for name in names)
+    group = TwoLinks(pose.maths, first, second, r1, r2, SIDES[part.word("side")])
+    one, other = group.links()
+    pose.links.update(zip(names, (one, other), strict=True))
+    # The pin is reached over the second link: fewest terms where its joint is fixed.
+    pose.joints[part.word("pin")] = Joint(other.carried(other.heading))
+    pose.margins[part.name] = group
+
+
+def _slider(pose: Pose, part: Part) -> None:
+    """Place an Assur group RRP."""
+    (name,) = part.names("links")
+    group = OnGuide(
+        pose.maths,
+        pose.joints[part.word("from")],
+        pose.joints[part.word("through")],
+        pose.links[part.word("guide") or FRAME_NAME],
+        polar(pose.maths, pose.number(part, "direction")),
+        pose.number(part, "offset"),
+        pose.number(part, name),
+        SIDES[part.word("side")],
+    )
+    link = pose.links[name] = group.link()
+    pose.joints[part.word("pin")] = Joint(link.carried(link.heading))
+    pose.slides[part.name], pose.margins[part.name] = group.slide(), group
+
+
+def _slot(pose: Pose, part: Part) -> None:
+    """Place an Assur group RPR."""
+    pivot, through = pose.joints[part.word("at")], pose.joints[part.word("through")]
+    group = Slotted(pose.maths, pivot, through, pose.number(part, "offset"))
+    link = pose.links[part.word("link")] = group.link()
+    pose.slides[part.name], pose.margins[part.name] = group.slide(), group
+    if part.word("pin"):
+        pose.joints[part.word("pin")] = link.point(pose.number(part, "length"))
+
+
+KINDS: Mapping[str, Callable[[Pose, Part], None]] = {
+    "pivot": _pivot,
+    "crank": _crank,
+    "gear": _gear,
+    "cam": _cam,
+    "point": _point,
+    "dyad": _dyad,
+    "slider": _slider,
+    "slot": _slot,
+}
+DRIVERS = frozenset({"crank", "gear", "cam"})
+"""Parts that are a link of their own name."""
+
+
+def joints_of(part: Part) -> tuple[str, ...]:
+    """Return the joints that a part places."""
+    own = (part.name,) if part.kind in ("pivot", "point") else ()
+    return (*own, part.word("pin")) if part.word("pin") else own
+
+
+def links_of(part: Part) -> tuple[str, ...]:
+    """Return the links that a part places."""
+    if part.kind in DRIVERS:
+        return (part.name,)
+    return (part.word("link"),) if part.word("link") else part.names("links")
+
+
+def provides(part: Part) -> tuple[str, ...]:
+    """Return the joints and links that a part places."""
+    return joints_of(part) + links_of(part)
+
+
+def wanted_joints(part: Part) -> tuple[str, ...]:
+    """Return the joints that a part hangs on."""
+    found = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
+    return tuple(name for name in found if name)
+
+
+def wanted_links(part: Part) -> tuple[str, ...]:
+    """Return the links that a part hangs on; the frame is always there."""
+    found = (part.word(key) for key in ("on", "guide", "with", "carrier"))
+    return tuple(name for name in found if name not in ("", FRAME_NAME))
+
+
+def wants(part: Part) -> tuple[str, ...]:
+    """Return the joints and links that a part hangs on."""
+    return wanted_joints(part) + wanted_links(part)
+
+
+def closes(part: Part) -> Mapping[str, str]:
+    """Return the spans of a part's margin by what they say: "drive: B to D < rod + rocker"."""
+    if part.kind == "dyad":
+        (a, b), (one, other) = part.names("joins"), part.names("links")
+        far, near = f"{part.name}: {a} to {b} < {one} + {other}", f"{part.name}: {a} to {b} > |{one} - {other}|"
+        if part.numbers[one] == part.numbers[other]:
+            return {far: "span_far", **_apart(part, a, b)}
+        return {far: "span_far", near: "span_near"}
+    if part.kind == "slider":
+        return {f"{part.name}: {part.names('links')[0]} reaches its guide": "span"}
+    if part.kind == "slot":
+        if has_transmission_angle(part):
+            return {f"{part.name}: the slot of {part.word('link')} reaches {part.word('through')}": "span"}
+        return _apart(part, part.word("through"), part.word("at"))
+    return {}
+
+
+def _apart(part: Part, a: str, b: str) -> Mapping[str, str]:
+    return {f"{part.name}: {a} keeps away from {b}": "span_pass"}
+
+
+def has_transmission_angle(part: Part) -> bool:
+    """Say whether a part has one that is not always a right angle."""
+    return part.kind in ("dyad", "slider") or (part.numbers.get("offset", NOTHING) != NOTHING and part.kind == "slot")
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Parts in an order in which each hangs on those before it, apart from their numbers."""
+
+    parts: tuple[Part, ...]
+
+    def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> Pose:
+        """Return the linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
+        pose = Pose(maths, values, phi, switch)
+        for part in self.parts:
+            KINDS[part.kind](pose, part)
+        return pose
+
+    @lazy
+    def cams(self) -> tuple[Part, ...]:
+        """The parts whose turn falls into stretches of formulas of their own."""
+        return tuple(part for part in self.parts if part.kind == "cam")
+
+    def corners(self, cam: Part, maths: Maths, values: Values) -> tuple[Number, ...]:
+        """Return the crank angles, rad, between the stretches of a cam, for `dwell_cam.stretch`."""
+        return _lasts(Pose(maths, values, None), cam).corners(maths)
+
+    def switch(self, values: Values, phi: "Floats") -> dict[str, Number]:
+        """Return the stretches in which all cams are at crank angles φ, rad, as a node has them."""
+        return {cam_switch(cam): stretches(phi, self.corners(cam, FLOAT, values)) for cam in self.cams}
+
+    @lazy
+    def joints(self) -> tuple[str, ...]:
+        """The names of all joints."""
+        return tuple(name for part in self.parts for name in joints_of(part))
+
+    @lazy
+    def links(self) -> tuple[str, ...]:
+        """The names of all links, the frame not among them."""
+        return tuple(name for part in self.parts for name in links_of(part))
+
+    @lazy
+    def slides(self) -> tuple[str, ...]:
+        """The names of the parts in which something slides."""
+        return tuple(part.name for part in self.parts if part.kind in ("slider", "slot"))
+
+    @lazy
+    def pivots(self) -> tuple[str, ...]:
+        """The joints that do not move."""
+        return tuple(part.name for part in self.parts if part.kind == "pivot")
+
+    @lazy
+    def bars(self) -> tuple[tuple[str, str, str], ...]:
+        """(link, joint, joint) of every line that is drawn."""
+        found: list[tuple[str, str, str]] = []
+        origin: dict[str, str] = {}
+        for part in self.parts:
+            pin = part.word("pin")
+            starts = part.names("joins") or (part.word("from") or part.word("at"),)
+            origin |= dict(zip(links_of(part), starts, strict=False))
+            if part.kind == "slot":
+                found.append((part.word("link"), part.word("at"), part.word("through")))
+            if part.kind == "point":
+                found.append((part.word("on"), origin[part.word("on")], part.name))
+            elif pin:
+                found += [(link, origin[link], pin) for link in links_of(part)]
+        return tuple(found)
+
+    @lazy
+    def bodies(self) -> Mapping[str, tuple[str, ...]]:
+        """All joints of each link, those of a plate in the order in which they came; the frame's are its pivots."""
+        found: dict[str, tuple[str, ...]] = {FRAME_NAME: self.pivots}
+        for link, a, b in self.bars:
+            found[link] = tuple(dict.fromkeys((*found.get(link, ()), a, b)))
+        return found
+
+
+SAMPLES, WORTH_A_LOOK, SINGULAR = 720, 0.99, 1e-12
+"""Samples of one turn between which the closest position of a group is sought; its span there from which that is done:
+half a degree beside its top a span is lower by less than a hundredth; and the share of its span by which a group must
+close, a hundred times the rounding of a place."""
+
+
+def fault(chain: Chain, values: Values, shown: ShowValue = usual) -> str:
+    """Say which part does not close, and at which crank angle, also where it only touches; "" where all do.
+
+    values: numbers by name, SI; shown(value, kind): a value as text in the reader's unit.
+    """
+    import numpy as np
+
+    with np.errstate(all="ignore"):
+        for part in chain.parts:
+            found = _cam_fault(chain, part, values, shown) if part.kind == "cam" else ""
+            found = found or (_gear_fault(chain, part, values, shown) if part.kind == "gear" else "")
+            for phrase, span in {} if found else _spans(part).items():
+                top, place = _top(functools.partial(_heights, chain, part, span, values))
+                if not top < 1 - SINGULAR:
+                    return f"{phrase} fails at crank angle {shown(place, 'angle')}"
+            if found:
+                return found
+    return ""
+
+
+def _spans(part: Part) -> Mapping[str, str]:
+    """Return what must close, and of a dyad that its joints do not meet: equal links fold nowhere else."""
+    own = closes(part)
+    return {**own, **_apart(part, *part.names("joins"))} if part.kind == "dyad" else own
+
+
+def _heights(chain: Chain, part: Part, span: str, values: Values, phi: "Floats") -> "Floats":
+    import numpy as np
+
+    found = chain.pose(numpy(), values, phi, chain.switch(values, phi)).margins[part.name].spans[span]()
+    return np.broadcast_to(np.asarray(found, dtype=np.float64), phi.shape)
+
+
+def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
+    """Return the highest of heights(angles) over one turn, between samples too where it nears 1, and its angle, rad."""
+    import numpy as np
+
+    from loomopt.maths.turning_points import sectioned
+
+    step = 2 * math.pi / SAMPLES
+    angles: Floats = step * np.arange(SAMPLES, dtype=np.float64)
+    values = heights(angles)
+    best = int(np.argmax(values))
+    found = [(float(values[best]), float(angles[best]))]
+    if not found[0][0] < 1 - SINGULAR:
+        return found[0]
+    tops = (values >= np.roll(values, 1)) & (values >= np.roll(values, -1)) & (values > WORTH_A_LOOK)
+    for angle in angles[tops]:
+        at = sectioned(heights, float(angle) - step, float(angle) + step)
+        found.append((float(heights(np.array([at]))[0]), at % (2 * math.pi)))
+    return max(found, key=lambda each: math.inf if math.isnan(each[0]) else each[0])
+
+
+def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
+    corners = chain.corners(part, FLOAT, values)
+    spent = corners[-1] - corners[0]
+    if spent < 2 * math.pi:
+        return ""
+    return f"{part.name}: rise, far_dwell and return take {shown(spent, 'angle')}, and a turn has less room"
+
+
+def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
+    """Say where the angle that a gear of no whole ratio counts passes its end, or that it does not come back."""
+    import numpy as np
+
+    if isinstance(part.ratio, int):
+        return ""
+    angles = np.linspace(0.0, 2 * math.pi, SAMPLES + 1)
+    pose = chain.pose(numpy(), values, angles, chain.switch(values, angles))
+    if pose.links[part.name].angle is None:
+        mate, carrier = pose.links[part.word("with")], pose.links[part.word("carrier") or FRAME_NAME]
+        between = _counted(pose.maths, mate, carrier, pose.number(part, "zero"))
+        counted = np.broadcast_to(np.arctan2(between.y, between.x), angles.shape)
+        steps = np.abs(np.diff(counted))
+        jump = int(np.argmax(steps))
+        if steps[jump] > math.pi:
+            end = f"{part.name}: {part.word('with')} keeps within half a turn of zero"
+            return f"{end} fails at crank angle {shown(float(angles[jump]), 'angle')}"
+    x, y = (np.broadcast_to(each, angles.shape) for each in pose.links[part.name].unit())
+    if math.hypot(x[-1] - x[0], y[-1] - y[0]) > 1e-9:
+        return f"{part.name}: after a turn of the crank it stands elsewhere, for its ratio is no whole number"
+    return ""

@@ -1,0 +1,257 @@
+"""Forces in every joint of a chain of parts: the groups are solved from the last part back to the crank.
+
+What acts on a body is one force and one moment about the axes' origin. Solving a part gives the forces in its joints;
+their opposites are loads of the bodies that it hangs on. A slider's pin is a body of its own; a pin of two links
+belongs to the second one, and what else hangs there pushes on that. Gears touch where their pitch circles do, across
+the line of centres: what parts the wheels is left out; gears on one axis hand on a couple. Where a cam touches its
+follower no part tells: it gives a torque, and the follower's own pivot stays unknown. Symbols: `joint_forces`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from loomopt.base.records import lazy
+from loomopt.maths.systems import Number
+from loomopt.physics.effects.kinds import Applied
+from loomopt.physics.mechanisms import joint_forces
+from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part, Pose
+from loomopt.physics.mechanisms.dyad import Dyad, Vector, dot
+from loomopt.physics.mechanisms.joint_forces import Wrench, cross, minus, plus
+from loomopt.physics.mechanisms.moving import known, less, polar, total, turned_by
+
+
+def slider_of(part: str) -> str:
+    """Return the name of the body that slides in a part."""
+    return f"slider {part}"
+
+
+def owners(linked: Chain) -> dict[str, str]:
+    """Return the body that each joint belongs to."""
+    found = {}
+    for part in linked.parts:
+        pin = part.word("pin")
+        if part.kind == "pivot":
+            found[part.name] = FRAME_NAME
+        elif part.kind == "point":
+            found[part.name] = part.word("on")
+        elif pin:
+            own = {"dyad": part.names("links")[-1:], "slider": (slider_of(part.name),), "slot": (part.word("link"),)}
+            found[pin] = own.get(part.kind, (part.name,))[0]
+    return found
+
+
+def origins(linked: Chain) -> dict[str, str]:
+    """Return the joint about which each link's moment is reckoned."""
+    found: dict[str, str] = {}
+    for part in linked.parts:
+        if part.kind == "dyad":
+            found |= dict(zip(part.names("links"), part.names("joins"), strict=True))
+        elif part.kind == "slider":
+            found[part.names("links")[0]] = part.word("from")
+        elif part.kind == "slot":
+            found[part.word("link")] = part.word("at")
+        elif part.kind in ("crank", "gear", "cam"):
+            found[part.name] = part.word("at")
+    return found
+
+
+def held(linked: Chain) -> Iterator[tuple[str, str]]:
+    """Yield each force that a chain has: a joint and the part that has it there; a slider's guide, a gear's teeth."""
+    for part in linked.parts:
+        if part.kind == "dyad":
+            yield from ((joint, part.name) for joint in (*part.names("joins"), part.word("pin")))
+        elif part.kind == "slider":
+            yield from ((joint, part.name) for joint in (part.word("from"), part.word("pin"), part.name))
+        elif part.kind == "slot":
+            yield from ((joint, part.name) for joint in (part.word("at"), part.word("through")))
+        elif part.kind in ("crank", "gear"):
+            yield part.word("at"), part.name
+
+
+def names(linked: Chain) -> dict[tuple[str, str], str]:
+    """Return what the force of each joint and part is called: by the joint, and by the part where several share it."""
+    found = list(held(linked))
+    shared = [joint for joint, _ in found]
+    return {each: each[0] if shared.count(each[0]) == 1 else f"{each[0]}_{each[1]}" for each in found}
+
+
+def pinned(linked: Chain) -> dict[tuple[str, str], str]:
+    """Return which of them are forces in pins: all but those of guides."""
+    return {place: name for place, name in names(linked).items() if place[0] != place[1]}
+
+
+def joined(linked: Chain, place: tuple[str, str]) -> tuple[str, str]:
+    """Return the bodies that a force is between: of the first on the second one."""
+    joint, own = place
+    part = next(each for each in linked.parts if each.name == own)
+    if part.kind == "dyad":
+        first, second = part.names("links")
+        if joint == part.word("pin"):
+            return first, second
+        return owners(linked)[joint], first if joint == part.names("joins")[0] else second
+    if part.kind == "slider":
+        (link,), slider = part.names("links"), slider_of(own)
+        if joint == own:
+            return part.word("guide") or FRAME_NAME, slider
+        return (link, slider) if joint == part.word("pin") else (owners(linked)[joint], link)
+    return owners(linked)[joint], part.word("link") if part.kind == "slot" else own
+
+
+def guides(linked: Chain) -> dict[str, str]:
+    """Return what turns each slider: the body that it slides on."""
+    sliders = (part for part in linked.parts if part.kind == "slider")
+    return {slider_of(part.name): part.word("guide") or FRAME_NAME for part in sliders}
+
+
+def turned(linked: Chain, pose: Pose, place: tuple[str, str]) -> Number:
+    """Return how the second body of a pin turns from the first one, per rad of the crank."""
+    with_it = guides(linked)
+    first, second = (pose.links[with_it.get(body, body)].rates(1) for body in joined(linked, place))
+    return known(total(second, less(first)))
+
+
+def geared(linked: Chain) -> tuple[str, ...]:
+    """Return the gears that touch their mates at their pitch circles."""
+    own = origins(linked)
+    gears = (part for part in linked.parts if part.kind == "gear" and part.ratio != 1)
+    return tuple(part.name for part in gears if own[part.word("with")] != part.word("at"))
+
+
+@dataclass
+class Walk:
+    """A chain at one instant while its groups are solved.
+
+    forces: by joint and part, on that part's link, N; of a pin between two links of a group on the second one; teeth:
+    by gear, N, of the mate on it; torque: what the main shaft must give, N·m.
+    """
+
+    linked: Chain
+    pose: Pose
+    loads: dict[str, list[Wrench]] = field(default_factory=dict)
+    forces: dict[tuple[str, str], Vector] = field(default_factory=dict)
+    teeth: dict[str, Number] = field(default_factory=dict)
+    torque: Number = 0
+
+    @lazy
+    def owners(self) -> Mapping[str, str]:
+        """The body that each joint belongs to."""
+        return owners(self.linked)
+
+    @lazy
+    def origins(self) -> Mapping[str, str]:
+        """The joint about which each link's moment is reckoned."""
+        return origins(self.linked)
+
+    def at(self, joint: str) -> Vector:
+        """Return where a joint is, m."""
+        return self.pose.joints[joint].place
+
+    def push(self, body: str, force: Vector | None, place: Vector, couple: Number | None = None) -> None:
+        """Load a body."""
+        moment = known(couple)
+        if force is not None:
+            turning = cross(place, force)
+            moment = turning if couple is None else moment + turning
+        self.loads.setdefault(body, []).append(Wrench(force or Vector(0, 0), moment))
+
+    def acting(self, body: str, joint: str) -> Wrench | None:
+        """Return what acts on a body, about one of its joints; None for nothing."""
+        found = joint_forces.together(self.loads.get(body, ()))
+        return None if found is None else Wrench(found.force, found.moment - cross(self.at(joint), found.force))
+
+    def given(self, joint: str, part: Part, force: Vector) -> None:
+        """Keep the force of a joint on a part's link, and its opposite on what the joint belongs to."""
+        self.forces[joint, part.name] = force
+        self.push(self.owners[joint], minus(force), self.at(joint))
+
+    def solve(self, part: Part) -> None:
+        """Solve a part that nothing hangs on any more."""
+        solver = {"dyad": self._dyad, "slider": self._slider, "slot": self._slot, "gear": self._gear}
+        if part.kind in solver:
+            solver[part.kind](part)
+        elif part.kind in ("crank", "cam"):
+            self._driver(part)
+
+    def _dyad(self, part: Part) -> None:
+        (a, b), (first, second), pin = part.names("joins"), part.names("links"), part.word("pin")
+        r1, r2 = plus(self.at(pin), minus(self.at(a))), plus(self.at(pin), minus(self.at(b)))
+        found = joint_forces.two_links(Dyad(r1, r2, 2 * cross(r1, r2)), self.acting(first, a), self.acting(second, b))
+        self.forces[pin, part.name] = found.inner
+        self.given(a, part, found.outer1)
+        self.given(b, part, found.outer2)
+
+    def _slider(self, part: Part) -> None:
+        start, pin, guide = part.word("from"), part.word("pin"), part.word("guide") or FRAME_NAME
+        along = self.sliding(part)
+        link = self.acting(part.names("links")[0], start) or Wrench(Vector(0, 0), 0)
+        slider = self.acting(slider_of(part.name), pin) or Wrench(Vector(0, 0), 0)
+        arm = plus(self.at(pin), minus(self.at(start)))
+        found = joint_forces.link_and_slider(arm, along, link, slider.force)
+        self.forces[pin, part.name], self.forces[part.name, part.name] = found.inner, found.outer2
+        self.push(guide, minus(found.outer2), self.at(pin))
+        self.given(start, part, found.outer1)
+
+    def sliding(self, part: Part) -> Vector:
+        """Return the unit direction in which a slider moves."""
+        guide = self.pose.links[part.word("guide") or FRAME_NAME].unit()
+        return turned_by(guide, polar(self.pose.maths, self.pose.number(part, "direction")))
+
+    def _slot(self, part: Part) -> None:
+        pivot, through, link = part.word("at"), part.word("through"), part.word("link")
+        arm, lever = plus(self.at(through), minus(self.at(pivot))), self.acting(link, pivot)
+        nothing = Wrench(Vector(0, 0), 0)
+        found = joint_forces.slotted_lever(arm, self.pose.links[link].unit(), lever or nothing, nothing)
+        self.given(pivot, part, found.outer1)
+        self.given(through, part, found.outer2)
+
+    def _driver(self, part: Part) -> None:
+        joint = part.word("at")
+        own = self.acting(part.name, joint)
+        if own is None:
+            own = Wrench(Vector(0, 0), 0)
+        rate = part.ratio if part.kind == "crank" else known(self.pose.links[part.name].rates(1))
+        self.torque = self.torque - own.moment * rate
+        if part.kind == "crank":
+            self.given(joint, part, minus(own.force))
+
+    def _gear(self, part: Part) -> None:
+        joint, mate = part.word("at"), part.word("with")
+        own = self.acting(part.name, joint) or Wrench(Vector(0, 0), 0)
+        torque, here = -own.moment, self.at(joint)
+        if part.name not in geared(self.linked):
+            # On one axis, or side by side with the same speed: a couple, and what is left of it on the carrier.
+            self.push(mate, None, here, -part.ratio * torque)
+            self.push(part.word("carrier") or FRAME_NAME, None, here, (part.ratio - 1) * torque)
+            self.given(joint, part, minus(own.force))
+            return
+        between = plus(self.at(self.origins[mate]), minus(here))
+        distance = self.pose.maths.sqrt(dot(between, between))
+        towards, radius = Vector(between.x / distance, between.y / distance), distance / (1 - part.ratio)
+        self.teeth[part.name] = torque / radius
+        push = joint_forces.tooth_force(torque, radius, towards)
+        self.push(mate, minus(push), Vector(here.x + radius * towards.x, here.y + radius * towards.y))
+        self.given(joint, part, minus(plus(own.force, push)))
+
+
+def walked(linked: Chain, pose: Pose, applied: Sequence[Applied]) -> Walk:
+    """Return a chain with the forces in all its joints, N, and what the main shaft must give."""
+    walk = Walk(linked, pose)
+    for load in applied:
+        if load.on in pose.joints:
+            walk.push(walk.owners[load.on], load.force, load.place or walk.at(load.on), load.couple)
+        else:
+            walk.push(load.on, load.force, load.place or Vector(0, 0), load.couple)
+    for part in reversed(linked.parts):
+        walk.solve(part)
+    return walk
+
+
+def shaken(applied: Sequence[Applied], pose: Pose, about: Vector) -> Wrench:
+    """Return what all moving masses do to the frame: force, N, and moment about a point, N·m."""
+    found = []
+    for load in (load for load in applied if load.inertial):
+        force = load.force or Vector(0, 0)
+        place = load.place or (pose.joints[load.on].place if load.on in pose.joints else about)
+        moment = cross(plus(place, minus(about)), force)
+        found.append(Wrench(force, moment if load.couple is None else moment + load.couple))
+    return joint_forces.together(found) or Wrench(Vector(0, 0), 0)

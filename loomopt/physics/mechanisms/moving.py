@@ -1,0 +1,194 @@
+"""Points and links that move with the crank angle φ: positions and their derivatives up to the third.
+
+Lengths in m, angles in rad, derivatives with respect to φ. What nobody reads is not computed. None stands for what is
+zero by construction, such as the velocity of a pivot: it is in no formula. Directions are unit vectors, never angles,
+so that nothing here has a branch cut. What belongs to one position is no frozen record: that takes twice as long to
+make, and positions are made by the million.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+from loomopt.base.records import lazy
+from loomopt.maths.systems import Maths, Number
+from loomopt.physics.mechanisms.dyad import Vector, dot
+
+Rates = Callable[[int], Number | None]
+"""rates(k): the k-th derivative of an angle, k = 1, 2, 3."""
+Found = TypeVar("Found")
+
+X = Vector(1, 0)
+"""The direction of the frame."""
+
+
+def by_order(formula: Callable[[int], Found]) -> Callable[[int], Found]:
+    """Return a formula of an order of derivative that is computed when it is first read."""
+    known: dict[int, Found] = {}
+
+    def read(order: int) -> Found:
+        if order not in known:
+            known[order] = formula(order)
+        return known[order]
+
+    return read
+
+
+def once(formula: Callable[[], Found]) -> Callable[[], Found]:
+    """Return a formula that is computed when it is first read."""
+    found: list[Found] = []
+
+    def read() -> Found:
+        if not found:
+            found.append(formula())
+        return found[0]
+
+    return read
+
+
+def cross(a: Vector, b: Vector) -> Number:
+    """Return the outer product a × b."""
+    return a.x * b.y - a.y * b.x
+
+
+def left_of(a: Vector) -> Vector:
+    """Return a turned by a right angle to the left."""
+    return Vector(-a.y, a.x)
+
+
+def scaled(length: Number, a: Vector) -> Vector:
+    """Return a times a number."""
+    return Vector(length * a.x, length * a.y)
+
+
+def turned_by(direction: Vector, a: Vector) -> Vector:
+    """Return a turned by the angle of a direction (a unit vector) from x."""
+    return Vector(direction.x * a.x - direction.y * a.y, direction.y * a.x + direction.x * a.y)
+
+
+def seen_from(direction: Vector, a: Vector) -> Vector:
+    """Return a as seen from a direction: (dot, cross)."""
+    return Vector(dot(direction, a), cross(direction, a))
+
+
+def polar(maths: Maths, angle: Number | None) -> Vector:
+    """Return the unit vector at an angle, rad."""
+    return X if angle is None else Vector(maths.cos(angle), maths.sin(angle))
+
+
+def plus(a: Vector | None, b: Vector | None) -> Vector | None:
+    """Return a + b."""
+    if a is None or b is None:
+        return b if a is None else a
+    return Vector(a.x + b.x, a.y + b.y)
+
+
+def minus(a: Vector | None, b: Vector | None) -> Vector | None:
+    """Return a − b."""
+    if a is None or b is None:
+        return a if b is None else Vector(-b.x, -b.y)
+    return Vector(a.x - b.x, a.y - b.y)
+
+
+def total(*terms: Number | None) -> Number | None:
+    """Return the sum of the terms that are not zero by construction."""
+    found = None
+    for term in terms:
+        found = term if found is None else found if term is None else found + term
+    return found
+
+
+def times(first: Number | None, *factors: Number | None) -> Number | None:
+    """Return a product, zero by construction where a factor is."""
+    for factor in factors:
+        first = None if first is None or factor is None else first * factor
+    return first
+
+
+def known(a: Number | None) -> Number:
+    """Return a number as it is, and 0 for what is zero by construction."""
+    return 0 if a is None else a
+
+
+def less(a: Number | None) -> Number | None:
+    """Return −a."""
+    return None if a is None else -a
+
+
+def along(a: Vector | None, b: Vector) -> Number | None:
+    """Return a·b."""
+    return None if a is None else dot(a, b)
+
+
+def turned(rates: Rates, r: Vector, order: int) -> Vector | None:
+    """Return the derivative of an order, 0 to 3, of a vector r of constant length whose angle has these rates."""
+    if order == 0:
+        return r
+    w = rates(1)
+    if w is None:
+        return None
+    if order == 1:
+        return Vector(-w * r.y, w * r.x)
+    if order == 2:
+        radial, across = -(w * w), rates(2)
+    else:
+        radial, across = times(-3, w, rates(2)), total(rates(3), -(w * w * w))
+    if across is None:
+        return scaled(radial, r)
+    if radial is None:
+        return Vector(-across * r.y, across * r.x)
+    return Vector(radial * r.x - across * r.y, across * r.x + radial * r.y)
+
+
+class Joint(NamedTuple):
+    """A point that moves with φ; at(k): the k-th derivative of its place, m; None where that is zero."""
+
+    at: Callable[[int], Vector | None]
+
+    @property
+    def place(self) -> Vector:
+        """Where it is, m."""
+        return self.at(0) or Vector(0, 0)
+
+
+@dataclass(eq=False)
+class Link:
+    """A rigid link that moves with φ.
+
+    origin: the joint that its points are counted from; heading(): its direction, of any length; rates(k): the k-th
+    derivative of its angle; span: the length of heading() where that is not 1; angle: its angle from x, rad, where a
+    formula gives it without a branch cut.
+    """
+
+    origin: Joint
+    heading: Callable[[], Vector]
+    rates: Rates
+    span: Number | None = None
+    angle: Callable[[], Number | None] | None = None
+
+    @lazy
+    def _unit(self) -> Vector:
+        vector = self.heading()
+        return vector if self.span is None else Vector(vector.x / self.span, vector.y / self.span)
+
+    def unit(self) -> Vector:
+        """Return its direction, of length 1."""
+        return self._unit
+
+    def point(self, along: Number | None, across: Number | None = None) -> Joint:
+        """Return a point of it: along its line from the origin, and to the left of that, m."""
+
+        def arm() -> Vector:
+            if across is None:
+                return Vector(0, 0) if along is None else scaled(along, self.unit())
+            return turned_by(self.unit(), Vector(0 if along is None else along, across))
+
+        return Joint(self.carried(once(arm)))
+
+    def carried(self, arm: Callable[[], Vector]) -> Callable[[int], Vector | None]:
+        """Return the motion of what an arm of the link, m, reaches from the origin."""
+        return by_order(lambda order: plus(self.origin.at(order), turned(self.rates, arm(), order)))
+
+
+FRAME = Link(Joint(lambda order: None), lambda: X, lambda order: None, angle=lambda: None)
+"""What does not move: x of the scene from its origin."""

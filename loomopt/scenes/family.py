@@ -1,0 +1,172 @@
+"""[targets.family]: one machine for several sets of scene numbers, each of which is a scene of its own."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+from pydantic import Field
+
+from loomopt.base.errors import BadInput, refusal, unknown
+from loomopt.base.records import Frozen
+from loomopt.physics.schema import Target, TargetTable
+from loomopt.scenes import tables
+from loomopt.scenes.document import removed
+from loomopt.scenes.scene import TABLES, Scene, build, kept
+from loomopt.scenes.tables import FAMILY
+
+MOST_MEMBERS = 50
+"""Members that a family may have: each is a machine of its own in one problem."""
+
+
+class FamilyTarget(TargetTable):
+    """Values of the target family."""
+
+    of: str | None = Field(None, description="the target of each member; the job's default without it")
+    combine: Literal["worst", "sum"] = Field(
+        "worst", description="what of the members' figures is sought the least of: the worst, or the sum"
+    )
+    members: list[dict[str, Any]] = Field(
+        [], description='what each member changes of the scene: { M0 = "600 N*m" }, or dotted keys'
+    )
+    own: list[str] = Field([], description="design variables of which each member has its own")
+
+
+TARGET = Target(FAMILY, "one machine for several sets of numbers: the least worst of its members", FamilyTarget)
+
+
+def table(scene: Scene) -> FamilyTarget:
+    """Return the table of a scene's family."""
+    found = scene.targets[FAMILY]
+    assert isinstance(found, FamilyTarget)
+    return found
+
+
+def of_target(scene: Scene) -> str:
+    """Return the target that each member has. Raises BadInput for one that the job does not have."""
+    name = table(scene).of or scene.schema.default_target
+    known = [each for each in scene.schema.targets if each != FAMILY]
+    if name not in known:
+        raise unknown("target", name, known, scene.origin, f"targets.{FAMILY}.of")
+    return name
+
+
+def changes(scene: Scene) -> tuple[dict[str, Any], ...]:
+    """Return what each member changes of the scene: dotted key → its value. Raises BadInput."""
+    return tuple(_changes(scene, place) for place in range(len(_members(scene))))
+
+
+def members(scene: Scene) -> tuple[Scene, ...]:
+    """Return the scene of each member. Raises BadInput that names the member and the key."""
+    return kept(scene, FAMILY, lambda: tuple(_member(scene, k, each) for k, each in enumerate(changes(scene))))
+
+
+def member_name(name: str, member: int) -> str:
+    """Return what a family calls a member's own: members are counted from 1 where a person reads it."""
+    return f"{name}[{member + 1}]"
+
+
+def sum_name(figure: str, magnitude: bool, power: int = 1) -> str:
+    """Return what a family calls the sum of its members' figures, or the root of the sum of their powers."""
+    if power == 1:
+        return f"sum of |{figure}|" if magnitude else f"sum of {figure}"
+    return f"root sum of squares of {figure}" if power == 2 else f"root sum of powers of {figure}"
+
+
+def called(scene: Scene) -> Mapping[str, str]:
+    """Return what a family calls its members' numbers and figures → what a member calls it."""
+    names = (*scene.schema.figures, *scene.schema.variables, *scene.bounds)
+    count = len(table(scene).members)
+
+    def found() -> dict[str, str]:
+        own = {member_name(name, k): name for name in names for k in range(count)}
+        kinds = ((True, 1), (False, 1), (False, 2), (False, -1))
+        return own | {sum_name(name, *kind): name for name in names for kind in kinds}
+
+    return kept(scene, "family names", found)
+
+
+def _members(scene: Scene) -> list[dict[str, Any]]:
+    found, key = table(scene).members, f"targets.{FAMILY}.members"
+    if not found:
+        raise refusal("a family needs members", scene.origin, key, remedy='Write members = [{ M0 = "600 N*m" }, ...]')
+    if len(found) > MOST_MEMBERS:
+        raise refusal(
+            "a family of so many", scene.origin, key, str(len(found)), f"1 to {MOST_MEMBERS}", "Take some out"
+        )
+    return found
+
+
+def _changes(scene: Scene, place: int) -> dict[str, Any]:
+    at, given = f"targets.{FAMILY}.members[{place + 1}]", _members(scene)[place]
+    if not given:
+        raise refusal("a member that changes nothing", scene.origin, at, remedy='Write { M0 = "600 N*m" }')
+    found: dict[str, Any] = {}
+    free = {f"{p.table}.{p.key}" for p in _places(scene) if (bound := scene.bounds.get(p.label)) and bound.free}
+    for key, value in _flat(scene, at, given):
+        if key in found:
+            raise refusal("it is changed twice", scene.origin, f"{at}.{key}", remedy="Take one of them out")
+        if key in free:
+            problem, remedy = "it is free, so that the family chooses it", "Change its bounds, or take it out"
+            raise refusal(problem, scene.origin, f"{at}.{key}", remedy=remedy)
+        found[key] = value
+    return found
+
+
+def _flat(scene: Scene, at: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield dotted keys with their values; a short name is that of the one number it calls."""
+    places = _places(scene)
+    for name, value in given.items():
+        if name in TABLES or "." in name:
+            yield from _leaves(name, value)
+            continue
+        found = [f"{p.table}.{p.key}" for p in places if name in (p.key, p.label) and p.given]
+        if len(found) != 1:
+            known = sorted({p.label for p in places if p.given})
+            if not found:
+                raise unknown("number", name, known, scene.origin, f"{at}.{name}")
+            problem, remedy = f"{name} may mean {', '.join(found)}", f"Write one of them in place of {name}"
+            raise refusal(problem, scene.origin, f"{at}.{name}", remedy=remedy)
+        yield found[0], value
+
+
+def _places(scene: Scene) -> list[tables.Place]:
+    on = {effect: scene.effects[effect.name] for effect in scene.active}
+    return list(tables.places(scene.schema, scene.tables, on, {}))
+
+
+def _leaves(key: str, value: object) -> Iterator[tuple[str, Any]]:
+    """Yield the values inside tables by their dotted keys."""
+    if not isinstance(value, Mapping):
+        yield key, value
+        return
+    for name, inner in value.items():
+        yield from _leaves(f"{key}.{name}", inner)
+
+
+def _alone(scene: Scene) -> Scene:
+    """Return the scene without its family."""
+    own = {key: value for key, value in scene.call.set.items() if not f"{key}.".startswith(f"targets.{FAMILY}.")}
+    call = replace(scene.call, set=Frozen(own), target=None)
+    return build(removed(scene.document, ("targets", FAMILY)), scene.jobs, scene.origin, scene.paths, call)
+
+
+def _member(scene: Scene, place: int, change: Mapping[str, Any]) -> Scene:
+    at = f"targets.{FAMILY}.members[{place + 1}]"
+    for key in change:
+        if key.split(".")[0] in ("targets", "problem"):
+            allowed = "operation, mechanism, effects, bounds, limits"
+            raise refusal(
+                "a member cannot change it", scene.origin, f"{at}.{key}", allowed=allowed, remedy="Take it out"
+            )
+    try:
+        return _alone(scene).update(change)
+    except BadInput as error:
+        first = error.faults[0]
+        raise BadInput(
+            first.problem,
+            file=scene.origin,
+            key=f"{at}.{first.key}",
+            value=first.value,
+            allowed=first.allowed,
+            remedy=first.remedy,
+        ) from None
