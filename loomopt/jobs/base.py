@@ -5,19 +5,19 @@ import functools
 import importlib
 import math
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from loomopt.base.errors import BadInput
-from loomopt.base.records import Frozen, lazy
+from loomopt.base.records import Awaited, Frozen, lazy
 from loomopt.base.units import SI_UNIT
 from loomopt.maths.systems import Number
 from loomopt.model import drive, numbers
 from loomopt.model.curves import STEPS, Columns, curves, tops
 from loomopt.model.limits import BoundLimit, CycleLimit, DesignLimit, Limit
-from loomopt.model.model import JobModel
+from loomopt.model.model import SLOWNESS, Integral, JobModel
 from loomopt.model.objectives import Objective, Value
 from loomopt.model.program import (
     LEAST_CHANGE,
@@ -34,11 +34,12 @@ from loomopt.model.program import (
     nothing_follows,
 )
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.cycle import Floats
+from loomopt.model.session import working
+from loomopt.physics.cycle import Floats, Where
 from loomopt.physics.effects.kinds import Check, Event, label, owned
 from loomopt.physics.tolerances import START_ROOM
 from loomopt.picture.job_views import JobViews
-from loomopt.scenes.scene import Scene
+from loomopt.scenes.scene import Scene, kept
 from loomopt.scenes.tables import SceneSchema
 
 Ends = tuple[float, float]
@@ -58,6 +59,8 @@ class Task(abc.ABC):
     """Figures that are read from rows or quantities of other names."""
     remedy = "Take the limit off, or add what {name} needs."
     """What helps where nothing in the scene gives the figure of a limit."""
+    any_numbers = False
+    """Whether its numbers are a person's own, so that some may serve no level of a target."""
     tops: Mapping[str, str] = Frozen()
     """Variables that are the crank angles where a whole-cycle quantity is largest, with that quantity."""
 
@@ -116,6 +119,7 @@ class Task(abc.ABC):
             self.single(),
             self.goals(),
             None if self.traded else self.added(),
+            self.any_numbers,
         )
 
     def demand_figures(self) -> None:
@@ -123,12 +127,13 @@ class Task(abc.ABC):
         for name in self.scene.limits:
             rows = self.read_from.get(name, (name,))
             if not all(self.model.has_row(row) or self.model.has_quantity(row) for row in rows):
+                missing = self.model.undefined.get(name)
                 raise BadInput(
-                    f"nothing in the scene gives the figure {name}",
+                    missing or f"nothing in the scene gives the figure {name}",
                     file=self.scene.origin,
                     key=f"limits.{name}",
                     allowed="figures whose numbers and effects the scene has",
-                    remedy=self.remedy.format(name=name),
+                    remedy=(Task.remedy if missing else self.remedy).format(name=name),
                 )
 
     @lazy
@@ -250,13 +255,22 @@ class Task(abc.ABC):
         return goals(self.wanted())
 
     def held(self) -> tuple[Objective, ...]:
-        """Return what of the target's levels is held before the axes."""
-        return ()
+        """Return what of the target's levels is held before the axes: those before its own last that are no axes."""
+        added = self.least() if self.target else ()
+        own = [level for level in self.objectives() if level not in added] if self.target else []
+        return tuple(level for level in own[:-1] if level.figure not in self.traded)
 
     def least(self) -> tuple[Objective, ...]:
-        """Return the levels after a target's own: rows that the checks would have least."""
-        rows = [check.least for check in self.sampler.model.checks if check.least]
-        return tuple(Value(row, row, abs(self.sampler.static[row]) or 1.0) for row in rows)
+        """Return the levels after a target's own: what effects want least, rows of checks and free numbers of any."""
+        found = []
+        for effect in self.sampler.model.effects:
+            if isinstance(effect, Check) and effect.least in effect.rows:
+                found.append(Value(effect.least, effect.least, abs(self.sampler.static[effect.least]) or 1.0))
+            elif effect.least:
+                row = owned(effect, effect.least)
+                free = (v for v in self.bounded if v.name == row and v.lower < v.upper)
+                found += [Value(v.called, row, v.scale) for v in free]
+        return tuple(found)
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Return the job's own starts: today's machine."""
@@ -271,13 +285,12 @@ class Task(abc.ABC):
         return start
 
     def moves(self) -> list[Move]:
-        """Return the directions that may leave everything unchanged, in order: numbers of checks."""
+        """Return the directions that may leave everything unchanged, in order: numbers of effects."""
         return self.axis_moves()
 
     def axis_moves(self) -> list[Move]:
-        """Return the moves along numbers of checks that may change nothing."""
-        axes = [(check, axis) for check in self.scene.active if isinstance(check, Check) for axis in check.axes]
-        named = [(axis.name, owned(check, axis.key)) for check, axis in axes]
+        """Return the moves along numbers of effects that may change nothing."""
+        named = [(axis.name, owned(effect, axis.key)) for effect in self.scene.active for axis in effect.axes]
         return [
             self.move(axis, name)
             for axis, name in named
@@ -314,7 +327,9 @@ class Task(abc.ABC):
 
     def figure_size(self, name: str) -> float:
         """Return the natural size of a figure: today's value of it, or of the first row that it is read from."""
-        return size_read(self.sampler, self.read_from.get(name, (name,))[0])
+        row, axis = self.read_from.get(name, (name,))[0], self.scene.schema.own_axes.get(name)
+        told = self.model.has_row(row) or self.model.has_quantity(row)
+        return size_read(self.sampler, axis.rows[0] if axis and axis.rows and not told else row)
 
     def size(self, axis: str) -> float:
         """Return the natural size of what of an axis is sought the least of."""
@@ -357,16 +372,21 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
     from loomopt.model.axes import Requested, Traded
+    from loomopt.model.machines import Machines
     from loomopt.model.separation import Parted
     from loomopt.scenes.scene import Scene
 
 
 class Crossing(NamedTuple):
-    """The first crank angle at which |quantity| passes a level: the figure that tells it, and the level's full name."""
+    """The first crank angle at which |quantity| passes a level: the figure that tells it, and the level's full name.
+
+    side: which way the crank turns from angle 0.
+    """
 
     figure: str
     quantity: str
     level: str
+    side: int = 1
 
 
 class LawFamily(NamedTuple):
@@ -397,17 +417,48 @@ class Studied(NamedTuple):
     family: LawFamily | None = None
 
 
+class InBox(NamedTuple):
+    """How a figure of machines is read whose numbers are known to lie in a box, and no more.
+
+    It is the least of `rows`; or offset + sign · the peak of a quantity, on the pieces `where`, largest: whether of its
+    value, not of its magnitude; or how far the crank turns from 0 to one side before |quantity| passes 1 (`leaves`).
+    """
+
+    rows: tuple[str, ...] = ()
+    quantity: str = ""
+    sign: float = 1.0
+    offset: float = 0.0
+    where: Where | None = None
+    largest: bool = False
+    leaves: int = 0
+
+
 Figures = Mapping[str, float | None]
+
+
+class Every:
+    """What holds every name."""
+
+    def __contains__(self, name: object) -> bool:
+        """Say that it is there."""
+        return True
+
+
+EVERY = Every()
 
 
 class Job(abc.ABC):
     """A loom mechanism and what can be asked of it; all numbers SI."""
 
     name: str
+    at_once: tuple[str, ...] = ()
+    """Figures over the cycle that never wait until they are read."""
     own_schema: SceneSchema
     """What a scene may hold, where that does not depend on the scene."""
     task: type[Task]
     """What builds the program of a scene and target, or of axes that are traded."""
+    members: "tuple[Scene, ...]" = ()
+    """The scenes of a family, where it is one."""
     open_boxes: str = ""
     """Why branch and bound does not close on its designs, "" where it does."""
     loosening: Mapping[str, str] = MappingProxyType({})
@@ -427,6 +478,13 @@ class Job(abc.ABC):
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Return one sentence on what an optimum of the target is worth."""
 
+    def say_together(self, members: "Sequence[tuple[Scene, Numbers, Figures]]", own: frozenset[str]) -> str:
+        """Return sentences on why members of a family cannot all reach their goal, "" where physics says nothing.
+
+        members: the scene, design and figures of each, SI; own: numbers of a design of which each has its own.
+        """
+        return ""
+
     @abc.abstractmethod
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return what the curves over the cycle show of the motion, and what force and torque are called."""
@@ -435,7 +493,7 @@ class Job(abc.ABC):
 
     def program(self, scene: Scene, target: str) -> Program:
         """Return a target as a task: structure and numbers. Raises BadInput."""
-        return self.task(scene, target).program()
+        return kept(scene, (self.name, target), lambda: self.task(scene, target).program())
 
     def schema(self, document: Mapping[str, Any]) -> SceneSchema:
         """Return what a scene may hold; document: the raw scene, on which that may depend."""
@@ -471,11 +529,11 @@ class Job(abc.ABC):
 
     def numbers(self, scene: Scene) -> dict[str, float]:
         """Return every number of the scene by full name."""
-        return self.task(scene).known
+        return kept(scene, (self.name, "numbers"), lambda: Frozen(self.task(scene).known))
 
     def numbers_of(self, scene: Scene, design: Numbers) -> dict[str, float]:
         """Return all numbers of a design, by any name of each; a number it does not name stays the scene's."""
-        return self.numbers(scene) | {scene.full(name): value for name, value in design.items()}
+        return {**self.numbers(scene), **{scene.full(name): value for name, value in design.items()}}
 
     def sampler(self, scene: Scene, design: Numbers) -> Sampler:
         """Return a design ready to be sampled, at the speed that the scene gives its crank. Raises BadInput."""
@@ -493,9 +551,8 @@ class Job(abc.ABC):
         sampler = self.sampler(scene, design)
         peaks = tops(sampler, self.peaks(sampler.model).values())
         kinds = {name: figure.kind for name, figure in scene.schema.figures.items()} | drive.KINDS
-        names = [name for check in sampler.model.checks for name in check.quantities]
-        names += drive.KINDS if drive.motor(sampler.model.effects) else ()
-        checks = {name: SI_UNIT[kinds[name]] for name in names}
+        names = sampler.model.told | ({k: k for k in drive.KINDS} if drive.motor(sampler.model.effects) else {})
+        checks = {name: SI_UNIT[kinds[figure]] for name, figure in names.items()}
         columns, parted = self.columns(scene, sampler)._replace(checks=checks), self.parted(scene, sampler)
         return (parted.curves if parted else functools.partial(curves, sampler))(columns, steps, [*peaks, *also])
 
@@ -511,11 +568,41 @@ class Job(abc.ABC):
         """Return the design a person reads, by full names, from the NLP's variables: these themselves."""
         return dict(x)
 
-    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of the job; None for one whose numbers the scene does not have."""
+    def figures(self, scene: Scene, design: Numbers) -> Figures:
+        """Return every figure of the job; None for one whose numbers the scene does not have.
+
+        Those over the cycle that nothing has asked for yet are computed when they are read.
+        """
         sampled = self.sampler(scene, design)
-        found: dict[str, float | None] = {name: sampled.figures.get(name) for name in scene.schema.figures}
-        return found | {name: sampled.peak(quantity) for name, quantity in self.peaks(sampled.model).items()}
+        late = self.over_cycle(sampled.model)
+        known = [*self.at_once, *(name for name, quantity in late.items() if sampled.knows(quantity))]
+        found = self.figures_of(scene, sampled, known)
+
+        @working()
+        def later(names: Sequence[str]) -> Figures:
+            read = self.figures_of(scene, self.sampler(scene, design), names)
+            return {name: _own(read[name]) for name in names}
+
+        told = {name: _own(value) for name, value in found.items()}
+        return Awaited(found, {k: v for k, v in told.items() if v is not None or k in known or k not in late}, later)
+
+    def figures_of(
+        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+    ) -> dict[str, Number]:
+        """Return every figure of a machine, or of many at once, SI; None for one whose numbers the scene does not have.
+
+        asked: which of those `over_cycle`, every one without it; the others are None or there too. What a motion of its
+        own tells is not among those of many (`machines.at_once`).
+        """
+        found = alone(scene, sampled, asked)
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        sampled.search(tuple(peaks.values()))
+        return found | {name: sampled.peak(quantity) for name, quantity in peaks.items()}
+
+    def over_cycle(self, model: JobModel) -> Mapping[str, str]:
+        """Return the figures that are read over the cycle: the quantity of an extreme, "" for what is none."""
+        means = [name for mean in model.integrals for name in (mean.name, mean.root)]
+        return {**dict.fromkeys((*means, *model.worked), ""), **self.peaks(model)}
 
     def traded(self, scene: Scene, target: str | None, asked: "Requested") -> "tuple[Program, tuple[Traded, ...]]":
         """Return the task whose levels are axes, after what a target holds (None: nothing), and the axes.
@@ -543,23 +630,40 @@ class Job(abc.ABC):
         """Return the figures that are extremes over the cycle, with their quantities."""
         return {name: name for name in model.quantities}
 
+    def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
+        """Return how each figure is read over a box of numbers that can be."""
+        rows = {name: InBox((name,)) for name in scene.schema.figures if model.has_row(name)}
+        return rows | {name: InBox(quantity=quantity) for name, quantity in self.peaks(model).items()}
+
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: the default target, and every figure that is the largest |value| of a quantity."""
         peaks = {name: (name, False) for name in self.model(scene).quantities}
         return Studied((scene.schema.default_target,), peaks)
+
+    def crossings(self, scene: Scene) -> Mapping[str, tuple[Crossing, ...]]:
+        """Return figures that are read where a curve passes a level, and jump where it turns there."""
+        return {}
 
     def adopted(self, scene: Scene, design: Mapping[str, Any], target: str) -> tuple[Scene, str]:
         """Return the scene whose own are a design's lists, and the target whose limits it keeps."""
         return scene, target
 
     def sizes(self, scene: Scene) -> Mapping[str, Sequence[float]]:
-        """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending."""
+        """Return the freed numbers, as a designer calls them, that come in sizes only, with those sold, ascending.
+
+        Sizes of the scene's own [stock] take the place of those that a check knows.
+        """
         found: dict[str, Sequence[float]] = {}
+        stock: Mapping[str, Sequence[float]] = {}
+        if scene.document.get("stock"):
+            from loomopt.scenes.numbers import sizes
+
+            stock = sizes(scene).stock
         for check, own in _checks(scene):
             for key, sold in check.sold(own).items():
                 bound = scene.bounds.get(label(check, key))
                 if bound is not None and bound.free and bound.min < bound.max:
-                    found[label(check, key)] = sold
+                    found[label(check, key)] = stock.get(label(check, key), sold)
         return found
 
     def explain(self, scene: Scene, clash: Collection[str]) -> str:
@@ -568,6 +672,28 @@ class Job(abc.ABC):
         limited = numbers.bounds(scene, known)
         told = [check.explain(known, limited, own, clash, scene.show) for check, own in _checks(scene)]
         return " ".join(text for text in told if text)
+
+
+def alone(scene: Scene, sampled: "Sampler | Machines", asked: Container[str]) -> dict[str, Number]:
+    """Return figures that are rows of the model, and its means that are asked for; None for every other."""
+    found: dict[str, Number] = {name: sampled.static.get(name) for name in scene.schema.figures}
+    means = [name for mean in sampled.model.integrals for name in (mean.name, mean.root)]
+    found |= {name: sampled.single(name) for name in means if name in found and name in asked}
+    return found | {name: power(sampled, work) for name, work in sampled.model.worked.items() if name in asked}
+
+
+def power(sampled: "Sampler | Machines", work: str) -> Number:
+    """Return the mean over a turn, W, of work done, J/rad, that may bend where a motion turns back."""
+    done, time = (sampled.mean(Integral(name, "", name, parts=BENT)) for name in (work, SLOWNESS))
+    return done / time
+
+
+BENT = 20
+"""Parts of each piece on which work that bends is summed: right to 2e-6, and no friction is known as closely."""
+
+
+def _own(value: Number) -> float | None:
+    return None if value is None else float(value)
 
 
 def _checks(scene: Scene) -> list[tuple[Check[Any], Any]]:

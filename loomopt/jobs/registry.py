@@ -21,7 +21,7 @@ from loomopt.scenes import packaged
 from loomopt.scenes.document import Paths, read_document
 from loomopt.scenes.packaged import entry_points
 from loomopt.scenes.scene import Equation, Scene, build
-from loomopt.scenes.tables import SceneSchema
+from loomopt.scenes.tables import FAMILY, SceneSchema
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -97,6 +97,15 @@ def of(scene: Scene) -> Job:
     return find(scene.job)
 
 
+def of_target(scene: Scene, target: str) -> Job:
+    """Return the job that answers a target: of a family that of all its members. Raises BadInput."""
+    if target != FAMILY:
+        return of(scene)
+    from loomopt.jobs.family import FamilyJob
+
+    return FamilyJob(of(scene), scene)
+
+
 class _Registered:
     """All jobs, as scenes look them up; it pickles as what it is."""
 
@@ -120,7 +129,8 @@ class _Registered:
                 effect = _brought(schema, name)
                 if effect is not None:
                     schema = replace(schema, effects=ranked([*schema.effects.values(), effect]))
-            return schema
+            targets = document.get("targets")
+            return _with_family(schema) if isinstance(targets, Mapping) and FAMILY in targets else schema
 
     def check(self, scene: Scene) -> None:
         """Raise BadInput where today's machine is not one that its job can work on."""
@@ -131,6 +141,13 @@ class _Registered:
     def equations(self, scene: Scene) -> tuple[Equation, ...]:
         """Return the equations that a scene really uses; SymPy is imported for them."""
         return of(scene).views.equations(scene)
+
+
+def _with_family(schema: SceneSchema) -> SceneSchema:
+    """Return what scenes of a job may hold that tell of several machines."""
+    from loomopt.scenes.family import TARGET
+
+    return replace(schema, targets={**schema.targets, FAMILY: TARGET})
 
 
 def _brought(schema: SceneSchema, name: str) -> Effect | None:
@@ -206,7 +223,7 @@ def declared(name: str) -> SceneSchema:
     others = [
         point.name.removeprefix(f"{name}.") for point in entry_points(EFFECTS) if point.name.startswith(f"{name}.")
     ]
-    return REGISTERED.schema(name, {}, others)
+    return _with_family(REGISTERED.schema(name, {}, others))
 
 
 def template(name: str) -> str:

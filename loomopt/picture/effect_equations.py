@@ -4,14 +4,16 @@ import math
 from collections import ChainMap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from loomopt.maths import systems
+from loomopt.maths.systems import Number
 from loomopt.model.drive import motor
-from loomopt.model.model import JobModel
+from loomopt.model.model import COMPONENTS, JobModel
 from loomopt.physics import balance
 from loomopt.physics.balance import Acting, Given
-from loomopt.physics.effects.kinds import Check, Event, EventTerms, Load, Motion, State
+from loomopt.physics.effects.kinds import Applied, Check, Event, EventTerms, LinkMass, Load, Motion, State, keys, owned
 from loomopt.physics.schema import Values
 from loomopt.picture.equations import (
     Case,
@@ -30,6 +32,7 @@ from loomopt.picture.equations import (
 
 if TYPE_CHECKING:
     from loomopt.physics.effects.kinds import Written
+    from loomopt.physics.mechanisms.dyad import Vector
 
 AnyMotion = TypeVar("AnyMotion", bound=Motion)
 SIGNS, ENDS = {-1: ">=", 0: "=", 1: "<="}, {-1: "min", 0: "given", 1: "max"}
@@ -37,9 +40,26 @@ Piece = tuple[Expression, tuple[Expression, Expression]]
 """A formula, and the crank angles between which it holds."""
 
 
+MOTION = frozenset({"phi", "theta", "omega", "omega_dot", "q", "beta"})
+"""Symbols of the motion that terms read, beside those of the scene's numbers."""
+
+
 def given(model: JobModel, values: Values) -> Given:
-    """Return a scene's numbers as symbols, with the symbols and words of every effect's table."""
-    return Given(values, {effect.name: own_values(effect, model.words_of(effect.name)) for effect in model.effects})
+    """Return a scene's numbers as symbols, with the symbols and words of every effect's table that it gives."""
+    taken, own = {*MOTION, *values, *model.known} - set(model.labels), dict[str, Values]()
+    # A model of formulas alone does not say which of its effects' numbers are given.
+    told = not model.known.isdisjoint(model.labels)
+    for effect in model.effects:
+        words = model.words_of(effect.name)
+        given_keys = [key for key in keys(effect.own) if not told or owned(effect, key) in model.known]
+        own[effect.name] = own_values(effect, words, given_keys, taken)
+        taken |= {str(value) for key, value in own[effect.name].items() if key not in words}
+    if not any(check.joints for check in model.checks):
+        return Given(values, own)
+    # Where a formula asks whether a number is given, those are that the scene gives.
+    there = {owned(effect, key): value for effect in model.effects for key, value in own[effect.name].items()}
+    there |= {name: values[name] for name in sorted(model.known) if name not in there}
+    return Given(ChainMap(there, values), own)  # type: ignore[arg-type]  # it is only read
 
 
 def forces(
@@ -55,7 +75,8 @@ def forces(
     found = [each for load in model.loads for each in _written(model, load, at, known, letter)]
     found += sums(model.loads, at, symbol(total), letter, torque)
     found += crank_motion(model, at, known, torque[1])
-    return found + [each for check in model.checks for each in check_equations(check, at, known)]
+    found += [each for check in model.checks for each in check_equations(check, at, known)]
+    return found + joint_equations(model, at, known, symbol(total), letter)
 
 
 def turning(pose: AnyMotion, model: JobModel) -> AnyMotion:
@@ -120,7 +141,8 @@ def term(load: Acting, pose: Motion, known: Given, letter: str) -> Equation:
     lines = [rf"{latex(one)} & {latex(a)} \le {latex(phi)} \le {latex(b)}" for one, (a, b) in inner]
     choice = r" \\ ".join([*lines, rf"{latex(last)} & \text{{else}}"])
     written = rf"{latex(name)} = \begin{{cases}} {choice} \end{{cases}}"
-    return Equation(load.name, f"{text(name)} = {', '.join(told)}, else {text(last)}", written)
+    form = ((name, "="), *((one, (a, phi, b)) for one, (a, b) in inner), (last, "else"))
+    return Equation(load.name, f"{text(name)} = {', '.join(told)}, else {text(last)}", written, form)
 
 
 def _tabulated(load: Load[Any], name: Expression, known: Given) -> Equation:
@@ -130,15 +152,17 @@ def _tabulated(load: Load[Any], name: Expression, known: Given) -> Equation:
     bent = f"{curve.corners} corners" if curve.corners != 1 else "one corner"
     said = f"a cubic between each of the table's {curve.samples} samples and the next, C2 but for {bent}"
     said += f", angles {load.tabulated.angle}"
-    return Equation(load.name, f"{text(name)}: {said}", rf"{latex(name)}:\ \text{{{said}}}")
+    written = rf"{latex(name)}:\ \text{{{said}}}"
+    return Equation(load.name, f"{text(name)}: {said}", written, ((name, f": {said}"),))
 
 
 def force(load: Acting, pose: Motion, known: Given, switch: float) -> Expression:
-    """Return a load's formula at a switch."""
+    """Return a load's formula at a switch, on the turn on which its corners lie: no whole turns are taken off."""
     if isinstance(load, State):
         return load.term(_in_symbols(pose, 0, 0), known.own[load.name])
-    number = sympy().Rational(switch)
-    return load.force(systems.sympy(), pose, known.values, known.own[load.name], number)
+    sp = sympy()
+    found = load.force(systems.sympy(), pose, known.values, known.own[load.name], sp.Rational(switch))
+    return sp.sympify(found).replace(sp.floor, lambda turns: sp.Integer(0))
 
 
 def pieces(load: Acting, pose: Motion, known: Given) -> list[Piece]:
@@ -162,6 +186,59 @@ def check_equations(check: Check[Any], pose: Motion, known: Given) -> list[Equat
     found = {name: read(system, pose, known.values, own) for name, read in check.quantities.items()}
     found |= {name: row(system, known.values, own) for name, row in check.rows.items()}
     return [each for name, value in found.items() for each in _kept(check, name, value)]
+
+
+class WrittenLoading(NamedTuple):
+    """What acts on a mechanism, in symbols."""
+
+    force: Expression
+    carried: Number
+    masses: Sequence[tuple[LinkMass, Any]]
+    pushes: "Sequence[Vector]"
+    applied: Sequence[Applied] = ()
+
+
+def joint_equations(model: JobModel, pose: Motion, known: Given, total: Expression, letter: str) -> list[Equation]:
+    """Write the components of each force in a joint, and the moments, that checks read, once for all of them."""
+    checks = [check for check in model.checks if check.joints]
+    if not checks:
+        return []
+    system, moved = systems.sympy(), pose
+    if balance.carried(model.loads):
+        psi = [-symbol(f"psi_r{dots}") for dots in ("", "_dot", "_ddot")]
+        moved = SimpleNamespace(q=psi[0], velocity=psi[1], acceleration=psi[2])  # type: ignore[assignment]
+    terms = [(load, symbol(f"{letter}_{load.name}")) for load in model.loads]
+    masses = balance.masses(system, model.loads, known, (pose, moved))
+    loading = WrittenLoading(total, moved, masses, balance.pushes(system, terms, known, (pose, moved)))
+    found: dict[str, Equation] = {}
+    for check in checks:
+        assert check.joints is not None
+        if check.said:
+            found[check.name] = Equation(check.name, check.said, rf"\text{{{check.said}}}")
+            continue
+        joints = check.joints(system, pose, known.values, known.own[check.name], loading)
+        for name in check.between:
+            found |= {each: equation(check.name, symbol(each), value) for each, value in _between(joints, name)}
+        for name in (name for name in (*check.vectors, *check.scalars) if name in model.told):
+            parts = [""] if name in check.scalars else [f"_{axis}" for axis in COMPONENTS]
+            for part in parts:
+                value = getattr(joints, name)
+                value = getattr(value, part[1:]) if part else value
+                found.setdefault(name + part, equation(check.name, symbol(name + part), sympy().sympify(value)))
+        for name, work in ((each, check.worked[each]) for each in model.worked if each in check.worked):
+            value = sum(share * symbol(vector) for vector, share in getattr(joints, work).items())
+            found[name] = equation(check.name, symbol(f"dW_{name}/dphi"), value)
+    return list(found.values())
+
+
+def _between(joints: Number, name: str) -> Iterator[tuple[str, Expression]]:
+    """Yield what acts on a link by its own mass, and let symbols stand for it from there on; nothing without any."""
+    own = getattr(joints, name)
+    if own is not None:
+        parts = [f"F_{name}_x", f"F_{name}_y", f"N_{name}"]
+        yield from zip(parts, map(sympy().sympify, (*own.force, own.moment)), strict=True)
+        x, y, moment = map(symbol, parts)
+        joints.__dict__[name] = type(own)(type(own.force)(x, y), moment)
 
 
 def _kept(check: Check[Any], name: str, value: Expression) -> list[Equation]:

@@ -3,10 +3,11 @@
 import dataclasses
 import functools
 import importlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
+from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.physics import balance
 from loomopt.physics.balance import Acting
@@ -21,11 +22,21 @@ _GREEK = {"alpha", "beta", "gamma", "delta", "theta", "phi", "psi", "chi", "omeg
 
 @dataclass(frozen=True)
 class Equation:
-    """One equation: what it is of, as plain text, and in LaTeX."""
+    """One equation: what it is of, as plain text, and in LaTeX.
+
+    written: its LaTeX, or what writes that when it is first asked for. form: its rows of expressions, signs and words,
+    for other ways to write it; of several the first is the left side.
+    """
 
     name: str
     text: str
-    latex: str
+    written: str | Callable[[], str] = field(repr=False, compare=False)
+    form: tuple[tuple[Any, ...], ...] = field(default=(), repr=False, compare=False)
+
+    @lazy
+    def latex(self) -> str:
+        """It in LaTeX."""
+        return self.written if isinstance(self.written, str) else self.written()
 
     def _repr_latex_(self) -> str:
         return rf"$\displaystyle {self.latex}$"
@@ -112,27 +123,39 @@ def sums(
 def _shown(load: Acting, value: Expression) -> Acting:
     """Return a load whose force is one symbol, and which no state needs to answer."""
     if isinstance(load, Load):
-        return dataclasses.replace(load, force=lambda *_: value, response=None)
+        return dataclasses.replace(load, force=lambda *_: value, response=None, upon=None)
     return dataclasses.replace(load, force=lambda *_: value)
 
 
-def own_values(effect: Effect, words: Mapping[str, str]) -> Values:
-    """Return the symbols of an effect's table; words: values that choose a formula."""
+def own_values(effect: Effect, words: Mapping[str, str], keys: Iterable[str], taken: Collection[str]) -> Values:
+    """Return the symbols of an effect's table; words: values that choose a formula; keys: of its numbers.
+
+    One whose letter is taken, and every one of an instance, is told by whose it is.
+    """
     curve = effect.tabulated.key if isinstance(effect, Load) and effect.tabulated else ""
-    keys = [key for key in effect.own.model_fields if key != curve or key in words]
-    return {key: words.get(key, symbol(effect.letters.get(key, key))) for key in keys}
+    letters = {key: effect.letters.get(key, key) for key in keys if key != curve}
+    if effect.instance:
+        letters = {key: f"{effect.instance}.{letter}" for key, letter in letters.items()}
+    unlike = {key: f"{letter}_{effect.name}" if letter in taken else letter for key, letter in letters.items()}
+    return {key: symbol(letter) for key, letter in unlike.items()} | dict(words)
 
 
 def equation(name: str, left: Expression, right: Expression) -> Equation:
     """Return an equation of two expressions."""
-    return Equation(name, f"{text(left)} = {text(right)}", f"{latex(left)} = {latex(right)}")
+    return relation(name, left, "=", right)
 
 
 def relation(name: str, left: Expression, sign: str, right: Expression, where: str = "") -> Equation:
     """Return what a number must keep: sign is "=", "<=" or ">="; where: words that follow."""
+    told = f"{text(left)} {sign} {text(right)}{f' {where}' if where else ''}"
+    form = (left, sign, right, *([where] if where else []))
+    return Equation(name, told, functools.partial(_related, left, sign, right, where), (form,))
+
+
+def _related(left: Expression, sign: str, right: Expression, where: str) -> str:
     written = {"=": "=", "<=": r"\le", ">=": r"\ge"}[sign]
-    words, tail = (f" {where}", rf"\quad \text{{{where}}}") if where else ("", "")
-    return Equation(name, f"{text(left)} {sign} {text(right)}{words}", f"{latex(left)} {written} {latex(right)}{tail}")
+    tail = rf"\quad \text{{{where}}}" if where else ""
+    return f"{latex(left)} {written} {latex(right)}{tail}"
 
 
 Case = tuple[Expression | str, str | tuple[Expression, Expression, Expression]]
@@ -144,8 +167,13 @@ def cases(name: str, left: Expression, rows: Sequence[Case]) -> Equation:
     if len(rows) == 1:
         return equation(name, left, rows[0][0])
     written = ", ".join(f"{_said(value, text)} {_where(when, text)}" for value, when in rows)
+    told = f"{text(left)} = {written}"
+    return Equation(name, told, functools.partial(_parted, left, rows), ((left, "="), *rows))
+
+
+def _parted(left: Expression, rows: Sequence[Case]) -> str:
     lines = r" \\ ".join(f"{_said(value, latex)} & {_where(when, latex)}" for value, when in rows)
-    return Equation(name, f"{text(left)} = {written}", rf"{latex(left)} = \begin{{cases}} {lines} \end{{cases}}")
+    return rf"{latex(left)} = \begin{{cases}} {lines} \end{{cases}}"
 
 
 def _said(value: Expression | str, write: Callable[[Expression], str]) -> str:
@@ -194,10 +222,31 @@ def _latex_name(name: str) -> str:
     return letter + (f"_{{{joined}}}" if joined else "") + primes  # so that a power may follow the primes
 
 
+GREEK_LETTERS = dict(zip(sorted(_GREEK), ("α", "β", "χ", "δ", "γ", "ω", "φ", "ψ", "θ"), strict=True))
+
+
+def name_parts(name: str) -> tuple[str, str, str]:
+    """Return a symbol's letter, its index and its primes, as `latex` writes them; words stay words."""
+    head, _, rest = name.partition("_")
+    if rest == "dot":
+        letter, index, primes = name_parts(head)
+        return f"{letter}\u0307", index, primes
+    letters = head.rstrip("'")
+    primes = head[len(letters) :]
+    word = letters.rstrip("0123456789")
+    if word in _GREEK:
+        letter, below = GREEK_LETTERS[word], letters[len(word) :]
+    elif len(letters) > 1 and letters.isalpha() and letters.islower():
+        return name.replace("_", " "), "", ""
+    else:
+        letter, below = letters[0], letters[1:]
+    return letter, ", ".join(part for part in (below, rest) if part).replace("_", " "), primes
+
+
 @functools.cache
 def symbol(name: str) -> Expression:
-    """Return the real symbol of a name."""
-    return sympy().Symbol(name, real=True)
+    """Return the real symbol of a name; one with dots stands with underscores, so that SymPy reads it back."""
+    return sympy().Symbol(name.replace(".", "_"), real=True)
 
 
 def sympy() -> Any:

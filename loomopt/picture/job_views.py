@@ -1,13 +1,17 @@
 """How a job shows itself: what its own views return, and views/ renders."""
 
 import abc
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
+
+from loomopt.physics.effects.kinds import Check
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.force_arrows import ForceArrow
+    from loomopt.picture.motion import MechanismMotion
     from loomopt.picture.panels import Curve, Panel
-    from loomopt.picture.shapes import Drawing
+    from loomopt.picture.shapes import Drawing, Floats
     from loomopt.scenes.scene import Scene
 
 Numbers = Mapping[str, float]
@@ -22,6 +26,16 @@ class Span(NamedTuple):
 
 Marks = Mapping[str, float | Span]
 """Name → a crank angle, rad, or a stretch of the cycle."""
+
+
+def tells_forces(scene: "Scene") -> bool:
+    """Say whether an effect that is on tells forces in joints."""
+    return any(isinstance(effect, Check) and effect.joints for effect in scene.active)
+
+
+def sized(scene: "Scene", forces: "Iterable[ForceArrow]") -> "dict[ForceArrow, str]":
+    """Return forces, each with its size in the scene's unit."""
+    return {force: scene.show(force.size, "force", 4) for force in forces}
 
 
 class JobViews(abc.ABC):
@@ -40,6 +54,10 @@ class JobViews(abc.ABC):
     @abc.abstractmethod
     def joints_csv(self, scene: "Scene", design: Numbers) -> str:
         """Return what `linkage` draws as CSV in its unit: joints and masses, or a profile. Raises BadInput."""
+
+    def motion(self, scene: "Scene", design: Numbers, angles: "Floats") -> "MechanismMotion | None":
+        """Return the mechanism at crank angles, (n,) rad, as it moves; None where a job has none. Raises BadInput."""
+        return None
 
     @abc.abstractmethod
     def equations(self, scene: "Scene") -> "tuple[Equation, ...]":

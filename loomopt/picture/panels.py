@@ -11,7 +11,7 @@ from loomopt.maths import systems
 from loomopt.model.curves import ANGLE, COLUMN, POWER, load_name, split
 from loomopt.model.drive import MOTOR, SPEED
 from loomopt.model.drive import POWER as PEAK_POWER
-from loomopt.model.model import read_at
+from loomopt.model.model import COMPONENTS, read_at
 from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Check, Load, Speed, State
 from loomopt.scenes.scene import Scene
@@ -124,7 +124,10 @@ def _of_effects(scene: Scene) -> dict[str, Curve]:
             name = effect.name.replace("_", " ") if symbol != effect.name else ""
             found[symbol] = Curve(name, BY_EFFECT if effect.acts == "output" else DRIVE)
         elif isinstance(effect, Check):
-            found |= {name: Curve(peak=name) for name in effect.quantities}
+            found |= {name: Curve(peak=name) for name in (*effect.quantities, *effect.scalars)}
+            found |= {name: Curve(panel="in the joints", peak=name) for name in effect.vectors}
+            parts = (f"{name}_{axis}" for name in effect.vectors for axis in COMPONENTS)
+            found |= {part: Curve(shown=False) for part in parts}
         elif isinstance(effect, Speed):
             found |= {SPEED: Curve("crank speed"), MOTOR: Curve(most=effect.most)}
     return found

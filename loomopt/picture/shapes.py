@@ -231,6 +231,7 @@ LAYERS: Mapping[str, Layer] = {
     "least cam force": Layer("#c2410c", 30, 0.35),
     "schematic": Layer("#475569", 8, 0.25),
     "masses": Layer("#9d174d", 220, 0.35),
+    "forces": Layer("#b91c1c", 10, 0.35),
     "joints": Layer("#1f2937", 7, 0.35),
     "leaders": Layer("#6b7280", 8, 0.13),
     "dimensions": Layer("#047857", 92, 0.18),
@@ -295,11 +296,21 @@ Trace = Line | Circle | Arc
 Primitive = Trace | Text
 
 
+class Measure(NamedTuple):
+    """A length between two points, m, and its name; half: how far it may be off on each side, m, 0 where not said."""
+
+    name: str
+    one: Point
+    other: Point
+    half: float = 0.0
+
+
 @dataclass(frozen=True)
 class Drawing:
     """A mechanism at full scale in m; height: of its capitals, m, which line widths and dashes follow.
 
     legend: lines of (layer, text) below it. unit: in which its lengths are told, and which a workshop reads it in.
+    measures: lengths that a format with dimensions of its own has as such.
     """
 
     title: str
@@ -307,6 +318,7 @@ class Drawing:
     primitives: tuple[Primitive, ...]
     legend: tuple[tuple[str, str], ...] = ()
     unit: Unit = "mm"
+    measures: tuple[Measure, ...] = ()
 
     @property
     def layers(self) -> dict[str, Layer]:
@@ -338,7 +350,9 @@ def scaled(drawing: Drawing, size: float) -> Drawing:
             case Text(_, at):
                 return replace(primitive, at=of(at))
 
-    return replace(drawing, height=size * drawing.height, primitives=tuple(map(larger, drawing.primitives)))
+    measures = tuple(Measure(name, of(one), of(other), size * half) for name, one, other, half in drawing.measures)
+    primitives = tuple(map(larger, drawing.primitives))
+    return replace(drawing, height=size * drawing.height, primitives=primitives, measures=measures)
 
 
 def text_box(text: Text, height: float) -> Box:

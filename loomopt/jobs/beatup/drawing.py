@@ -5,13 +5,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from loomopt.base.errors import BadInput
 from loomopt.base.units import show
 from loomopt.jobs.beatup.model import FRONT, LENGTHS, REAR
+from loomopt.maths import systems
 from loomopt.maths.systems import FLOAT
 from loomopt.physics.mechanisms import crank_rocker
+from loomopt.picture import force_arrows
 from loomopt.picture.drawing import POINTER, Label, Mass, Skeleton, along, angle_between, around, place, pointer
-from loomopt.picture.shapes import METRIC, Arc, Drawing, Point, Primitive, Units
+from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.motion import MechanismMotion
+from loomopt.picture.shapes import METRIC, Arc, Drawing, Floats, Measure, Point, Primitive, Units
 
 REED, COUNTERWEIGHT = "G", "E"
 MASSES = {REED: ("m4", "r4"), COUNTERWEIGHT: ("m4e", "r4e")}
@@ -78,17 +84,51 @@ def of(design: Mapping[str, float]) -> LinkageDrawing:
     return LinkageDrawing(lengths, crank_rocker.DeadCentres(FLOAT, lengths), there, design.get("offset", 0.0))
 
 
-def linkage(design: Mapping[str, float], title: str, units: Units = METRIC) -> Drawing:
-    """Return the crank-rocker of a design in both dead centres, at full scale. Raises BadInput."""
+def linkage(
+    design: Mapping[str, float],
+    title: str,
+    units: Units = METRIC,
+    forces: Mapping[ForceArrow, str] | None = None,
+) -> Drawing:
+    """Return the crank-rocker of a design in both dead centres, at full scale. Raises BadInput.
+
+    forces: in its joints at some crank angles, each with its size as it is told.
+    """
     found = of(design)
-    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
-    texts = place(_labels(found, units), strokes, found.height)
-    return Drawing(title, found.height, (*strokes, *texts), _legend(found, units), units.length)
+    strokes, labels = [*found.skeleton.strokes(found.height), *_angles(found)], _labels(found, units)
+    legend = _legend(found, units)
+    if forces:
+        moved = motion(design, np.array([force.angle for force in forces]))
+        arrows, sizes = force_arrows.drawn(tuple(forces), moved, forces, found.height)
+        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
+        legend = (*legend, *force_arrows.legend(FRONT))
+    texts = place(labels, strokes, found.height)
+    return Drawing(title, found.height, (*strokes, *texts), legend, units.length, _measures(found))
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
     """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
     return of(design).skeleton.csv(units)
+
+
+def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
+    """Return the crank-rocker at crank angles, rad, its centres of mass with it. Raises BadInput."""
+    found = of(design)
+    pose, skeleton = crank_rocker.CrankRockerPose(systems.numpy(), found.lengths, angles), found.skeleton
+    rod, at = pose.dyad.link1, {"B": np.column_stack(pose.crank)}
+    at["C"] = at["B"] + np.column_stack(rod)
+    turned = pose.psi + found.offset
+    for name, own in found.masses.items():
+        side = -own.radius if name == COUNTERWEIGHT else own.radius
+        at[name] = np.asarray(skeleton.pivots["D"]) + side * np.column_stack([np.cos(turned), np.sin(turned)])
+    return MechanismMotion(angles, skeleton.pivots, at, skeleton.links, skeleton.guides)
+
+
+def _measures(found: LinkageDrawing) -> tuple[Measure, ...]:
+    """Return the lengths of crank, rod, rocker and frame, at front dead centre."""
+    at = found.skeleton.at(FRONT)
+    ends = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
+    return tuple(Measure(name, at[one], at[other]) for name, (one, other) in zip(LENGTHS, ends, strict=True))
 
 
 def _angles(found: LinkageDrawing) -> list[Primitive]:

@@ -1,16 +1,17 @@
 """The beat-up job: balance the reed torque of a four-bar crank-rocker within the space [Yuan24]."""
 
-import math
-from typing import final
+from collections.abc import Container, Sequence
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
 from loomopt.base.errors import BadInput
 from loomopt.jobs import base
-from loomopt.jobs.base import Figures, Job, Studied
-from loomopt.jobs.beatup.model import FRONT
-from loomopt.jobs.beatup.program import BALANCE, BeatupTask, model
+from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
+from loomopt.jobs.beatup.model import FRONT, LENGTHS
+from loomopt.jobs.beatup.program import BALANCE, BeatupTask, balanced_by, model, served
 from loomopt.jobs.beatup.scene import RESISTED, SCHEMA, VARIABLES, RetrofitTarget, TorqueTarget, fault
+from loomopt.maths.systems import Number
 from loomopt.model.axes import opposite
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
@@ -19,6 +20,9 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.effects.kinds import Load
 from loomopt.physics.tolerances import NO_MASS
 from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
 
 
 @final
@@ -118,47 +122,68 @@ class Beatup(Job):
             return {**x, "s": 0.0}
         return {**x, "s": min(masses) * radius.lower**2, "r4e": radius.lower}
 
-    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-        sampled, limited = self.sampler(scene, design), self.task(scene).limited
-        static = sampled.figures
-        found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
-        found["mu_min"] = min(static["mu_near"], static["mu_far"])
-        sampled.search((*sampled.model.quantities, *sampled.model.least))
-        found |= {name: sampled.peak(name) for name in sampled.model.quantities}
-        found |= {name: -sampled.peak(name) for name in sampled.model.least}
+    def figures_of(
+        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+    ) -> dict[str, Number]:
+        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        found, limited = base.alone(scene, sampled, asked), self.task(scene).limited
+        found["mu_min"] = np.minimum(sampled.static["mu_near"], sampled.static["mu_far"])
+        signs = dict.fromkeys(sampled.model.quantities, 1) | dict.fromkeys(sampled.model.least, -1)
+        called = [name for name in signs if name in asked]
+        sampled.search(called)
+        found |= {name: signs[name] * sampled.peak(name) for name in called}
         weights = scene.table(RetrofitTarget).weights
         widths = {name: limited[name][1] - limited[name][0] for name in VARIABLES}
         changes = [
-            weights.get(name, 1.0) * ((design[name] - old) / widths[name]) ** 2
+            weights.get(name, 1.0) * ((sampled.values[name] - old) / widths[name]) ** 2
             for name, old in self.today(scene).items()
             if widths.get(name, 0.0) > 0.0
         ]
-        found["change"] = math.fsum(changes)
+        found["change"] = sum(changes)
         return found
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""
         return {name: name for name in (*model.quantities, *model.least)} | {"mu_min": "obliquity"}
 
+    def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
+        """Return how each figure is read over a box of numbers: the transmission angle at both dead centres."""
+        found = super().in_boxes(scene, model) | {"mu_min": InBox(("mu_near", "mu_far"))}
+        return found | {name: InBox(quantity=name, sign=-1.0) for name in model.least}
+
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Say in one sentence what an optimum of the target reached; figures in SI."""
-        front, peak, rms = (
-            scene.show(figures[name] or 0.0, "torque") for name in ("M3_fdc", "peak_torque", "pulse_rms")
-        )
+
+        def told(name: str) -> str:
+            return scene.show(figures[name] or 0.0, "torque")
+
+        front = told("M3_fdc")
         jumps = any(FRONT in effect.reads for effect in scene.active)
         where = "just before front dead centre" if jumps else "at front dead centre"
-        peak_text = f"the least peak crank torque over the whole cycle is {peak}"
+        if target == "pulse":
+            return f"The least reed torque over the pulse is {told('pulse_rms')} rms ({front} {where})."
+        peak_text = f"the least peak crank torque over the whole cycle is {told('peak_torque')}"
         if target == "balance" and BALANCE.reached(figures):
             return f"Balanced: the reed torque {where} is zero, and then {peak_text}."
         if target == "balance":
             nearest = f"the reed torque nearest to zero found {where} is {front}"
             return f"Balance is out of reach: {nearest}, and then {peak_text}."
-        return {
-            "pulse": f"The least reed torque over the pulse is {rms} rms ({front} {where}).",
-            "torque": f"With the reed torque at {front} {where}, {peak_text}.",
-            "retrofit": f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}.",
-        }[target]
+        if target == "torque":
+            return f"With the reed torque at {front} {where}, {peak_text}."
+        return f"Balanced with the least change from today's machine; {peak_text.replace('least ', '')}."
+
+    def say_together(self, members: Sequence[tuple[Scene, Numbers, Figures]], own: frozenset[str]) -> str:
+        """Say which M0/ω² the ψ'' at front dead centre balances with the counterweights there are, and which it cannot.
+
+        M3 = M0 − J ψ'' ω² there, so that a member balances for J = (M0/ω²)/ψ''; said where nothing else acts.
+        """
+        if not own.isdisjoint(LENGTHS):
+            return ""
+        found = [balanced_by(scene, design, figures, own) for scene, design, figures in members]
+        bands = [band for band in found if band is not None]
+        if len(bands) < len(members):
+            return ""
+        return served(bands, members[0][0])
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return ψ, ψ', ψ'', the transmission angle, folded to at most 90°, the terms, M3 and Md."""

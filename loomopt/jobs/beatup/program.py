@@ -1,8 +1,8 @@
 """From a beat-up scene and a target to the program: variables, limits, objectives and their natural sizes."""
 
 import math
-from collections.abc import Mapping
-from typing import final
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple, final
 
 from loomopt.base.errors import BadInput
 from loomopt.base.records import Frozen, lazy
@@ -18,8 +18,8 @@ from loomopt.model.objectives import Magnitude, Objective, Peak, Value
 from loomopt.model.program import Added, Goal, Move, Numbers, Preference, Variable, goals
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Where
-from loomopt.physics.effects.kinds import Check, Load, UnsteadyError
-from loomopt.physics.tolerances import INDIFFERENT, NO_MASS
+from loomopt.physics.effects.kinds import Check, Load, UnsteadyError, model_of
+from loomopt.physics.tolerances import INDIFFERENT, NO_MASS, SHOWN_AS_ZERO
 from loomopt.scenes.scene import Scene
 
 COUNTERWEIGHT = ("m4e", "r4e")
@@ -118,8 +118,9 @@ class BeatupTask(Task):
         asked = set(self.scene.limits)
         read = bool(self.traded) or self.target == "retrofit" or "r4" in asked
         for effect in self.scene.active:
-            judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.quantities, *effect.rows})
-            read = read or bool(set(effect.reads) & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
+            judged = isinstance(effect, Check) and (effect.demands or asked & {*effect.over_cycle, *effect.rows})
+            reads = {*effect.reads, *model_of(effect, self.scene.effects[effect.name]).reads}
+            read = read or bool(reads & set(COUNTERWEIGHT) and (isinstance(effect, Load) or judged))
         fixed = all(self.limited[name][0] == self.limited[name][1] for name in COUNTERWEIGHT)
         return read or fixed or self.limited["r4e"][1] == 0.0
 
@@ -195,10 +196,6 @@ class BeatupTask(Task):
             "retrofit": (Value("change", "change", 1.0),),
         }
         return *own[self.target], *self.least()
-
-    def held(self) -> tuple[Objective, ...]:
-        """Return the reed torque of target balance, unless that is an axis."""
-        return self.objectives()[:1] if self.target == "balance" and not self.fallen else ()
 
     def starts(self) -> tuple[dict[str, float], ...]:
         """Return today's machine moved just inside its bounds, with a good part of the counterweight in use.
@@ -320,3 +317,65 @@ class BeatupTask(Task):
         if axis not in self.scene.schema.figures:
             return next(v.scale for v in self.variables if axis in (v.name, v.called))
         return {"change": 1.0, "pulse_rms": self.mean_square}.get(axis) or self.figure_size(axis)
+
+
+# A family: which machines one linkage can balance, M3 = M0 − J ψ'' ω² at front dead centre with J in a band.
+
+
+class Band(NamedTuple):
+    """What a member needs: κ = M0/ω², kg·m², and its inertia with the least and the most counterweight, kg·m².
+
+    bend: ψ'' at front dead centre.
+    """
+
+    kappa: float
+    least: float
+    most: float
+    bend: float
+
+
+def balanced_by(
+    scene: Scene, design: Mapping[str, float], figures: Mapping[str, float | None], own: Collection[str]
+) -> Band | None:
+    """Return what a member needs; None where more acts at front dead centre than the cloth and the reed's inertia."""
+    front, alpha, inertia = (figures.get(name) for name in ("M3_fdc", "alpha_fdc", "J4"))
+    speed, resistance = scene.operation.get("speed"), scene.operation.get("M0")
+    if front is None or alpha is None or inertia is None or not speed or not resistance:
+        return None
+    if abs(resistance - inertia * alpha - front) > SHOWN_AS_ZERO * resistance:
+        return None
+    bare = inertia - design["m4e"] * design["r4e"] ** 2
+    ends = {name: (design[name], design[name]) for name in COUNTERWEIGHT}
+    for name in COUNTERWEIGHT:
+        bound = scene.bounds.get(name)
+        if bound is not None and bound.free and (name in own or "m4e" in own):
+            ends[name] = bound.min, bound.max
+    least, most = (ends["m4e"][k] * ends["r4e"][k] ** 2 for k in range(2))
+    return Band(resistance / speed**2, bare + least, bare + most, alpha / speed**2)
+
+
+def served(bands: Sequence[Band], scene: Scene) -> str:
+    """Say which members one ψ'' can balance, and whether any could balance them all; scene: of the first member."""
+    reached = [b.kappa / b.bend for b in bands]
+    pairs = list(zip(bands, reached, strict=True))
+    if all(b.least * (1 - SHOWN_AS_ZERO) <= j <= b.most * (1 + SHOWN_AS_ZERO) for b, j in pairs):
+        return ""
+    needed, allowed = max(b.kappa / b.most for b in bands), min(b.kappa / b.least for b in bands)
+    said = f"At front dead centre M3 = M0 - J psi'' speed^2, and this design's psi'' is {bands[0].bend:.6g}."
+    said += _ratio(bands, scene) if len({(b.least, b.most) for b in bands}) == 1 else ""
+    if needed > allowed:
+        return f"{said} All would need one of {needed:.6g} or more, and of {allowed:.6g} or less: no linkage has it."
+    return f"{said} All would need one from {needed:.6g} to {allowed:.6g}."
+
+
+def _ratio(bands: Sequence[Band], scene: Scene) -> str:
+    """Say what one ψ'' serves where members have the same counterweights to choose from."""
+    first, speed = bands[0], scene.operation["speed"]
+    low, high = (scene.show(value, "inertia") for value in (first.least, first.most))
+    ends = [scene.show(inertia * first.bend * speed**2, "torque") for inertia in (first.least, first.most)]
+    spread = max(b.kappa for b in bands) / min(b.kappa for b in bands)
+    return (
+        f" One psi'' serves M0/speed^2 within a ratio of {first.most / first.least:.4g} (J from {low} to {high}), "
+        f"this one M0 from {ends[0]} to {ends[1]} at {scene.show(speed, 'angular speed')}; "
+        f"the members' ratio is {spread:.4g}."
+    )

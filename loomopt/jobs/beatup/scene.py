@@ -21,6 +21,13 @@ class Operation(Table):
     M0: Torque | None = Field(None, description="peak resistance of the cloth about the rocking shaft D")
 
 
+class Crank(Table):
+    """The crank's own mass, where it is not balanced."""
+
+    mass: PositiveMass = Field(description="mass of the crank, for the forces in its bearings")
+    centre: Length = Field(description="centre of mass of the crank from the crank shaft A, towards the pin B")
+
+
 class Mechanism(Table):
     """Today's machine: crank-rocker A B C D, reed system and counterweight on the rocking shaft D."""
 
@@ -32,6 +39,7 @@ class Mechanism(Table):
     r4e: Length = Field(0.0, description="distance of the counterweight from the rocking shaft D")
     m4: PositiveMass | None = Field(None, description="mass of the reed system without counterweight")
     r4: Length | None = Field(None, description="centre of mass of the reed system from the rocking shaft D")
+    crank: Crank | None = Field(None, description="mass of a crank that is not balanced")
 
 
 class BeatupTarget(TargetTable):

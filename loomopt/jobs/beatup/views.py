@@ -14,11 +14,12 @@ from loomopt.model.model import JobModel
 from loomopt.model.numbers import told
 from loomopt.physics import balance
 from loomopt.physics.cycle import TURN
-from loomopt.physics.effects.kinds import State
+from loomopt.physics.effects.kinds import Check, State
 from loomopt.physics.mechanisms import crank_rocker
+from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span
+from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
 from loomopt.scenes.scene import Scene
 
 
@@ -80,8 +81,14 @@ class _Symbols(Symbols):
 
 def _pose() -> balance.Pose:
     """Return a pose of symbols; gamma is the angle of the rod B→C."""
-    phi, gamma, sp = symbol("phi"), symbol("gamma"), sympy()
+    phi, gamma, psi, sp = symbol("phi"), symbol("gamma"), symbol("psi"), sympy()
+    lengths = crank_rocker.Lengths(*(symbol(name) for name in ("l1", "l2", "l3", "l4")))
+    rod = Vector(lengths.l2 * sp.cos(gamma), lengths.l2 * sp.sin(gamma))
+    rocker = Vector(lengths.l3 * sp.cos(psi), lengths.l3 * sp.sin(psi))
     joints = SimpleNamespace(
+        lengths=lengths,
+        crank=Vector(lengths.l1 * sp.cos(phi), lengths.l1 * sp.sin(phi)),
+        dyad=Dyad(rod, rocker, 2 * lengths.l2 * lengths.l3 * sp.sin(psi - gamma)),
         rod_1=symbol("gamma'"),
         rod_2=symbol("gamma''"),
         cos_crank_rod=sp.cos(phi - gamma),
@@ -92,8 +99,9 @@ def _pose() -> balance.Pose:
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.motion import MechanismMotion
     from loomopt.picture.panels import Curve
-    from loomopt.picture.shapes import Drawing
+    from loomopt.picture.shapes import Drawing, Floats
 
 
 class BeatupViews(JobViews):
@@ -104,7 +112,13 @@ class BeatupViews(JobViews):
         from loomopt.jobs.beatup import drawing
         from loomopt.picture.shapes import drawn_units
 
-        return drawing.linkage(_numbers(scene, design), scene.name, drawn_units(scene))
+        numbers, forces = _numbers(scene, design), None
+        if tells_forces(scene):
+            from loomopt.picture import force_arrows
+
+            drawing.of(numbers)  # one that cannot be drawn says so first
+            forces = sized(scene, force_arrows.told(registry.of(scene).sampler(scene, design), (FRONT,)))
+        return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints and centres of mass as CSV. Raises BadInput."""
@@ -112,6 +126,12 @@ class BeatupViews(JobViews):
         from loomopt.picture.shapes import drawn_units
 
         return drawing.joints_csv(_numbers(scene, design), drawn_units(scene))
+
+    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
+        """Return the crank-rocker at crank angles, rad. Raises BadInput."""
+        from loomopt.jobs.beatup import drawing
+
+        return drawing.motion(_numbers(scene, design), angles)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""
@@ -128,8 +148,8 @@ class BeatupViews(JobViews):
         return found | {name.replace("_", " "): tops(sampler, [name])[0] % TURN for name in model.least}
 
     def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
-        """Return what there is to remark upon: curves, a reed that twists away while it beats up."""
-        found = told(scene)
+        """Return what there is to remark upon: curves, checks, a reed that twists away while it beats up."""
+        found = super().remarks(scene, design) if any(isinstance(e, Check) for e in scene.active) else told(scene)
         if not any(isinstance(effect, State) for effect in scene.active):
             return found
         from loomopt.picture.panels import twisted

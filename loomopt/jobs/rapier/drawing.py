@@ -15,8 +15,11 @@ from loomopt.physics.cycle import TURN, Floats
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.mechanisms.rapier_drive import Dimensions, RapierPose, Sley
+from loomopt.picture import force_arrows
 from loomopt.picture.drawing import POINTER, Label, Skeleton, along, angle_between, around, arrow, place, pointer
-from loomopt.picture.shapes import METRIC, Drawing, Line, Point, Primitive, Units
+from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.motion import MechanismMotion
+from loomopt.picture.shapes import METRIC, Drawing, Line, Measure, Point, Primitive, Units
 
 FRONT, REAR, OVER = "front dead centre", "rear dead centre", "hand-over"
 LINKS = (("A0", "A"), ("A", "B1"), ("B0", "B1"), ("B0", "B2"), ("C0", "C"), ("C", "D"), ("B2", "D"))
@@ -113,17 +116,49 @@ def of(design: Mapping[str, float]) -> Drive:
     return Drive(dimensions)
 
 
-def linkage(design: Mapping[str, float], title: str, units: Units = METRIC) -> Drawing:
-    """Return the drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput."""
+def linkage(
+    design: Mapping[str, float],
+    title: str,
+    units: Units = METRIC,
+    forces: Mapping[ForceArrow, str] | None = None,
+) -> Drawing:
+    """Return the drive in both dead centres of the sley and at the hand-over, at full scale. Raises BadInput.
+
+    forces: in its joints at some crank angles, each with its size as it is told.
+    """
     found = of(design)
-    strokes = [*found.skeleton.strokes(found.height), *_angles(found)]
-    texts = place([*_joints(found), *_labels(found, units)], strokes, found.height)
-    return Drawing(title, found.height, (*strokes, *texts), _legend(found, units), units.length)
+    strokes, labels = (
+        [*found.skeleton.strokes(found.height), *_angles(found)],
+        [*_joints(found), *_labels(found, units)],
+    )
+    legend = _legend(found, units)
+    if forces:
+        moved = motion(design, np.array([force.angle for force in forces]))
+        arrows, sizes = force_arrows.drawn(tuple(forces), moved, forces, found.height)
+        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
+        legend = (*legend, *force_arrows.legend(FRONT))
+    texts = place(labels, strokes, found.height)
+    return Drawing(title, found.height, (*strokes, *texts), legend, units.length, _measures(found))
 
 
 def joints_csv(design: Mapping[str, float], units: Units = METRIC) -> str:
     """Return the joints that `linkage` draws as CSV; digits round-trip. Raises BadInput."""
     return of(design).skeleton.csv(units)
+
+
+def motion(design: Mapping[str, float], angles: Floats) -> MechanismMotion:
+    """Return the drive at crank angles, rad. Raises BadInput."""
+    found = of(design)
+    at, skeleton = found.turn(angles).joints, found.skeleton
+    moving = {name: np.column_stack(np.broadcast_arrays(*at[name])) for name in MOVING}
+    return MechanismMotion(angles, skeleton.pivots, moving, LINKS, skeleton.guides)
+
+
+def _measures(found: Drive) -> tuple[Measure, ...]:
+    """Return the lengths of the links and of the frame, at front dead centre."""
+    at = found.skeleton.at(FRONT)
+    ends = [("l71", ("A0", "B0")), *zip(("l1", "l2", "l3", "l3p", "l4", "l5", "l6"), LINKS, strict=True)]
+    return tuple(Measure(name, at[one], at[other]) for name, (one, other) in ends)
 
 
 def _angles(found: Drive) -> list[Primitive]:

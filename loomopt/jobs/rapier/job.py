@@ -1,15 +1,18 @@
 """The rapier job: stroke and dwells of a five-bar drive on the sley [Hong17]."""
 
 import math
-from typing import final
+from collections.abc import Container, Mapping
+from typing import TYPE_CHECKING, final
+
+import numpy as np
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.jobs import base
-from loomopt.jobs.base import Crossing, Figures, Job, Studied
-from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read
-from loomopt.jobs.rapier.program import RapierTask, model
+from loomopt.jobs.base import EVERY, Crossing, Figures, InBox, Job, Studied
+from loomopt.jobs.rapier.model import jerk_mean, linked, match_mean, read, read_many
+from loomopt.jobs.rapier.program import SIDES, RapierTask, model
 from loomopt.jobs.rapier.scene import FIGURES, SCHEMA, STROKE, VARIABLES, MatchTarget, match_table
-from loomopt.maths.systems import FLOAT
+from loomopt.maths.systems import FLOAT, Number
 from loomopt.model.curves import Columns
 from loomopt.model.model import JobModel
 from loomopt.model.program import Numbers, Program
@@ -17,12 +20,17 @@ from loomopt.model.sampling import Sampler
 from loomopt.physics.mechanisms import rapier_drive
 from loomopt.scenes.scene import Scene
 
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
+
 
 @final
 class Rapier(Job):
     """A five-bar rapier drive on the sley of a four-bar, with one 2:1 gear."""
 
     name = "rapier"
+    # Its table is read with the design: by the time somebody asks for the figure the file may be another.
+    at_once = ("match_rms",)
     own_schema = SCHEMA
     task = RapierTask
     open_boxes = "no global claim: boxes of 1 % round a drive's optimum do not close in any time worth waiting for"
@@ -66,27 +74,43 @@ class Rapier(Job):
             name: values[name] for name in (*VARIABLES, *(name for name in x if name in own and name not in VARIABLES))
         }
 
-    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
-        """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-        sampled = self.sampler(scene, design)
-        reading, static = read(sampled), sampled.static
-        found: dict[str, float | None] = {name: static.get(name) for name in scene.schema.figures}
+    def figures_of(
+        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+    ) -> dict[str, Number]:
+        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked and name != "stroke"}
+        sampled.search(("S", *peaks.values()))
+        reading = read(sampled) if isinstance(sampled, Sampler) else read_many(sampled)
+        found, static = base.alone(scene, sampled, asked), sampled.static
         found |= {"stroke": reading.stroke, "phi_stroke": reading.phi_stroke}
         if "s_dwell" in scene.operation:
             found |= {"dwell_after": reading.dwell_after, "dwell_before": reading.dwell_before}
-            found["dwell"] = min(reading.dwell_after, reading.dwell_before)
-        sampled.search((*sampled.model.quantities, "obliquity"))
-        found |= {name: sampled.peak(name) for name in sampled.model.quantities}
-        found["mu_min"] = math.pi / 2 - sampled.peak("obliquity")
-        found["sley_mu_min"] = min(static["sley_mu_near"], static["sley_mu_far"])
-        found["rms_jerk"] = math.sqrt(sampled.mean(jerk_mean()))
-        if scene.table(MatchTarget).table is not None:
-            found["match_rms"] = math.sqrt(sampled.mean(match_mean(*match_table(scene))))
+            found["dwell"] = np.minimum(reading.dwell_after, reading.dwell_before)
+        found |= {name: sampled.peak(of) for name, of in peaks.items()}
+        if "mu_min" in asked:
+            found["mu_min"] = math.pi / 2 - found["mu_min"]
+        found["sley_mu_min"] = np.minimum(static["sley_mu_near"], static["sley_mu_far"])
+        if "rms_jerk" in asked:
+            found["rms_jerk"] = np.sqrt(sampled.mean(jerk_mean()))
+        if "match_rms" in asked and scene.table(MatchTarget).table is not None:
+            found["match_rms"] = np.sqrt(sampled.mean(match_mean(*match_table(scene))))
         return found
+
+    def over_cycle(self, model: JobModel) -> dict[str, str]:
+        """Return the figures that are read over the cycle, with their quantities."""
+        return {**super().over_cycle(model), "rms_jerk": ""}
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle."""
         return {name: name for name in model.quantities} | {"stroke": "S", "mu_min": "obliquity"}
+
+    def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
+        """Return how each figure is read over a box of numbers: dwells end where the head leaves s_dwell."""
+        found = super().in_boxes(scene, model)
+        found |= {"stroke": InBox(quantity="S", largest=True), "sley_mu_min": InBox(("sley_mu_near", "sley_mu_far"))}
+        found["mu_min"] = InBox(quantity="obliquity", sign=-1.0, offset=math.pi / 2)
+        sides = {"dwell_after": 1, "dwell_before": -1} if "s_dwell" in scene.operation else {}
+        return found | {name: InBox(quantity="dwell_travel", leaves=side) for name, side in sides.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Say in one sentence what an optimum of the target reached; figures in SI."""
@@ -94,13 +118,14 @@ class Rapier(Job):
         def told(name: str, digits: int = 9) -> str:
             return scene.show(figures.get(name) or 0.0, FIGURES[name].kind, digits)
 
+        if target == "match":
+            return f"The head travel comes within {told('match_rms', 6)} rms of the table."
         kept = f"stroke {told('stroke')} and {told('dwell', 4)} of dwell"
-        return {
-            "stroke-dwell": f"With {kept}, the least peak head acceleration is {told('peak_acceleration')}.",
-            "dwell": f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}.",
-            "smooth": f"With {kept}, the least rms head jerk is {told('rms_jerk')}.",
-            "match": f"The head travel comes within {told('match_rms', 6)} rms of the table.",
-        }[target]
+        if target == "stroke-dwell":
+            return f"With {kept}, the least peak head acceleration is {told('peak_acceleration')}."
+        if target == "smooth":
+            return f"With {kept}, the least rms head jerk is {told('rms_jerk')}."
+        return f"With stroke {told('stroke')}, the largest dwell on both sides is {told('dwell')}."
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return S with three derivatives, φ3, φ6, φ63, the folded transmission angle, terms, tape force and torque."""
@@ -128,8 +153,15 @@ class Rapier(Job):
     def studied(self, scene: Scene) -> Studied:
         """Return what studies read: peak acceleration, stroke, and where the head leaves its dwell."""
         peaks = {"peak_acceleration": ("peak_acceleration", False), "stroke": ("S", True)}
-        leaves = Crossing("dwell_after", "S", "s_dwell") if "s_dwell" in scene.operation else None
+        leaves = next(iter(self.crossings(scene).get("dwell_after", ())), None)
         return Studied(("stroke-dwell",), peaks, motion="S_2", crossing=leaves)
+
+    def crossings(self, scene: Scene) -> Mapping[str, tuple[Crossing, ...]]:
+        """Return where the head leaves its dwells."""
+        if "s_dwell" not in scene.operation:
+            return {}
+        found = {name: (Crossing(name, "S", "s_dwell", int(side)),) for name, side in SIDES.items()}
+        return found | {"dwell": tuple(each for (each,) in found.values())}
 
 
 JOB = Rapier()

@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from loomopt.physics.mechanisms import crank_rocker, rapier_drive
 from loomopt.physics.mechanisms.dyad import Vector, dot
 from loomopt.physics.schema import Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN
+
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
 
 DIMENSIONS = tuple(entry.name for entry in fields(rapier_drive.Dimensions))
 SLEY = ("l1", "l2", "l3", "l71")
@@ -307,12 +310,15 @@ TOUCHES = 1e-9
 
 @dataclass(frozen=True)
 class TravelReading:
-    """stroke, m, reached at crank angle phi_stroke; dwells after and before front dead centre, rad."""
+    """stroke, m, reached at crank angle phi_stroke; dwells after and before front dead centre, rad.
 
-    stroke: float
-    phi_stroke: float
-    dwell_after: float
-    dwell_before: float
+    Of one drive, or of many.
+    """
+
+    stroke: Number
+    phi_stroke: Number
+    dwell_after: Number
+    dwell_before: Number
 
 
 def read(sampler: Sampler) -> TravelReading:
@@ -346,3 +352,25 @@ def _dwell(sampler: Sampler, extremes: list[float], room: float, side: int) -> f
     inside = np.flatnonzero(sizes[: out[0]] <= room)
     low, high = float(angles[inside[-1]]) if inside.size else 0.0, float(angles[out[0]])
     return crossing(lambda turned: abs(sampler.at_angle(("S",), side * turned)[0]) - room, low, high)
+
+
+SETTLED_STEPS = 3
+"""Newton's steps from a refined extreme of many drives, which is right to 1e-6."""
+
+
+def read_many(machines: "Machines") -> TravelReading:
+    """Return stroke and dwells of many drives at once, (machines,); no number where one does not turn all round."""
+    tops = machines.tops("S", signed=True)
+    phi = machines.angles(tops)
+    for _ in range(SETTLED_STEPS):
+        slope, bend = machines.at_angles(("S_1", "peak_acceleration"), phi)
+        step = slope / bend
+        phi = phi - np.where(np.abs(step) <= FARTHEST, step, 0.0)
+    (stroke,) = machines.at_angles(("S",), phi)
+    still = tops.value <= 0.0
+    stroke, phi = np.where(still, 0.0, stroke), np.where(still, 0.0, phi)
+    room = machines.values.get("s_dwell")
+    if room is None:
+        return TravelReading(stroke, phi % TURN, math.nan, math.nan)
+    after, before = (machines.leaving("S", "S_1", room, side, TOUCHES) for side in (1, -1))
+    return TravelReading(stroke, phi % TURN, after, before)

@@ -125,7 +125,7 @@ class RapierTask(Task):
     def model(self) -> JobModel:
         """The drive with what is sought; with the effects where anything that they give is read."""
         checks = [effect for effect in self.scene.active if isinstance(effect, Check)]
-        given = {name for check in checks for name in (*check.quantities, *check.rows)}
+        given = {name for check in checks for name in (*check.over_cycle, *check.rows)}
         read = bool((given | set(LOADED)) & {*self.scene.limits, *self.sought})
         return model(self.scene, self.sought, read or any(check.demands or check.least for check in checks), self.dwelt)
 

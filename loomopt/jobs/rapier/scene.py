@@ -29,6 +29,14 @@ class Operation(Table):
     dwell_before: DwellAngle | None = Field(None, description="angle before front dead centre within s_dwell")
 
 
+class Gears(Table):
+    """The gears between both cranks."""
+
+    pitch_radius: PositiveLength = Field(
+        description="pitch radius of the second crank's gear, for the force in the mesh"
+    )
+
+
 class Mechanism(Table):
     """Today's drive [Hong17]: a four-bar A0 A B1 B0 moves the sley, which carries the drive of the head."""
 
@@ -48,6 +56,7 @@ class Mechanism(Table):
     i1: PositiveNumber = Field(description="gear ratio from driving link to tape wheel, first stage")
     i2: PositiveNumber = Field(1.0, description="gear ratio from driving link to tape wheel, second stage")
     wheel: PositiveLength = Field(description="diameter of the tape wheel")
+    gears: Gears | None = Field(None, description="a third of the shafts' distance without it")
 
 
 class MatchTarget(TargetTable):

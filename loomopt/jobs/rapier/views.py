@@ -1,6 +1,7 @@
 """The rapier's own views; what draws and prints is imported when it is first asked for."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from loomopt.jobs import registry
@@ -10,10 +11,11 @@ from loomopt.maths.systems import FLOAT
 from loomopt.model.model import JobModel
 from loomopt.physics import balance
 from loomopt.physics.cycle import TURN
-from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley
+from loomopt.physics.mechanisms.dyad import Dyad
+from loomopt.physics.mechanisms.rapier_drive import Dimensions, Sley, Stand, polar
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Angle, Equation, Symbols, equation, loop, moving, symbol, sympy
-from loomopt.picture.job_views import JobViews, Marks, Span
+from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
 from loomopt.scenes.scene import Scene
 
 
@@ -78,7 +80,30 @@ def _travel(d: Dimensions) -> list[Equation]:
 
 def _pose() -> balance.Pose:
     """Return a pose of symbols: the output is the rapier's travel."""
-    return balance.Pose(symbol("phi1"), symbol("omega"), symbol("S"), symbol("S'"), symbol("S''"))
+    phi1, omega, S, S1, S2 = (symbol(name) for name in ("phi1", "omega", "S", "S'", "S''"))
+    links = _linkage(Dimensions(*(symbol(name) for name in Dimensions.__dataclass_fields__)))
+    return balance.Pose(phi1, omega, S, S1, S2, links)
+
+
+def _linkage(d: Dimensions) -> SimpleNamespace:
+    """Return the links of both loops by their directions, as forces in joints read them."""
+    sp, system = sympy(), systems.sympy()
+    phi2, phi3, phi4, phi5, phi6, phi7 = (symbol(f"phi{k}") for k in range(2, 8))
+    rod, sley, link, driving = (
+        polar(system, length, angle) for length, angle in ((d.l2, phi2), (d.l3, phi3), (d.l5, phi5), (d.l6, phi6))
+    )
+    return SimpleNamespace(
+        dimensions=d,
+        dyad=Dyad(link, driving, 2 * d.l5 * d.l6 * sp.sin(phi6 - phi5)),
+        sley_dyad=Dyad(rod, sley, 2 * d.l2 * d.l3 * sp.sin(phi3 - phi2)),
+        carrier=polar(system, d.l3p, phi3 + d.alpha),
+        second_crank=polar(system, d.l4, phi4),
+        main_shaft=polar(system, -d.l71, phi7),
+        stand=Stand(symbol("beta"), phi7),
+        four_bar=SimpleNamespace(rod_1=symbol("phi2'")),
+        phi3_1=symbol("phi3'"),
+        rates=(symbol("phi5'"), symbol("phi6'")),
+    )
 
 
 def _forces(model: JobModel) -> list[Equation]:
@@ -90,8 +115,9 @@ def _forces(model: JobModel) -> list[Equation]:
 
 if TYPE_CHECKING:
     from loomopt.picture.equations import Equation
+    from loomopt.picture.motion import MechanismMotion
     from loomopt.picture.panels import Curve
-    from loomopt.picture.shapes import Drawing
+    from loomopt.picture.shapes import Drawing, Floats
 
 SWUNG = "of sley and driving link"
 
@@ -104,7 +130,13 @@ class RapierViews(JobViews):
         from loomopt.jobs.rapier import drawing
         from loomopt.picture.shapes import drawn_units
 
-        return drawing.linkage(registry.of(scene).numbers_of(scene, design), scene.name, drawn_units(scene))
+        numbers, forces = registry.of(scene).numbers_of(scene, design), None
+        if tells_forces(scene):
+            from loomopt.picture import force_arrows
+
+            drawing.of(numbers)  # one that cannot be drawn says so first
+            forces = sized(scene, force_arrows.told(registry.of(scene).sampler(scene, design), (drawing.FRONT,)))
+        return drawing.linkage(numbers, scene.name, drawn_units(scene), forces)
 
     def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
         """Return its joints as CSV. Raises BadInput."""
@@ -112,6 +144,12 @@ class RapierViews(JobViews):
         from loomopt.picture.shapes import drawn_units
 
         return drawing.joints_csv(registry.of(scene).numbers_of(scene, design), drawn_units(scene))
+
+    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
+        """Return the drive at crank angles, rad. Raises BadInput."""
+        from loomopt.jobs.rapier import drawing
+
+        return drawing.motion(registry.of(scene).numbers_of(scene, design), angles)
 
     def equations(self, scene: Scene) -> "tuple[Equation, ...]":
         """Return the equations the scene really uses."""

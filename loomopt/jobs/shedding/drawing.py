@@ -5,7 +5,7 @@ The cam stands still as it is at the beginning of the rise, and the arm goes rou
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,11 @@ from loomopt.jobs.shedding.model import FOLLOWER, CamProgram, follower, frame
 from loomopt.jobs.shedding.scene import HealdFrame
 from loomopt.maths import systems
 from loomopt.model.sampling import Extreme, Sampler
-from loomopt.physics.cycle import Floats, Pieces
+from loomopt.physics.cycle import TURN, Floats, Pieces
 from loomopt.physics.mechanisms.cam_follower import Follower, Stations
 from loomopt.physics.mechanisms.cam_motion import Spline
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
+from loomopt.picture import force_arrows
 from loomopt.picture.drawing import (
     JOINT,
     Label,
@@ -35,7 +36,10 @@ from loomopt.picture.drawing import (
     place,
     spring,
 )
-from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Point, Primitive, Units, drawn_units
+from loomopt.picture.force_arrows import ForceArrow
+from loomopt.picture.job_views import sized, tells_forces
+from loomopt.picture.motion import MechanismMotion, Turning
+from loomopt.picture.shapes import Arc, Circle, Drawing, Line, Measure, Point, Primitive, Units, drawn_units
 from loomopt.scenes import provenance
 from loomopt.scenes.scene import Scene
 
@@ -314,13 +318,80 @@ def picture(found: CamDrawing, least: float) -> Picture:
     return Picture(found, {NEAR: near, FAR: far, LEAST: least})
 
 
+OUTLINE = 180
+"""Points of the cam in a moving picture."""
+
+
+def motion(found: CamDrawing, angles: Floats) -> MechanismMotion:
+    """Return the cam turning at cam angles, rad, under its arm, and the frame with its spring beside it.
+
+    An output that leaves the cam is shown on it.
+    """
+    drawn = picture(found, 0.0)
+    at, a, h = found.at(angles), float(found.follower.centre_distance), drawn.height
+    moving = {"C": _turned(at.pitch, angles), "T": _turned(at.profile, angles)}
+    frame_at, X = drawn.spring.top, np.asarray(at.X)
+    for name, side in (("H", -COIL * h), ("H'", BAR * h), ("S", 0.0)):
+        moving[name] = np.column_stack([np.full(len(X), frame_at.x + side), frame_at.y - X])
+    outline = found.at(np.asarray(TURN / OUTLINE * np.arange(OUTLINE), dtype=np.float64)).profile
+    pivots = {"A": ORIGIN, "B": Point(0.0, a), "K": drawn.spring.hung}
+    rings = (("C", float(found.follower.roller_radius)),)
+    cam = Turning("A", _points(outline), np.asarray(angles))
+    unnamed = frozenset(("H", "H'", "S", "T", "K"))
+    return MechanismMotion(angles, pivots, moving, (("B", "C"), ("H", "H'")), rings, (cam,), (("K", "S"),), unnamed)
+
+
+def _turned(points: Floats, angles: Floats) -> Floats:
+    """Return points of the cam's frame, (n, 2) m, as they stand when the cam has turned by an angle each, rad."""
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.column_stack([points[:, 0] * cos - points[:, 1] * sin, points[:, 0] * sin + points[:, 1] * cos])
+
+
 def linkage(scene: Scene, found: CamDrawing, figures: Figures) -> Drawing:
     """Return a design's cam with its follower in both dwells and at the least cam force, at full scale."""
     drawn, units = picture(found, figures["contact_angle"] or 0.0), drawn_units(scene)
     strokes = [*drawn.skeleton.strokes(drawn.height), *_frame(drawn), *drawn.spring.strokes()]
-    texts = place(_labels(drawn, units), strokes, drawn.height)
-    legend = _legend(scene, drawn, figures, units)
-    return Drawing(scene.name, drawn.height, (*strokes, *texts), legend, units.length)
+    labels, legend = _labels(drawn, units), _legend(scene, drawn, figures, units)
+    forces = sized(scene, _forces(drawn)) if tells_forces(scene) else {}
+    if forces:
+        arrows, sizes = force_arrows.drawn(tuple(forces), _stood(drawn, forces), forces, drawn.height)
+        strokes, labels = [*strokes, *arrows], [*labels, *sizes]
+        legend = (*legend, *force_arrows.legend(LEAST))
+    texts = place(labels, strokes, drawn.height)
+    near = drawn.skeleton.joints[NEAR]
+    measures = (
+        Measure("arm", near["B"], near["C"]),
+        Measure("centre_distance", ORIGIN, near["B"]),
+        Measure("roller_radius", near["C"], near["T"]),
+    )
+    return Drawing(scene.name, drawn.height, (*strokes, *texts), legend, units.length, measures)
+
+
+PINS = {"cam_shaft_force": "A", "lever_pivot_force": "B", "roller_force": "C"}
+
+
+def _forces(drawn: Picture) -> list[ForceArrow]:
+    """Return the forces on the lever and in the cam's bearings in the drawing's axes, which turn with the cam."""
+    sampler, found = drawn.cam.sampler, []
+    for name in (name for name in PINS if name in sampler.model.told):
+        pushed = sampler.pushed(name)
+        nodes = [(top.piece, top.u, "") for top in sampler.extremes(name) if top.height == pushed][:1]
+        nodes.append((*(each[0] for each in sampler.cycle.located(np.array([drawn.theta[LEAST]]))), LEAST))
+        for piece, u, event in nodes:
+            node = np.array([piece]), np.array([u])
+            force, x, y = sampler.together(("cam_force", f"{name}_x", f"{name}_y"), *node).values()
+            theta = sampler.cycle.angles(*node)
+            if settled(float(force[0]), sampler.peak("cam_force")) > 0.0:
+                ((x, y),) = _turned(np.column_stack((x, y)), -theta)
+                found.append(ForceArrow(PINS[name], float(theta[0]) % TURN, float(x), float(y), event))
+    return found
+
+
+def _stood(drawn: Picture, forces: Collection[ForceArrow]) -> MechanismMotion:
+    """Return where the arm stands about the cam at the forces' cam angles."""
+    theta = np.array([force.angle for force in forces])
+    round_it = float(drawn.cam.follower.centre_distance) * np.column_stack((np.sin(theta), np.cos(theta)))
+    return MechanismMotion(theta, {"A": ORIGIN}, {"B": round_it, "C": drawn.cam.at(theta).pitch}, (("B", "C"),))
 
 
 def _points(curve: Floats) -> tuple[Point, ...]:

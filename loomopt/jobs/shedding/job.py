@@ -6,13 +6,13 @@ force, one in proportion to the shed on either side of its middle, and inertia.
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, final
+from collections.abc import Callable, Container, Mapping
+from typing import TYPE_CHECKING, Any, final
 
 from loomopt.base.errors import BadInput, refusal
 from loomopt.base.quantities import NARROWEST
 from loomopt.jobs import base
-from loomopt.jobs.base import Figures, Job, LawFamily, Studied
+from loomopt.jobs.base import EVERY, Figures, InBox, Job, LawFamily, Studied
 from loomopt.jobs.shedding.model import (
     CYCLE,
     DWELLS,
@@ -25,7 +25,14 @@ from loomopt.jobs.shedding.model import (
     frame,
     moving,
 )
-from loomopt.jobs.shedding.program import CONTACT_SPEED, SheddingTask, contact_speed, demand_moving, model
+from loomopt.jobs.shedding.program import (
+    CONTACT_SPEED,
+    SheddingTask,
+    contact_speed,
+    contact_speeds,
+    demand_moving,
+    model,
+)
 from loomopt.jobs.shedding.scene import (
     SCHEMA,
     SEGMENTS,
@@ -50,6 +57,9 @@ from loomopt.physics.mechanisms import cam_limit, cam_spline
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import Spline, knots, named_knots
 from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
 
 SAME_TURN = 1e-9
 """rad; the segments' angles may miss a whole turn by this much: decimals."""
@@ -150,36 +160,58 @@ class Shedding(Job):
         changed = scene.update(changes) if changes else scene
         return changed, "stiffness" if target == "law" else target
 
-    def figures(self, scene: Scene, design: Numbers) -> dict[str, float | None]:
+    def figures(self, scene: Scene, design: Numbers) -> Figures:
         """Return every figure of the job for a design, SI; None for one whose numbers the scene does not have."""
-        sampler = self.sampler(scene, design)
-        found: dict[str, float | None] = {name: sampler.static.get(name) for name in scene.schema.figures}
-        peaks = self.peaks(sampler.model)
-        sampler.search(("lift", *peaks.values()))
+        found, parted = super().figures(scene, design), self.parted(scene, self.sampler(scene, design))
+        return {**found, **parted.figures} if parted else found
+
+    def figures_of(
+        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+    ) -> dict[str, Number]:
+        """Return every figure of a machine, or of many, but those of a frame that parts; None without its numbers."""
+        found = base.alone(scene, sampled, asked)
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        sampled.search(("lift", *peaks.values()))
         for name, quantity in peaks.items():
-            found[name] = sampler.peak(quantity) * (-1 if quantity == "concavity" else 1)
-        parted = self.parted(scene, sampler)
-        return found | contact_figures(scene, sampler) | (parted.figures if parted else {})
+            found[name] = sampled.peak(quantity) * (-1 if quantity in ("concavity", "lift") else 1)
+        if isinstance(sampled, Sampler):
+            found |= {name: sampled.pushed(name) for name in peaks if name in sampled.model.pushes}
+            found["contact_min"], found["contact_angle"] = _least(sampled.extremes("lift"), sampled)
+            return found | ({CONTACT_SPEED: contact_speed(scene, sampled)} if CONTACT_SPEED in asked else {})
+        lowest = sampled.tops("lift")
+        found |= {"contact_min": -lowest.value, "contact_angle": sampled.angles(lowest) % (2 * math.pi)}
+        return found | ({CONTACT_SPEED: contact_speeds(sampled)} if CONTACT_SPEED in asked else {})
+
+    def over_cycle(self, model: JobModel) -> dict[str, str]:
+        """Return the figures that are read over the cycle, with their quantities."""
+        return {**super().over_cycle(model), CONTACT_SPEED: ""}
 
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Return the figures that are extremes over the cycle, with their quantities."""
         found = {name: quantity for name, quantity in CYCLE.items() if model.has_quantity(quantity)}
-        return found | {name: name for check in model.checks for name in check.quantities}
+        told = [name for check in model.checks for name in check.over_cycle if model.has_quantity(name)]
+        return found | {name: name for name in told}
+
+    def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
+        """Return how each figure is read over a box of numbers: the least cam force and curvature are opposites."""
+        opposite = {name: of for name, of in self.peaks(model).items() if of in ("concavity", "lift")}
+        return super().in_boxes(scene, model) | {n: InBox(quantity=of, sign=-1.0) for n, of in opposite.items()}
 
     def say(self, scene: Scene, target: str, figures: Figures) -> str:
         """Say what an optimum of the target reached, and what today's spring would do; figures in SI."""
-        now, dwells = contact_figures(scene, self.sampler(scene, self.today(scene))), judged(self.model(scene))
-        size = {name: value or 0.0 for name, value in figures.items()}
-        stiffness, speed = scene.show(size["K1"], "stiffness", 9), scene.show(size["speed"], "angular speed", 9)
+        dwells = judged(self.model(scene))
         kept = f"keeps the roller on the cam {f'in {dwells}' if dwells else 'all round'}"
-        peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {scene.show(size['contact_max'], 'force')}"
-        said = {
-            "stiffness": f"The least return spring that {kept} has {stiffness}.",
-            "law": f"With the cam law chosen too, the least return spring that {kept} has {stiffness}.",
-            "force": f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}",
-            "speed": f"Today's spring {kept} up to {speed}.",
-        }[target]
-        return said if target == "speed" else f"{said} {_today(scene, now)}".strip()
+        if target == "speed":
+            return f"Today's spring {kept} up to {scene.show(figures['speed'] or 0.0, 'angular speed', 9)}."
+        stiffness = scene.show(figures["K1"] or 0.0, "stiffness", 9)
+        said = f"The least return spring that {kept} has {stiffness}."
+        if target == "law":
+            said = f"With the cam law chosen too, the least return spring that {kept} has {stiffness}."
+        if target == "force":
+            force = scene.show(figures["contact_max"] or 0.0, "force")
+            peak = f"peak cam force{f' in {dwells}' if dwells else ''} is {force}"
+            said = f"The least {peak}, with a return spring of {stiffness}.{MOVES if dwells else ''}"
+        return f"{said} {_today(scene, self.sampler(scene, self.today(scene)))}".strip()
 
     def columns(self, scene: Scene, sampler: Sampler) -> Columns:
         """Return X with three derivatives, s'', the terms, N, the cam torque, pressure angle and curvatures."""
@@ -241,14 +273,6 @@ def _chosen(variable: Variable, value: float) -> bool:
     return variable.lower < variable.upper or abs(value - variable.lower) > GAVE_WAY * variable.scale
 
 
-def contact_figures(scene: Scene, sampler: Sampler) -> dict[str, float | None]:
-    """Return the figures of the cam force, SI, and the speed up to which the roller stays on the cam."""
-    found: dict[str, float | None] = {"contact_max": sampler.peak("cam_force")}
-    found["contact_min"], found["contact_angle"] = _least(sampler.extremes("lift"), sampler)
-    found[CONTACT_SPEED] = contact_speed(scene, sampler)
-    return found
-
-
 def _least(found: list[Extreme], sampled: Sampler) -> tuple[float, float]:
     """Return the least cam force, N, and the first cam angle where it is reached, rad."""
     highest = max(extreme.height for extreme in found)
@@ -264,15 +288,16 @@ def judged(model: JobModel) -> str:
     return "both dwells" if len(known) > 1 else f"the {known[0]}" if known else ""
 
 
-def _today(scene: Scene, found: Figures) -> str:
+def _today(scene: Scene, sampler: Sampler) -> str:
     """Say whether today's spring holds the roller on the cam, and where and by how much it would lift off."""
-    least, most = found["contact_min"] or 0.0, abs(found["contact_max"] or 0.0)
+    sampler.search(("lift", "cam_force"))
+    (least, angle), most = _least(sampler.extremes("lift"), sampler), sampler.peak("cam_force")
     wanted, force = scene.operation["N_min"], scene.show(least, "force")
     spring = f"Today's spring ({scene.show(scene.mechanism['K1'], 'stiffness', 9)})"
     if least >= wanted - CLOSE * max(most, 1.0):
         return f"{spring} holds: the cam force is never less than {force}."
-    lost = f"the cam force would be {force} at {scene.show(found['contact_angle'] or 0.0, 'angle')}"
-    speed = found[CONTACT_SPEED]
+    lost = f"the cam force would be {force} at {scene.show(angle, 'angle')}"
+    speed = contact_speed(scene, sampler)
     if speed:
         lost += f"; it holds up to {scene.show(speed, 'angular speed', 7)}"
     return f"{spring} would lift off: {lost}." if least < 0.0 else f"{spring} is too soft: {lost}."

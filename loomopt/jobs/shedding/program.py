@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from loomopt.jobs.shedding.scene import (
     program_numbers,
 )
 from loomopt.maths import systems
-from loomopt.maths.systems import numpy
+from loomopt.maths.systems import Number, numpy
 from loomopt.model import drive
 from loomopt.model.limits import BoundLimit, Limit
 from loomopt.model.model import JobModel
@@ -33,12 +33,15 @@ from loomopt.model.objectives import Objective, Peak, Value
 from loomopt.model.program import Goal, Move, Numbers, Variable, goals, nothing_follows
 from loomopt.model.reading import Quantities
 from loomopt.model.sampling import Sampler, sampled
-from loomopt.physics.cycle import Floats, Node
+from loomopt.physics.cycle import Floats, Node, Pieces
 from loomopt.physics.effects.kinds import Check, Load, owned
 from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Spline, accelerations, named_knots
 from loomopt.physics.tolerances import ACCURACY, START_ROOM
 from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
 
 SPEED_AT_REST, SPEED_STEPS, SPEED_MET = 1e-12, 30, 1e-8
 """Largest speed that keeps a bound: share of the largest value by which one at rest may miss it, for rounding; Newton's
@@ -127,6 +130,8 @@ SPEEDS = frozenset(("speed", CONTACT_SPEED))
 """The cam shaft's speed, and the one up to which contact holds: each is free where it is traded."""
 LINEAR = SPEEDS | {"K1", "X0", "contact_max", "contact_min", "spring_force_max", "spring_stretch"}
 """What is linear, or a quotient of what is, in K1, K1 X0 and the speed's square."""
+LEAST_SPARE = 1e-3
+"""Of rounding: what a force is taken to spare where it spares none, so that its inverse is a number."""
 LEAST_STRETCH = 1e-3
 """Share of the largest elongation below which a spring is as good as slack."""
 MEGA = 1e6
@@ -157,14 +162,61 @@ def survived(sampler: Sampler, least: float) -> float:
     return speed_reached(sampler.model, sampler.values, "lift", -least, slack)
 
 
+def races(physics: JobModel) -> bool:
+    """Say whether the speed up to which the roller stays on the cam is known, and any ends that."""
+    unknown = drive.motor(physics.effects) or physics.known_in
+    return not unknown and any(load.moved for load in physics.loads if isinstance(load, Load))
+
+
 def contact_speed(scene: Scene, sampler: Sampler) -> float | None:
     """Return the speed, rad/s, up to which the roller stays on the cam; None where none ends that, or it is unknown."""
-    physics = sampler.model
-    unknown = drive.motor(physics.effects) or physics.known_in
-    if unknown or not any(load.moved for load in physics.loads if isinstance(load, Load)):
+    if not races(sampler.model):
         return None
     speed = survived(sampler, scene.operation["N_min"])
     return speed if math.isfinite(speed) else None
+
+
+def contact_speeds(machines: "Machines") -> Floats | None:
+    """Return the speed, rad/s, up to which each roller stays on its cam, (machines,); infinite where none ends that.
+
+    As `speed_reached`, but that at each cam angle the inverse of the first root is a curve, and refined as one.
+    """
+    if not races(machines.model):
+        return None
+    own, least = machines.values["speed"], machines.values["N_min"]
+    slack = ACCURACY * np.abs(machines.static["spring_force_max"])
+    runs = [machines.at_numbers(speed=share * own) for share in (0.0, 1.0, -1.0)]
+    reached = own / _inverse_shares(machines, runs, least - 0.0 * slack)
+    held = (reached < own) & (machines.peak(LIFT) <= slack - least)
+    if not held.any():
+        return np.asarray(reached)
+    return np.asarray(np.where(held & (own <= own / _inverse_shares(machines, runs, least - slack)), own, reached))
+
+
+def _inverse_shares(machines: "Machines", runs: "Sequence[Machines]", least: Floats) -> Floats:
+    """Return each machine's speed over the one up to which its cam force stays at least `least`, N, (machines,).
+
+    runs: the machines at rest, at their speed, and backward.
+    """
+    sampled = [run.sampled(LIFT) for run in runs]
+    slack = ACCURACY * np.abs(machines.static["spring_force_max"])
+    rounding = SPEED_AT_REST * np.abs(sampled[:2]).max(axis=(0, 1))
+
+    def inverse(lifts: Sequence[Floats], which: Number) -> Floats:
+        rest, ahead, back = (-lift for lift in lifts)
+        square, linear, spare = (ahead + back) / 2 - rest, (ahead - back) / 2, rest - least[which]
+        inside = linear**2 - 4 * square * np.maximum(spare, 0.0)
+        falls = (inside >= 0.0) & ((np.abs(square) > rounding[which]) | (np.abs(linear) > rounding[which]))
+        root = (np.sqrt(np.maximum(inside, 0.0)) - linear) / (2 * np.maximum(spare, LEAST_SPARE * rounding[which]))
+        return np.where(falls & (root > 0.0), root, 0.0)
+
+    def at(pieces: Pieces, u: Floats, which: Pieces) -> Floats:
+        return inverse([run.at(LIFT, pieces, u, which) for run in runs], which)
+
+    on = machines.model.counted(machines.like.cycle, LIFT)
+    tops = machines.highest(inverse(sampled, np.arange(machines.count)), True, on, at)
+    lost = (-sampled[0][on[machines.pieces]] - least).min(axis=0) < -np.maximum(rounding, slack)
+    return np.where(lost, np.inf, tops.value)
 
 
 def demand_moving(scene: Scene, instead: str) -> None:
@@ -279,6 +331,11 @@ class SheddingTask(Task):
     def checks(self) -> list[Check[Any]]:
         """The checks that are on."""
         return [effect for effect in self.scene.active if isinstance(effect, Check)]
+
+    def decides(self, check: Check[Any]) -> bool:
+        """Say whether a check is more than figures: it demands, is made least, or is limited or sought."""
+        asked = {*self.scene.limits, *self.traded}
+        return bool(check.demands or check.least or check.axes or asked & {*check.over_cycle, *check.rows})
 
     # Variables.
 
@@ -471,7 +528,7 @@ class SheddingTask(Task):
         spring = free <= {"K1", "X0"} and (not self.law or set(self.scene.limits) <= {"law_acceleration"})
         traded = self.traded and set(self.traded) <= LINEAR and free <= {"K1", "X0", *SPEEDS}
         told = spring or bool(traded) or free == {"speed"}
-        linear = not self.checks and told and (spring or drive.POWER not in self.scene.limits)
+        linear = not any(map(self.decides, self.checks)) and told and (spring or drive.POWER not in self.scene.limits)
         return ONE_OPTIMUM if linear else ""
 
     # Natural sizes.

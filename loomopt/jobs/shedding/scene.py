@@ -67,6 +67,15 @@ class SegmentTable(Table):
     law: NAMED_LAW | None = Field(None, description="its cam law, that of the mechanism without one")
 
 
+class Lever(Table):
+    """Where the rod to the heald frame acts on the lever, for the force in its pivot."""
+
+    arm: PositiveLength = Field(description="distance of the rod's line from the lever's pivot")
+    direction: Angle = Field(
+        description="angle of the rod's force on the lever, from x; y is from the cam shaft to the pivot"
+    )
+
+
 class HealdFrame(Table):
     """The heald frame and its cam today; the follower's arm turns about C, its roller's centre is B."""
 
@@ -85,6 +94,7 @@ class HealdFrame(Table):
     centre_distance: PositiveLength | None = Field(None, description="from the cam shaft A to the arm's pivot B")
     roller_radius: PositiveLength | None = Field(None, description="radius of the roller")
     arm_swing: Angle | None = Field(None, description="angle through which the arm swings")
+    lever: Lever | None = Field(None, description="where the rod to the heald frame acts on the lever")
     K1: Stiffness = Field(description="stiffness of the return spring, both springs together")
     X0: Length = Field(description="elongation of the return spring with the shed open upward")
 

@@ -1,11 +1,13 @@
 """Shedding's own views: the cam, its profile, the cam force, and what a designer should know beside the numbers."""
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, get_args
 
 from loomopt.jobs import registry
@@ -39,6 +41,7 @@ from loomopt.physics.mechanisms import cam_spline
 from loomopt.physics.mechanisms.cam_follower import Contact, Follower
 from loomopt.physics.mechanisms.cam_laws import LawDerivatives
 from loomopt.physics.mechanisms.cam_motion import CamLaw, Named, Spline, Tabulated, of_knots
+from loomopt.physics.mechanisms.dyad import Vector
 from loomopt.physics.schema import Values
 from loomopt.picture import effect_equations
 from loomopt.picture.equations import Case, Equation, Expression, cases, equation, relation, sums, symbol, sympy, text
@@ -99,6 +102,7 @@ def law(found: CamLaw) -> list[Equation]:
     return written
 
 
+@functools.lru_cache(64)
 def expanded(formula: Expression, u: Expression) -> Expression:
     """Return a law's formula as a sum of powers of u and plain sine waves."""
     from sympy.simplify.fu import TR8
@@ -141,7 +145,7 @@ def _table(found: cam_spline.LawTable) -> list[Equation]:
     s, v, a = (symbol(f"{letter}_k") for letter in "sva")
     kind = f"cam law table, k = 0 ... {points - 2}"
     return [
-        Equation("cam law table", f"s(u): {said}", rf"s(u):\ \text{{{said}}}"),
+        Equation("cam law table", f"s(u): {said}", rf"s(u):\ \text{{{said}}}", ((f"s(u): {said}",),)),
         equation(kind, t, u - k),
         equation(kind, symbol("s"), s + v * t + a * t**2 / 2 + jerk * t**3 / 6),
     ]
@@ -177,6 +181,19 @@ class FrameSymbols(Motion):
         """Sign of X', `worst` in the dwells."""
         return {RISE: 1, RETURN: -1}.get(self.segment, self.worst)
 
+    def contact(self, follower: Follower) -> SimpleNamespace:
+        """Return roller and cam by the pressure angle, and the outward normal n."""
+        sp, angle = sympy(), symbol("pressure_angle")
+        toward = Vector(-symbol("n_x"), -symbol("n_y"))
+        swing = symbol("phi'")
+        return SimpleNamespace(
+            sides=(sp.cos(angle), -sp.sin(angle)),
+            speed=sp.Integer(1),  # sides are shares of it
+            normal=lambda theta: toward,
+            phi_1=swing,
+            rolling=sp.Symbol("w", positive=True) / follower.roller_radius - (1 + swing),
+        )
+
 
 def equations(model: JobModel) -> tuple[Equation, ...]:
     """Return the equations of a shedding scene: law, segments, motion, terms, balance, contact, follower, coils.
@@ -194,7 +211,8 @@ def equations(model: JobModel) -> tuple[Equation, ...]:
     if model.has_quantity("curvature"):
         found += follower()
     pose = _pose(model, cam.segments[0], LEAST)
-    return (*found, *(each for check in model.checks for each in effect_equations.check_equations(check, pose, known)))
+    found += [each for check in model.checks for each in effect_equations.check_equations(check, pose, known)]
+    return (*found, *effect_equations.joint_equations(model, pose, known, symbol("N"), "N"))
 
 
 def _given(model: JobModel) -> Given:
@@ -363,7 +381,8 @@ def _profile_curvature(numbers: Sequence[Expression]) -> Expression:
 if TYPE_CHECKING:
     from loomopt.model.separation import Parted
     from loomopt.picture.equations import Equation
-    from loomopt.picture.shapes import Drawing
+    from loomopt.picture.motion import MechanismMotion
+    from loomopt.picture.shapes import Drawing, Floats
 
 ALIKE = 1e-9
 """Forces this close, relative, in N, are one."""
@@ -389,6 +408,12 @@ class SheddingViews(JobViews):
         from loomopt.jobs.shedding import drawing
 
         return drawing.joints_csv(scene, drawing.cam(scene, design))
+
+    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion | None":
+        """Return the cam turning under its arm at cam angles, rad; none without a follower. Raises BadInput."""
+        from loomopt.jobs.shedding import drawing
+
+        return None if self.missing(scene) else drawing.motion(drawing.cam(scene, design), angles)
 
     def missing(self, scene: Scene) -> tuple[str, ...]:
         """Return the keys of the follower that the scene does not give."""

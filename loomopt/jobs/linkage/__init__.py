@@ -1,0 +1,1 @@
+"""The linkage job, in the files every job has."""

@@ -1,0 +1,129 @@
+"""The linkage job: whatever a planar linkage of one degree of freedom is asked for."""
+
+import math
+from collections.abc import Container, Mapping
+from typing import TYPE_CHECKING, Any, final
+
+from loomopt.jobs import base
+from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
+from loomopt.jobs.linkage import scene as scenes
+from loomopt.jobs.linkage.model import OBLIQUITY
+from loomopt.jobs.linkage.program import LinkageTask, linkage_of, model
+from loomopt.maths.systems import Number
+from loomopt.model.curves import Columns
+from loomopt.model.model import Formula, Instant, JobModel
+from loomopt.model.program import Numbers
+from loomopt.model.sampling import Sampler
+from loomopt.physics.tolerances import FEASIBLE
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import SceneSchema
+
+if TYPE_CHECKING:
+    from loomopt.model.machines import Machines
+
+LEAST = ("x_min.", "y_min.")
+
+
+@final
+class LinkageJob(Job):
+    """A linkage described in the scene."""
+
+    name = "linkage"
+    task = LinkageTask
+    open_boxes = "no global claim: boxes of a chain's designs do not close in any time worth waiting for"
+
+    def schema(self, document: Mapping[str, Any]) -> SceneSchema:
+        """Return what a scene may hold, by its own tables. Raises BadInput."""
+        return scenes.schema(document)
+
+    def check(self, scene: Scene) -> None:
+        """Raise BadInput where today's linkage does not turn all round, or a name means nothing in it."""
+        scenes.check(scene)
+
+    def model(self, scene: Scene, design: Numbers | None = None) -> JobModel:
+        """Return the linkage with the effects the scene calls for."""
+        return model(scene)
+
+    def figures_of(
+        self, scene: Scene, sampled: "Sampler | Machines", asked: Container[str] = EVERY
+    ) -> dict[str, Number]:
+        """Return every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
+        peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in asked}
+        sampled.search(tuple(peaks.values()))
+        found = base.alone(scene, sampled, asked)
+        return found | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
+
+    def read(self, name: str, peak: Number) -> Number:
+        """Return a figure of a quantity's largest value, SI."""
+        if name.startswith("mu."):
+            return math.pi / 2 - peak
+        return -peak if name.startswith(LEAST) else peak
+
+    def peaks(self, model: JobModel) -> dict[str, str]:
+        """Return the figures that are extremes over the cycle."""
+        found = {name: name for name in model.quantities}
+        found |= {name: name for name in model.signed}
+        return found | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
+
+    def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
+        """Return how each figure is read over a box of numbers."""
+        told = {name: (self.read(name, 0.0), self.read(name, 1.0)) for name in self.peaks(model)}
+        peaks = {
+            name: InBox(quantity=of, sign=told[name][1] - told[name][0], offset=told[name][0])
+            for name, of in self.peaks(model).items()
+        }
+        return super().in_boxes(scene, model) | peaks
+
+    def say(self, scene: Scene, target: str, figures: Figures) -> str:
+        """Say in one sentence what an optimum reached; figures in SI."""
+        kinds, told, task = scene.schema.figures, [], LinkageTask(scene, target)
+        for name, sense in task.levels:
+            value = figures.get(name)
+            if name in kinds and value is not None:
+                made_zero = name.startswith("force.") and abs(value) <= FEASIBLE * task.figure_size(name)
+                text = scene.show(0.0 if made_zero else value, kinds[name].kind, 9)
+                told.append(f"the {sense} {name} is {text}")
+            elif name not in kinds:
+                told.append(f"the {sense} {name} is sought")
+        said = ", then ".join(told)
+        return f"{said[:1].upper()}{said[1:]}."
+
+    def columns(self, scene: Scene, sampler: Sampler) -> Columns:
+        """Return the output with three derivatives, the transmission angles, the terms, force and torque."""
+        linkage = linkage_of(sampler.model)
+        slides = linkage.output.slides
+        unit, force = ("m", "N") if slides else ("rad", "N*m")
+        per = ("m/rad", "m/rad^2", "m/rad^3") if slides else ("1", "1", "1")
+        motion = {f"q [{unit}]": _order(0)} | {f"q_{k} [{per[k - 1]}]": _order(k) for k in (1, 2, 3)}
+        motion |= {f"mu_{part} [rad]": _mu(part) for part in linkage.oblique}
+        return Columns(
+            motion,
+            force,
+            (f"Q [{force}]", lambda at: at.force),
+            ("Md [N*m]", lambda at: at.crank_torque),
+            also=tuple(float(sampler.given.values[place.value]) for place in linkage.places),
+        )
+
+    def demand(self, scene: Scene, target: str) -> None:
+        """Raise BadInput where a target speaks of what the scene does not have."""
+        base.demand(scene, target)
+        self.task(scene, target).demand_figures()
+
+    def studied(self, scene: Scene) -> Studied:
+        """Return what studies read."""
+        found = super().studied(scene)
+        return found._replace(peaks={name: (name, False) for name in self.model(scene).quantities})
+
+
+def _order(order: int) -> Formula:
+    return lambda at: at.pose.order(order)
+
+
+def _mu(group: str) -> Formula:
+    def value(at: Instant) -> Number:
+        return math.pi / 2 - abs(at.pose.joints.obliquity(group))
+
+    return value
+
+
+JOB = LinkageJob()

@@ -1,0 +1,657 @@
+"""The linkage model: the parts of a scene as a motion, with its events, windows, quantities and rows.
+
+q = the output that the scene names (an angle, a slide, a coordinate of a joint); Q = force or torque there.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Collection, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from loomopt.base.records import lazy
+from loomopt.maths import systems, turning_points
+from loomopt.maths.systems import FLOAT, Maths, Number
+from loomopt.model import drive
+from loomopt.model.kinematics import Arcs, Group, Kinematics
+from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import TURN, Floats, Node
+from loomopt.physics.effects.kinds import Effect, Load, Motion
+from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
+from loomopt.physics.mechanisms.dwell_cam import stretch
+from loomopt.physics.mechanisms.dyad import Vector, dot
+from loomopt.physics.mechanisms.moving import Joint, cross
+from loomopt.physics.schema import Values
+from loomopt.physics.tolerances import ASSEMBLY_MARGIN
+
+OBLIQUITY = "obliquity"
+"""What the quantity of a part's transmission angle is called, after the part."""
+SCAN = 720
+"""Samples of one turn between which turns of the output are sought."""
+BESIDE = 0.0123
+"""rad; where the samples begin: a linkage drawn in line turns at 0 exactly, where they would see no change of sign."""
+NEWTONS = 8
+"""Newton's steps from between two samples to a turn: the third is right to rounding."""
+FLAT = 1e-7
+"""Share of the largest |q''| below which the output only touches a standstill: its event has no angle of its own."""
+SMOOTH = 4
+"""Parts of a turn without corners over which means are taken by Gauss's rule; between corners one part is enough (the
+packaged means are right to 2e-15)."""
+
+
+class Output(NamedTuple):
+    """What of the linkage the output is; measure: "angle", "slide", "x" or "y" of a link, part or joint.
+
+    against: another link, from which an angle is counted; sign: whether it counts so or the other way round.
+    scale: what it is multiplied by; of an angle a length makes a length of it, so that the output slides. zero: the
+    direction from which an angle is counted, x without one.
+    """
+
+    measure: str
+    name: str
+    against: str = ""
+    sign: int = 1
+    scale: Ref | None = None
+    zero: Ref | None = None
+    slides: bool = False
+
+
+class Place(NamedTuple):
+    """An event: an extreme of q ("max", "min"), that nearest to a crank angle, rad, or the farthest of all without.
+
+    Or where q is `travel` short of its value at another event, `beside`, before (side −1) or after (+1) it; or a crank
+    angle of the scene's.
+    """
+
+    name: str
+    extreme: str = ""
+    near: float | None = None
+    travel: Ref | None = None
+    beside: str = ""
+    side: int = -1
+    angle: Ref | None = None
+
+    @property
+    def hint(self) -> str:
+        """The name of the value from which its crank angle is followed."""
+        return hint_of(self.name)
+
+    @property
+    def value(self) -> str:
+        """The name of the value that is its crank angle, rad."""
+        return event_value(self.name)
+
+
+def hint_of(name: str) -> str:
+    """Return the name of the value from which a crank angle is followed, rad."""
+    return f"hint {name}"
+
+
+def event_value(event: str) -> str:
+    """Return the name of the value that is an event's crank angle, rad."""
+    return f"event {event}"
+
+
+OUTPUT_PLACES = "output at events"
+"""What loads call in that read where the output is at events."""
+
+
+def output_value(event: str, axis: str) -> str:
+    """Return the name of the value that tells where the output is at an event: q, or its direction's x or y."""
+    return f"output {axis} at {event}"
+
+
+class Window(NamedTuple):
+    """A stretch of crank angles after an event; what the output travels in it counts from its place at `level`."""
+
+    name: str
+    after: str
+    begins: Ref
+    ends: Ref
+    level: str
+
+    @property
+    def switch(self) -> str:
+        """The name of the switch that is 1 inside it."""
+        return f"window {self.name}"
+
+    def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        """Return where it begins and ends, rad."""
+        start = given.values[event_value(self.after)]
+        return tuple(start + number(maths, given.values, end) for end in (self.begins, self.ends))
+
+    def arcs(self) -> Arcs:
+        """Return it as a stretch of the cycle that limits speak of."""
+        return Arcs(self.switch, self.corners, inside, self)
+
+
+def inside(angle: float, corners: tuple[float, ...]) -> float:
+    """Return 1 between two crank angles, rad, and 0 outside; a stretch that passes 0 is one too."""
+    begin, end = corners
+    return 1.0 if (angle - begin) % TURN < end - begin else 0.0
+
+
+class Path(NamedTuple):
+    """Where a point should be: phi: crank angles, rad, none where its timing is free; x, y, m."""
+
+    point: str
+    phi: tuple[float, ...]
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Names of the values that are the crank angles of its points where its timing is free."""
+        return () if self.phi else tuple(f"path {k}" for k in range(len(self.x)))
+
+
+def nearest_rates(joint: Joint, place: tuple[Number, Number]) -> tuple[Number, Number, Number]:
+    """Return what vanishes where a joint is nearest to a place, m², with its first two derivatives."""
+    p, p1, p2, p3 = joint.place, *(joint.at(order) or Vector(0, 0) for order in (1, 2, 3))
+    away = Vector(p.x - place[0], p.y - place[1])
+    return dot(away, p1), dot(p1, p1) + dot(away, p2), 3 * dot(p1, p2) + dot(away, p3)
+
+
+def number(maths: Maths, values: Values, ref: Ref) -> Number:
+    """Return a number of the scene by its name, or a literal."""
+    if not ref.name:
+        return maths.number(ref.value)
+    return values[ref.name] if ref.sign > 0 else -values[ref.name]
+
+
+@dataclass(frozen=True)
+class LinkagePose(Motion):
+    """The linkage at crank angles φ, rad, any shape; what nobody reads is not computed.
+
+    joints: its parts; factor: what the output is multiplied by, None for 1; zero: the direction an angle counts from.
+    """
+
+    joints: chain.Pose
+    output: Output
+    omega: Number
+    omega_dot: Number = None
+    factor: Number = None
+    zero: Number = None
+
+    @property
+    def phi(self) -> Number:
+        """Crank angle φ, rad."""
+        return self.joints.phi
+
+    @property
+    def direction(self) -> Vector:
+        """The output link's direction, of any length, as seen from the link it counts against."""
+        found = self.joints.vector(self.output.name)
+        if not self.output.against:
+            return found
+        seen = self.joints.vector(self.output.against)
+        return Vector(dot(seen, found), cross(seen, found))
+
+    def travelled(self, given: Values, event: str) -> Number:
+        """Return q − q at an event, rad or m; given: with the output's places there."""
+        if self.output.measure != "angle":
+            return self.q - given[output_value(event, "q")]
+        return self._turned(Vector(given[output_value(event, "x")], given[output_value(event, "y")]))
+
+    def order(self, order: int) -> Number:
+        """Return the output or a derivative of it with respect to φ."""
+        out, at = self.output, self.joints
+        if out.measure == "angle":
+            found = self._angle() if order == 0 else self._rate(order)
+        elif out.measure == "slide":
+            found = at.slides[out.name].at(order)
+        else:
+            vector = at.joints[out.name].at(order)
+            found = 0 if vector is None else getattr(vector, out.measure)
+        found = found if self.factor is None else self.factor * found
+        return found if out.sign > 0 else -found
+
+    def _angle(self) -> Number:
+        maths, seen = self.joints.maths, self.direction
+        if self.zero is None:
+            return maths.atan2(seen.y, seen.x)
+        zero = Vector(maths.cos(self.zero), maths.sin(self.zero))
+        return self.zero + maths.atan2(cross(zero, seen), dot(zero, seen))
+
+    def _rate(self, order: int) -> Number:
+        own = self.joints.links[self.output.name].rates(order)
+        other = self.joints.links[self.output.against].rates(order) if self.output.against else None
+        if own is None or other is None:
+            return -other if other is not None else 0 if own is None else own
+        return own - other
+
+    def since(self, there: "LinkagePose") -> Number:
+        """Return how far the output is from its place in another pose; of an angle as one atan2."""
+        if self.output.measure != "angle":
+            return self.q - there.q
+        return self._turned(there.direction)
+
+    def _turned(self, since: Vector) -> Number:
+        """Return what the output has made since it had another direction."""
+        seen = self.direction
+        found = self.joints.maths.atan2(cross(since, seen), dot(since, seen))
+        found = found if self.factor is None else self.factor * found
+        return found if self.output.sign > 0 else -found
+
+    @lazy
+    def q(self) -> Number:
+        """The output, rad or m."""
+        return self.order(0)
+
+    @lazy
+    def q1(self) -> Number:
+        """Its first derivative with respect to φ."""
+        return self.order(1)
+
+    @lazy
+    def q2(self) -> Number:
+        """Its second derivative."""
+        return self.order(2)
+
+    @lazy
+    def q3(self) -> Number:
+        """Its third derivative."""
+        return self.order(3)
+
+
+class Turn(NamedTuple):
+    """Where the output turns: the crank angle, rad, which way, the output there, and q'' over its largest."""
+
+    angle: float
+    extreme: str
+    q: float
+    bend: float
+
+
+class UnfoundError(ValueError):
+    """An event is not there, or not one: which, and why in words."""
+
+    def __init__(self, event: str, problem: str) -> None:
+        super().__init__(problem)
+        self.event, self.problem = event, problem
+
+
+@dataclass(frozen=True)
+class Linkage(Kinematics):
+    """The motion of the parts."""
+
+    chain: Chain
+    output: Output
+    places: tuple[Place, ...] = ()
+    path: Path | None = None
+
+    @property
+    def structure(self) -> Hashable:
+        """What distinguishes its formulas from another's."""
+        return self.chain, self.output, self.places, self.path
+
+    @lazy
+    def groups(self) -> Mapping[str, Group]:
+        """The parts that must close at every crank angle, by their names."""
+        found = {}
+        for part in self.chain.parts:
+            closes = chain.closes(part)
+            quantities: dict[str, Any] = {name: functools.partial(_span, part.name, name) for name in closes.values()}
+            if chain.has_transmission_angle(part):
+                quantities[OBLIQUITY] = functools.partial(_obliquity, part.name)
+            if quantities:
+                found[f"{part.name}."] = Group(quantities, closes)
+        return found
+
+    @lazy
+    def arcs(self) -> tuple[Arcs, ...]:
+        """The stretches of each cam, with formulas of their own."""
+        return tuple(
+            Arcs(cam_switch(cam), functools.partial(self._cornered, cam), stretch, cam) for cam in self.chain.cams
+        )
+
+    def _cornered(self, cam: Part, maths: Maths, given: Given) -> tuple[Number, ...]:
+        return self.chain.corners(cam, maths, given.values)
+
+    def at(self, maths: Maths, given: Given, phi: Number) -> LinkagePose:
+        """Return the pose at crank angles, rad, of a design in floats; maths: of the angles."""
+        return self.pose(maths, given, self._at(given, phi))
+
+    def _at(self, given: Given, phi: Number) -> Node:
+        """Return the node at crank angles, rad, of a design in floats, with the cams' stretches there."""
+        if not self.chain.cams:
+            return Node(phi, {})
+        found = self.chain.switch(given.values, np.atleast_1d(np.asarray(phi, dtype=np.float64)))
+        return Node(phi, found if np.ndim(phi) else {name: float(each[0]) for name, each in found.items()})
+
+    @lazy
+    def oblique(self) -> tuple[str, ...]:
+        """The parts that have a transmission angle."""
+        return tuple(part.name for part in self.chain.parts if chain.has_transmission_angle(part))
+
+    def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
+        """Return the crank angle of each event, rad."""
+        found: dict[str, Number] = {}
+        for place in self.places:
+            if place.angle is not None:
+                found[place.value] = number(maths, given.values, place.angle)
+            elif place.hint in given.values:
+                here = given._replace(values={**given.values, **found})
+                rates = functools.partial(self._rates, maths, here, place)
+                found[place.value] = turning_points.followed(rates, given.values[place.hint])
+        found |= self._nearest(maths, given)
+        if OUTPUT_PLACES in called:
+            for place in self.places:
+                if place.value in found:
+                    found |= self._placed(maths, given._replace(values={**given.values, **found}), place)
+        return found
+
+    def _nearest(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return the crank angles, rad, at which a point without timing is nearest to the places of its path."""
+        path, found = self.path, dict[str, Number]()
+        for k, name in enumerate(path.times if path else ()):
+            if path and hint_of(name) in given.values:
+                place = maths.number(path.x[k]), maths.number(path.y[k])
+
+                def rates(
+                    phi: Number, place: tuple[Number, Number] = place, point: str = path.point
+                ) -> tuple[Number, Number, Number]:
+                    return nearest_rates(self.pose(maths, given, Node(phi, {})).joints.joints[point], place)
+
+                found[name] = turning_points.followed(rates, given.values[hint_of(name)])
+        return found
+
+    def _placed(self, maths: Maths, given: Given, place: Place) -> dict[str, Number]:
+        """Return where the output is at an event."""
+        pose = self.at_event(maths, given, place.name)
+        if self.output.measure != "angle":
+            return {output_value(place.name, "q"): pose.q}
+        seen = pose.direction
+        return {output_value(place.name, "x"): seen.x, output_value(place.name, "y"): seen.y}
+
+    def _rates(self, maths: Maths, given: Given, place: Place, phi: Number) -> tuple[Number, Number, Number]:
+        """Return what vanishes at an event, with its first two derivatives."""
+        pose = self.pose(maths, given, self._there(given, place.name, phi))
+        if place.travel is None:
+            return pose.q1, pose.q2, pose.q3
+        there = self.at_event(maths, given, place.beside)
+        short = number(maths, given.values, place.travel)
+        return pose.since(there) + short, pose.q1, pose.q2
+
+    def hints(self, given: Given, called: Collection[str]) -> dict[str, float]:
+        """Return where the events lie, rad, found by a scan of the whole turn. Raises UnfoundError."""
+        found = self._times(given)
+        if all(place.angle is not None for place in self.places) and not self.chain.cams:
+            return found
+        turns = self.turns(given)
+        angles: dict[str, float] = {}
+        for place in self.places:
+            if place.angle is not None:
+                angles[place.name] = float(number(FLOAT, given.values, place.angle))
+                continue
+            crossed = None if place.extreme else self._crossing(given, place, angles[place.beside])
+            angles[place.name] = found[place.hint] = chosen(turns, place).angle if crossed is None else crossed
+        high, low = extremes(self.places)
+        if high and low:
+            found[SWEPT] = 0.0 if angles[low] > angles[high] else TURN
+        if not self.chain.cams:
+            return found
+        beside = {name: self._at(given, angle).switch for name, angle in angles.items()}
+        return found | {f"{cam} at {name}": value for name, each in beside.items() for cam, value in each.items()}
+
+    def _times(self, given: Given) -> dict[str, float]:
+        """Return near which crank angles, rad, a point without timing is nearest to the places of its path."""
+        path = self.path
+        if path is None or path.phi:
+            return {}
+        angles: Floats = np.linspace(0.0, TURN, SCAN, endpoint=False)
+        x, y = (np.asarray(each)[:, None] for each in (path.x, path.y))
+        with np.errstate(all="ignore"):
+            at = self.at(systems.numpy(), given, angles).joints.joints[path.point].place
+            phi = angles[np.argmin((at.x - x) ** 2 + (at.y - y) ** 2, axis=1)]
+            for _ in range(NEWTONS):
+                joint = self.at(systems.numpy(), given, phi).joints.joints[path.point]
+                value, slope, _ = nearest_rates(joint, (x[:, 0], y[:, 0]))
+                phi = phi - np.clip(value / slope, -TURN / SCAN, TURN / SCAN)
+        return {hint_of(name): float(angle) for name, angle in zip(path.times, phi, strict=True)}
+
+    def turns(self, given: Given) -> tuple[Turn, ...]:
+        """Return where the output turns over the whole turn: between samples, then by Newton's method.
+
+        Raises UnfoundError where it has no real position somewhere.
+        """
+        angles = BESIDE + np.linspace(0.0, TURN, SCAN + 1)
+        with np.errstate(all="ignore"):
+            pose = self.at(systems.numpy(), given, angles)
+            slopes, bends = (np.broadcast_to(np.asarray(each, float), angles.shape) for each in (pose.q1, pose.q2))
+        if not np.all(np.isfinite(slopes)):
+            raise UnfoundError("", "the linkage does not assemble all round")
+        largest = float(np.max(np.abs(bends))) or 1.0
+        found = []
+        for k in np.flatnonzero((slopes[:-1] > 0) != (slopes[1:] > 0)):
+            ends = float(angles[k]), float(angles[k + 1])
+            angle = self._settled(given, ends, (float(slopes[k]), float(slopes[k + 1])))
+            here = self.at(FLOAT, given, angle)
+            extreme = "min" if slopes[k + 1] > slopes[k] else "max"
+            found.append(Turn(angle, extreme, float(here.q), abs(float(here.q2)) / largest))
+        return tuple(found)
+
+    def _settled(self, given: Given, ends: tuple[float, float], slopes: tuple[float, float]) -> float:
+        """Return where the output turns between two crank angles, rad, at which it has slopes of other signs."""
+        (low, high), (at_low, at_high) = ends, slopes
+        angle = low - at_low * (high - low) / (at_high - at_low)
+        for _ in range(NEWTONS):
+            pose = self.at(FLOAT, given, angle)
+            step = pose.q1 / pose.q2 if pose.q2 else math.inf
+            if not low <= angle - step <= high:
+                break
+            angle -= step
+            if abs(step) < 1e-15:
+                break
+        return angle
+
+    def _crossing(self, given: Given, place: Place, beside: float) -> float:
+        """Return where q is `travel` short of its value at another event, the nearest before or after that."""
+        there = self.at(FLOAT, given, beside)
+        assert place.travel is not None
+        level = float(number(FLOAT, given.values, place.travel))
+
+        def excess(turned: float) -> float:
+            pose = self.at(FLOAT, given, beside + place.side * turned)
+            return -(float(pose.since(there)) + level)
+
+        steps = np.linspace(0.0, TURN, SCAN + 1)
+        phi = beside + place.side * steps
+        with np.errstate(all="ignore"):
+            pose = self.at(systems.numpy(), given, phi)
+            travelled = np.asarray(pose.since(there), dtype=np.float64)
+        beyond = np.flatnonzero(-(travelled + level) > 0.0)
+        if not beyond.size or beyond[0] == 0:
+            problem = f"the output never travels as far as event {place.name} asks"
+            raise UnfoundError(place.name, problem)
+        k = int(beyond[0])
+        return beside + place.side * turning_points.crossing(excess, float(steps[k - 1]), float(steps[k]))
+
+    def pose(self, maths: Maths, given: Given, node: Node) -> LinkagePose:
+        """Return the pose at crank angles φ, rad."""
+        values, out = given.values, self.output
+        joints = self.chain.pose(maths, values, node.phi, node.switch)
+        factor = None if out.scale is None else number(maths, values, out.scale)
+        zero = None if out.zero is None else number(maths, values, out.zero)
+        return LinkagePose(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero)
+
+    def at_event(self, maths: Maths, given: Given, event: str) -> LinkagePose:
+        """Return the pose at an event."""
+        return self.pose(maths, given, self._there(given, event, given.values[event_value(event)]))
+
+    def _there(self, given: Given, event: str, phi: Number) -> Node:
+        """Return the node at or beside an event, with the cams' stretches there."""
+        cams = (cam_switch(cam) for cam in self.chain.cams)
+        return Node(phi, {cam: given.values[f"{cam} at {event}"] for cam in cams})
+
+    def events(self, maths: Maths, given: Given) -> dict[str, Number]:
+        """Return the crank angles of the events, rad."""
+        return {place.name: given.values[place.value] for place in self.places if place.value in given.values}
+
+
+SWEPT = "turn of sweep"
+"""The value that makes the crank angle from the first maximum to the first minimum one of a single turn, rad."""
+
+
+def chosen(turns: tuple[Turn, ...], place: Place) -> Turn:
+    """Return the turn of the output that an extreme means, its angle within half a turn of `near`. Raises."""
+    own = [turn for turn in turns if turn.extreme == place.extreme]
+    if not own:
+        raise UnfoundError(place.name, "the output never turns back")
+    if place.near is None:
+        sign = 1 if place.extreme == "max" else -1
+        found = max(own, key=lambda turn: sign * turn.q)
+        found = found._replace(angle=found.angle % TURN)
+    else:
+        near = place.near
+        found = min(own, key=lambda turn: abs(apart(turn.angle, near)))
+        found = found._replace(angle=near + apart(found.angle, near))
+    if found.bend < FLAT:
+        raise UnfoundError(place.name, f"at event {place.name} the output only touches a standstill")
+    return found
+
+
+def apart(angle: float, other: float) -> float:
+    """Return an angle from another, rad, within half a turn."""
+    return (angle - other + math.pi) % TURN - math.pi
+
+
+def extremes(places: tuple[Place, ...]) -> tuple[str, str]:
+    """Return the first event that is a maximum of q, and the first that is a minimum; "" without."""
+    return tuple(next((p.name for p in places if p.extreme == kind), "") for kind in ("max", "min"))  # type: ignore[return-value]
+
+
+def _span(group: str, name: str, m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+    return ASSEMBLY_MARGIN**2 * pose().joints.margins[group].spans[name]()
+
+
+def _obliquity(group: str, m: Maths, given: Given, phi: Number, pose: Callable[[], Any]) -> Number:
+    return pose().joints.obliquity(group)
+
+
+# Quantities and rows.
+
+
+def _at(at: Instant, event: str) -> LinkagePose:
+    """Return the pose at an event."""
+    linkage = at.model.kinematics
+    assert isinstance(linkage, Linkage)
+    return linkage.at_event(at.maths, at.given, event)
+
+
+def _swing(high: str, low: str, at: Instant) -> Number:
+    return _at(at, high).since(_at(at, low))
+
+
+def _sweep(high: str, low: str, at: Instant) -> Number:
+    return at.values[event_value(low)] - at.values[event_value(high)] + at.values[SWEPT]
+
+
+def _angle(event: str, at: Instant) -> Number:
+    return at.values[event_value(event)]
+
+
+def _force(at: Instant) -> Number:
+    return at.force
+
+
+class Reach(NamedTuple):
+    """How far a joint reaches along x or y; sign: +1 for the largest, −1 for the least coordinate."""
+
+    joint: str
+    axis: str
+    sign: int
+
+    @property
+    def name(self) -> str:
+        """The figure's name."""
+        return f"{self.axis}_{'max' if self.sign > 0 else 'min'}.{self.joint}"
+
+    def value(self, at: Instant) -> Number:
+        """Return the coordinate, m, or its opposite where the least counts."""
+        found = getattr(at.pose.joints.joints[self.joint].place, self.axis)
+        return found if self.sign > 0 else -found
+
+
+def _travelled(window: Window, at: Instant) -> Number:
+    return at.node.switch[window.switch] * at.pose.since(_at(at, window.level))
+
+
+PATH_SQUARE, PATH = "path_mean_square", "path_rms"
+
+
+def _square(a: Vector, x: Number, y: Number) -> Number:
+    return (a.x - x) ** 2 + (a.y - y) ** 2
+
+
+def _missed(path: Path, at: Instant) -> Number:
+    """Return the square of the distance of the point from where it should be at a place of the table, m²."""
+    place = at.node.switch["datum"]
+    x, y = (at.maths.choose(place, [at.maths.number(v) for v in values]) for values in (path.x, path.y))
+    return _square(at.pose.joints.joints[path.point].place, x, y)
+
+
+def _nearest(path: Path, at: Instant) -> Number:
+    """Return the mean square of the distances at crank angles of the design's own, m²."""
+    found = 0
+    for name, x, y in zip(path.times, path.x, path.y, strict=True):
+        pose = at.model.kinematics.pose(at.maths, at.given, Node(at.values[name], {}))
+        found = found + _square(pose.joints.joints[path.point].place, at.maths.number(x), at.maths.number(y))  # type: ignore[attr-defined]
+    return found / len(path.x)
+
+
+def _root(path: Path, at: Instant) -> Number:
+    return at.maths.sqrt(_nearest(path, at))
+
+
+MOTION = {
+    "peak_velocity": CycleQuantity(lambda at: at.pose.q1),
+    "peak_acceleration": CycleQuantity(lambda at: at.pose.q2),
+    "peak_jerk": CycleQuantity(lambda at: at.pose.q3),
+    "q": CycleQuantity(lambda at: at.pose.q, figure=False),
+}
+"""Quantities of the output, by q', q'', q'''."""
+TORQUE_SQUARE, RMS_TORQUE = "torque_mean_square", "rms_torque"
+
+
+@functools.lru_cache(maxsize=64)
+def model(
+    linkage: Linkage,
+    effects: tuple[Effect, ...],
+    words: tuple[tuple[str, str, str], ...],
+    known: frozenset[str],
+    reaches: tuple[Reach, ...] = (),
+    windows: tuple[Window, ...] = (),
+) -> JobModel:
+    """Return the linkage with effects; known: names of scene numbers that are given."""
+    quantities, rows, means = dict(MOTION), dict[str, DesignRow](), list[Integral]()
+    driven = drive.quantities(effects, known)
+    if driven:
+        quantities |= driven
+        quantities["torque_square"] = CycleQuantity(lambda at: at.crank_torque**2, figure=False)
+        parted = linkage.chain.cams or any(isinstance(effect, Load) and effect.corners for effect in effects)
+        means.append(Integral(TORQUE_SQUARE, RMS_TORQUE, "torque_square", parts=1 if parted else SMOOTH))
+    quantities |= {reach.name: CycleQuantity(reach.value, figure=False, signed=True) for reach in reaches}
+    for window in windows:
+        quantities[f"travel.{window.name}"] = CycleQuantity(functools.partial(_travelled, window))
+    for place in linkage.places:
+        rows[f"angle.{place.name}"] = DesignRow(functools.partial(_angle, place.name))
+        rows[f"force.{place.name}"] = DesignRow(_force, event=place.name)
+    high, low = extremes(linkage.places)
+    if high and low:
+        rows["swing"] = DesignRow(functools.partial(_swing, high, low))
+        rows["sweep"] = DesignRow(functools.partial(_sweep, high, low))
+    path = linkage.path
+    if path and path.phi:
+        quantities["path_square"] = CycleQuantity(functools.partial(_missed, path), figure=False)
+        places = tuple(map(float, range(len(path.phi))))
+        means.append(Integral(PATH_SQUARE, PATH, "path_square", angles=path.phi, data=places))
+    elif path:
+        rows[PATH_SQUARE] = DesignRow(functools.partial(_nearest, path))
+        rows[PATH] = DesignRow(functools.partial(_root, path))
+    arcs = tuple(window.arcs() for window in windows)
+    return JobModel(linkage, effects, words, quantities, rows, arcs, tuple(means), known=known)

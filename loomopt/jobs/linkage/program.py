@@ -1,0 +1,216 @@
+"""From a linkage scene and a target to the program: variables, limits, objectives and their natural sizes."""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+
+from loomopt.base.errors import refusal
+from loomopt.base.records import lazy
+from loomopt.jobs.base import Ends, Task, distinct, ends, size_read
+from loomopt.jobs.linkage import model as linkages
+from loomopt.jobs.linkage.model import (
+    OBLIQUITY,
+    PATH,
+    PATH_SQUARE,
+    RMS_TORQUE,
+    TORQUE_SQUARE,
+    Linkage,
+    Path,
+)
+from loomopt.jobs.linkage.scene import TargetTable, path, reaches, reading
+from loomopt.maths.systems import FLOAT
+from loomopt.model.axes import opposing, opposite
+from loomopt.model.limits import CycleLimit, DesignLimit, Limit
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import bounds, numbers, words
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value
+from loomopt.model.program import Move
+from loomopt.physics.cycle import Node
+from loomopt.scenes.scene import Scene
+
+
+def model(scene: Scene, target: str = "") -> JobModel:
+    """Return the linkage with the effects the scene calls for; target: whose path its point should follow."""
+    known = reading(scene.document)
+    pathed = path(scene, target)
+    linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
+    names = frozenset(numbers(scene))
+    return linkages.model(
+        linkage, scene.active, words(scene), names, reaches(scene.document, linkage.chain), known.windows
+    )
+
+
+def linkage_of(model: JobModel) -> Linkage:
+    """Return a model's linkage."""
+    assert isinstance(model.kinematics, Linkage)
+    return model.kinematics
+
+
+@final
+class LinkageTask(Task):
+    """The linkage with figures and numbers that are sought in the scene's own order."""
+
+    any_numbers = True
+
+    @lazy
+    def plain_model(self) -> JobModel:
+        """The linkage with the effects the scene calls for."""
+        return model(self.scene, self.target)
+
+    @lazy
+    def model(self) -> JobModel:
+        """The same with the opposites of numbers of which the most is sought."""
+        found = self.plain_model
+        for name, sense in self.levels:
+            full = self.scene.full(name)
+            if sense == "most" and not self._is_figure(name):
+                found = opposing(found, (full,))
+            elif sense == "most" and found.has_row(name):
+                found = opposing(found, (name,))
+        return found
+
+    @property
+    def table(self) -> TargetTable:
+        """The target's own table."""
+        found = self.scene.targets[self.target]
+        assert isinstance(found, TargetTable)
+        return found
+
+    @property
+    def levels(self) -> tuple[tuple[str, str], ...]:
+        """What the target seeks in order, each with its end; the default target's where there is no table."""
+        if not self.target:
+            return ()
+        return self.table.sought or ((("peak_torque", "least"),) if self.target == "torque" else ())
+
+    def _is_figure(self, name: str) -> bool:
+        return name in self.scene.schema.figures
+
+    # Variables.
+
+    @lazy
+    def limited(self) -> dict[str, Ends]:
+        """Lower and upper bound of every number; one that the target seeks is free between its bounds."""
+        sought = {self.scene.full(name): name for name, _ in self.levels if name in self.scene.bounds}
+        free = {full: (self.scene.bounds[name].min, self.scene.bounds[name].max) for full, name in sought.items()}
+        return bounds(self.scene, self.known) | free
+
+    @lazy
+    def length(self) -> float:
+        """The longest length that there is or may be, m."""
+        kinds = self.scene.schema.variables
+        lengths = [name for name, kind in kinds.items() if kind == "length"]
+        ends = [end for name in lengths for end in (self.known[name], *self.limited[name])]
+        return max(map(abs, ends), default=1.0) or 1.0
+
+    def scale(self, name: str, ends: Ends) -> float:
+        """Return the size of a variable: lengths the longest, angles 1 rad, others their own."""
+        kind = self.scene.schema.variables.get(name, "")
+        return {"length": self.length, "angle": 1.0}.get(kind) or super().scale(name, ends)
+
+    # Limits.
+
+    def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
+        """Return the limits on one figure."""
+        size = self.figure_size(name)
+        return [self._limit(name, sign, value, size) for sign, value in ends(low, high)]
+
+    def _limit(self, name: str, sign: int, value: float, size: float) -> Limit:
+        if name.startswith("mu."):
+            return CycleLimit(name, -1, f"{name[3:]}.{OBLIQUITY}", value, 1.0, complement=math.pi / 2)
+        if name == PATH and not self.model.has_quantity(name):
+            return DesignLimit(name, sign, PATH, value, size)
+        return self.row_limit(name, sign, name, value, size)
+
+    def demand_figures(self) -> None:
+        """Raise BadInput for a limit or a level on a figure that nothing in the scene gives."""
+        keys = {name: f"limits.{name}" for name in self.scene.limits}
+        keys |= {name: f"targets.{self.target}.{sense}" for name, sense in self.levels if self._is_figure(name)}
+        for name, key in keys.items():
+            if name.startswith("mu.") or self.model.has_row(name) or self.model.has_quantity(name):
+                continue
+            problem, remedy = f"nothing in the scene gives the figure {name}", "Add the effects it needs"
+            if name == "peak_power" and self.model.loads:
+                problem, remedy = "peak_power needs the speed", "Give operation.speed"
+            raise refusal(problem, self.scene.origin, key, remedy=f"{remedy}, or take it out")
+
+    def margins(self) -> list[Limit]:
+        """Return that every part closes over the whole turn; a limit on its transmission angle says so too."""
+        return [
+            CycleLimit(said, 1, prefix + row, 1.0, 1.0, relaxable=False)
+            for prefix, group in self.model.kinematics.groups.items()
+            if f"mu.{prefix[:-1]}" not in self.scene.limits
+            for said, row in group.closes.items()
+        ]
+
+    # Levels, starts and moves.
+
+    def objectives(self) -> tuple[Objective, ...]:
+        """Return the target's levels in order."""
+        return *(self.level(name, sense) for name, sense in self.levels), *self.least()
+
+    def held(self) -> tuple[Objective, ...]:
+        """Return the levels before the first that is traded: what the target demands before it weighs anything."""
+        before = itertools.takewhile(lambda level: level[0] not in self.traded, self.levels[:-1])
+        return tuple(self.level(name, sense) for name, sense in before)
+
+    def level(self, name: str, sense: str) -> Objective:
+        """Return one level."""
+        size = self.figure_size(name) if self._is_figure(name) else self.size(name)
+        if name.startswith("mu."):
+            return Peak(name, f"{name[3:]}.{OBLIQUITY}", 1.0)
+        if name == RMS_TORQUE:
+            return Value(name, TORQUE_SQUARE, size**2, power=2)
+        if name == PATH:
+            return Value(name, PATH_SQUARE, size**2, power=2)
+        if self.model.has_quantity(name):
+            return Peak(name, name, size)
+        row = name if self._is_figure(name) else self.scene.full(name)
+        if sense == "most":
+            return Value(name, opposite(row), size)
+        return Magnitude(name, row, size) if name.startswith("force.") else Value(name, row, size)
+
+    def starts(self) -> tuple[dict[str, float], ...]:
+        """Return today's linkage, and first one with half of each number of effects: none of it hides what it does."""
+        today = self.inside(self.known)
+        lengths = self.scene.schema.variables
+        half = {
+            v.name: (v.lower + v.upper) / 2
+            for v in self.variables
+            if v.name not in lengths and v.lower < v.upper and math.isfinite(v.upper - v.lower)
+        }
+        return distinct([today | half, today] if half else [today])
+
+    def moves(self) -> list[Move]:
+        """Return the common scale of the lengths, and numbers of checks."""
+        lengths = tuple(name for name, kind in self.scene.schema.variables.items() if kind == "length")
+        return [*([self.scale_move("scale", lengths)] if lengths else []), *self.axis_moves()]
+
+    # Natural sizes.
+
+    def figure_size(self, name: str) -> float:
+        """Return the natural size of a figure: today's; of a force at an event the largest term that it is made of."""
+        if name.startswith(("mu.", "angle.")):
+            return 1.0
+        if name.startswith("force."):
+            return self._force(name.removeprefix("force."))
+        if name == PATH:
+            return self._extent()
+        return size_read(self.sampler, name)
+
+    def _force(self, event: str) -> float:
+        """Return the largest term of the output at an event, N or N·m."""
+        phi = float(self.sampler.given.values[linkages.event_value(event)])
+        at = self.sampler.model.instant(FLOAT, self.sampler.given, Node(phi, self.sampler.stills.get(event, {})))
+        acts = {load.name: load.acts for load in self.sampler.model.loads}
+        terms = [abs(float(term)) for name, term in at.terms().items() if acts[name] == "output"]
+        return max(terms, default=0.0) or 1.0
+
+    def _extent(self) -> float:
+        """Return the size of the path, m."""
+        found = linkage_of(self.plain_model).path
+        assert isinstance(found, Path)
+        return float(max(np.ptp(found.x), np.ptp(found.y))) or self.length

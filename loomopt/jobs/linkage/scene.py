@@ -1,0 +1,632 @@
+"""What a linkage scene may hold: it follows from its own parts, output, events, windows and targets."""
+
+import functools
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import Field, create_model
+
+from loomopt.base.errors import Faults, misread, refusal, unknown
+from loomopt.base.quantities import Angle, PositiveLength, PositiveNumber, Speed, read
+from loomopt.base.units import QuantityError, ShowValue, usual
+from loomopt.jobs.linkage import parts
+from loomopt.jobs.linkage.model import (
+    OBLIQUITY,
+    PATH,
+    RMS_TORQUE,
+    SCAN,
+    TORQUE_SQUARE,
+    Linkage,
+    Output,
+    Path,
+    Place,
+    Reach,
+    Turn,
+    UnfoundError,
+    Window,
+    apart,
+    chosen,
+    extremes,
+)
+from loomopt.maths import systems
+from loomopt.model import drive
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import Node
+from loomopt.physics.effects import kinds
+from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms.chain import Chain
+from loomopt.physics.schema import Axis, Figure, Table, Target
+from loomopt.physics.schema import TargetTable as AnyTarget
+from loomopt.scenes import csv_tables
+from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import SceneSchema
+
+
+class Operation(Table):
+    """What the machine does."""
+
+    speed: Speed | None = Field(None, description="speed of the crank")
+
+
+class TargetTable(AnyTarget):
+    """A target of the scene's own: figures that are sought one after the other, or a path."""
+
+    least: tuple[str, ...] = Field((), description="figures or numbers of which the least is sought, in order")
+    most: tuple[str, ...] = Field((), description="figures or numbers of which the most is sought, after those")
+    point: str | None = Field(None, description="joint that should follow a path")
+    table: str | None = Field(
+        None, description="CSV file of the path: x [mm], y [mm], and phi [deg] where its timing is given"
+    )
+
+    @property
+    def sought(self) -> tuple[tuple[str, str], ...]:
+        """What is sought in order, each with its end."""
+        path = ((PATH, "least"),) if self.point else ()
+        return (*path, *((name, "least") for name in self.least), *((name, "most") for name in self.most))
+
+
+DEFAULT = {"torque": {"least": ["peak_torque"]}}
+"""The target of a scene that has none of its own."""
+TABLES = {
+    "parts": "the parts of the linkage by name: pivot, crank, dyad, slider, slot, point, gear or cam",
+    "output": "what of the linkage is its output: angle, slide, x or y of a link, part or joint",
+    "events": "named crank angles: extremes of the output, travels from them, or angles",
+    "windows": "stretches of crank angles after an event",
+}
+OWN = ("mechanism", *TABLES)
+REACHES = ("x_max", "x_min", "y_max", "y_min")
+FEWEST = 2
+"""Points of a path."""
+SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
+
+
+class Reading(NamedTuple):
+    """What the scene's own tables say; numbers: name → kind of quantity and words, in the scene's order."""
+
+    linkage: Linkage
+    numbers: Mapping[str, tuple[Any, str]]
+    windows: tuple[Window, ...] = ()
+
+
+Used = dict[str, tuple[Any, str]]
+Names = Mapping[str, Any]
+Known = Mapping[str, Place]
+
+
+def _given(raw: object, path: str) -> Mapping[str, Any]:
+    if not isinstance(raw, Mapping):
+        raise refusal("it is not a table", "", path, raw, remedy=f"Write a table [{path}]")
+    return raw
+
+
+def _known_keys(table: Mapping[str, Any], known: Sequence[str], path: str) -> None:
+    for each in table:
+        if each not in known:
+            raise unknown("key", each, known, "", f"{path}.{each}")
+
+
+def _output(raw: Mapping[str, Any], linked: Chain, names: Mapping[str, Any], used: Used) -> Output:
+    joints, links, slides = parts.kinds_of(linked)
+    forms = {
+        "angle": (links, "link"),
+        "slide": (slides, "slider or slot"),
+        "x": (joints, "joint"),
+        "y": (joints, "joint"),
+    }
+    _known_keys(raw, (*forms, "against", "sense", "scale", "zero"), "output")
+    own = [form for form in forms if form in raw]
+    if len(own) != 1:
+        problem = f"the output is one of {', '.join(forms)}: {'none' if not own else ' and '.join(own)} is given"
+        raise refusal(problem, "", "output", remedy='Such as angle = "rocker", slide = "ram" or y = "P"')
+    form = own[0]
+    name = _word(raw, form, forms[form][0], forms[form][1], "output")
+    angular = [key for key in ("against", "zero") if key in raw and form != "angle"]
+    if angular:
+        raise refusal(f"{angular[0]} is for an angle alone", "", f"output.{angular[0]}", remedy="Take it out")
+    against = _word(raw, "against", links, "link", "output") if "against" in raw else ""
+    sense = raw.get("sense", "forward")
+    if sense not in SENSES:
+        raise unknown("sense", str(sense), SENSES, "", "output.sense")
+    scale, slides_now = None, form != "angle"
+    if "scale" in raw:
+        kind, slides_now = _scale(raw["scale"], form, names)
+        scale = parts.reference(raw["scale"], "output.scale", kind, names)
+        parts.use(used, scale, kind, "what the output is multiplied by", "output.scale")
+    zero = None
+    if "zero" in raw:
+        zero = parts.reference(raw["zero"], "output.zero", Angle, names)
+        parts.use(used, zero, Angle, "direction from which the output counts", "output.zero")
+    return Output(form, name, against, SENSES[sense], scale, zero, slides_now)
+
+
+def _word(raw: Mapping[str, Any], key: str, known: Iterable[str], what: str, path: str) -> str:
+    if raw[key] not in (names := sorted(known)):
+        raise unknown(what, str(raw[key]), names, "", f"{path}.{key}")
+    return str(raw[key])
+
+
+def _scale(raw: object, form: str, names: Mapping[str, Any]) -> tuple[Any, bool]:
+    """Return the kind of an output's scale, and whether the output then slides: an angle times a length is one."""
+    text = names.get(raw, raw) if isinstance(raw, str) else raw
+    if form != "angle":
+        return PositiveNumber, True
+    try:
+        read(str(text), "length")
+    except QuantityError:
+        return PositiveNumber, False
+    return PositiveLength, True
+
+
+EVENT_KEYS = {"extreme": ("extreme", "near"), "travel": ("travel", "before", "after"), "angle": ("angle",)}
+
+
+def _places(raw: Mapping[str, Any], names: Mapping[str, Any], output: Output, used: Used) -> tuple[Place, ...]:
+    found: dict[str, Place] = {}
+    for name, table in raw.items():
+        key = f"events.{name}"
+        table = _given(table, key)
+        parts.check_name(name, key)
+        own = [kind for kind in EVENT_KEYS if kind in table]
+        if len(own) != 1:
+            problem = "an event is one of an extreme, a travel from another event, and an angle"
+            raise refusal(problem, "", key, remedy='Such as { extreme = "max", near = "60 deg" }')
+        _known_keys(table, EVENT_KEYS[own[0]], key)
+        found[name] = {"extreme": _extreme, "travel": _travel, "angle": _angle}[own[0]](
+            name, table, names, output, found, used
+        )
+    return tuple(found.values())
+
+
+def _extreme(name: str, table: Mapping[str, Any], names: Names, output: Output, known: Known, used: Used) -> Place:
+    if table["extreme"] not in ("max", "min"):
+        raise unknown("extreme", str(table["extreme"]), ("max", "min"), "", f"events.{name}.extreme")
+    near = table.get("near")
+    try:
+        return Place(name, table["extreme"], None if near is None else read(str(near), "angle"))
+    except QuantityError as error:
+        raise misread(error, "", f"events.{name}.near", near) from None
+
+
+def _travel(
+    name: str,
+    table: Mapping[str, Any],
+    names: Names,
+    output: Output,
+    known: Known,
+    used: Used,
+) -> Place:
+    key = f"events.{name}"
+    sides = [side for side in ("before", "after") if side in table]
+    if len(sides) != 1:
+        raise refusal("a travel lies before or after another event", "", key, remedy='Such as before = "bottom"')
+    beside = _word(table, sides[0], known, "event above it", key)
+    if known[beside].extreme != "max":
+        problem = f"a travel is short of a maximum of the output, and {beside} is none"
+        raise refusal(problem, "", f"{key}.{sides[0]}", remedy="Name an event with extreme = max")
+    kind = PositiveLength if output.slides else parts.PositiveAngle
+    ref = parts.reference(table["travel"], f"{key}.travel", kind, names)
+    parts.use(used, ref, kind, f"travel between {name} and {beside}", f"{key}.travel")
+    return Place(name, travel=ref, beside=beside, side=-1 if sides[0] == "before" else 1)
+
+
+def _angle(name: str, table: Mapping[str, Any], names: Names, output: Output, known: Known, used: Used) -> Place:
+    ref = parts.reference(table["angle"], f"events.{name}.angle", Angle, names)
+    parts.use(used, ref, Angle, f"crank angle of {name}", f"events.{name}.angle")
+    return Place(name, angle=ref)
+
+
+def _windows(
+    raw: Mapping[str, Any], names: Mapping[str, Any], places: Sequence[Place], used: Used
+) -> tuple[Window, ...]:
+    known, found = [place.name for place in places], []
+    for name, table in raw.items():
+        key = f"windows.{name}"
+        table = _given(table, key)
+        parts.check_name(name, key)
+        keys = ("after", "begins", "ends", "level")
+        _known_keys(table, keys, key)
+        for each in keys:
+            if each not in table:
+                raise refusal(f"a window needs {each}", "", f"{key}.{each}", remedy="Give it")
+        after, level = (_word(table, each, known, "event", key) for each in ("after", "level"))
+        begins, ends = (parts.reference(table[each], f"{key}.{each}", Angle, names) for each in ("begins", "ends"))
+        for ref, each in ((begins, "begins"), (ends, "ends")):
+            parts.use(used, ref, Angle, f"crank angle from {after} where window {name} {each}", f"{key}.{each}")
+        found.append(Window(name, after, begins, ends, level))
+    return tuple(found)
+
+
+@functools.lru_cache(maxsize=64)
+def _read(text: str) -> Reading:
+    raw = json.loads(text)
+    names = _given(raw.get("mechanism", {}), "mechanism")
+    linked, used = parts.linked(_given(raw["parts"], "parts"), names)
+    output = _output(_given(raw["output"], "output"), linked, names, used)
+    places = _places(_given(raw["events"], "events"), names, output, used)
+    windows = _windows(_given(raw["windows"], "windows"), names, places, used)
+    for name in names:
+        parts.check_name(name, f"mechanism.{name}")
+        if name not in used:
+            raise refusal(f"nothing uses the number {name}", "", f"mechanism.{name}", remedy="Use it, or take it out")
+    return Reading(Linkage(linked, output, places), {name: used[name] for name in names}, windows)
+
+
+def reading(document: Mapping[str, Any]) -> Reading:
+    """Return what a scene's own tables say. Raises BadInput."""
+    return _read(json.dumps({name: document.get(name, {}) for name in OWN}, default=str))
+
+
+# Figures, targets and axes.
+
+
+def reaches(document: Mapping[str, Any], linked: Chain) -> tuple[Reach, ...]:
+    """Return the reaches of joints that limits or targets speak of."""
+    limits = document.get("limits", {})
+    named = list(limits) if isinstance(limits, Mapping) else []
+    for name in REACHES:
+        own = limits.get(name) if isinstance(limits, Mapping) else None
+        named += [f"{name}.{joint}" for joint in own] if isinstance(own, Mapping) else []
+    named += _sought(document, "least", "most")
+    joints = parts.kinds_of(linked)[0]
+    possible = {
+        reach.name: reach
+        for joint in joints
+        for reach in (Reach(joint, name[0], 1 if name.endswith("max") else -1) for name in REACHES)
+    }
+    return tuple(possible[name] for name in dict.fromkeys(named) if name in possible)
+
+
+def figures(known: Reading, document: Mapping[str, Any]) -> dict[str, Figure]:
+    """Return the figures of a linkage."""
+    linkage, slides = known.linkage, known.linkage.output.slides
+    travel, load = ("length", "force") if slides else ("angle", "torque")
+    rates = ("travel velocity", "travel acceleration", "travel jerk") if slides else ("number",) * 3
+    found = [*drive.FIGURES, Figure(RMS_TORQUE, "torque", "rms crank torque over the cycle", sides=("max",))]
+    for place in linkage.places:
+        found.append(Figure(f"force.{place.name}", load, f"{load} at the output at {place.name}"))
+        found.append(Figure(f"angle.{place.name}", "angle", f"crank angle of {place.name}"))
+    high, low = extremes(linkage.places)
+    if high and low:
+        found.append(Figure("swing", travel, f"{'stroke' if slides else 'swing'} of the output, {low} to {high}"))
+        found.append(Figure("sweep", "angle", f"crank angle from {high} to {low}"))
+    for name, kind, text in zip(("velocity", "acceleration", "jerk"), rates, ("q'", "q''", "q'''"), strict=True):
+        found.append(Figure(f"peak_{name}", kind, f"peak |{text}| of the output", sides=("max",)))
+    found += [Figure(f"mu.{n}", "angle", f"least transmission angle of {n}", ("min",)) for n in linkage.oblique]
+    for window in known.windows:
+        text = f"largest travel from {window.level} over window {window.name}"
+        found.append(Figure(f"travel.{window.name}", travel, text, sides=("max",)))
+    for reach in reaches(document, linkage.chain):
+        side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
+        found.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
+    if _pathed(document):
+        found.append(Figure(PATH, "length", "rms distance of the point from its path", sides=("max",)))
+    return {figure.name: figure for figure in found}
+
+
+def _pathed(document: Mapping[str, Any]) -> bool:
+    targets = document.get("targets", {})
+    return isinstance(targets, Mapping) and any(
+        isinstance(own, Mapping) and own.get("point") is not None for own in targets.values()
+    )
+
+
+def axes(known: Reading, document: Mapping[str, Any]) -> dict[str, Axis]:
+    """Return the axes that are read otherwise than under their own name."""
+    load = "force" if known.linkage.output.slides else "torque"
+    found = [
+        Axis(RMS_TORQUE, "torque", (TORQUE_SQUARE,), senses=("least",), power=2),
+        *(
+            Axis(f"mu.{part}", "angle", (f"{part}.{OBLIQUITY}",), "peak", ("most",), -1, math.pi / 2)
+            for part in known.linkage.oblique
+        ),
+        *(
+            Axis(reach.name, "length", (), "peak", ("least",) if reach.sign > 0 else ("most",), reach.sign)
+            for reach in reaches(document, known.linkage.chain)
+        ),
+        *(Axis(f"force.{place.name}", load, form="magnitude", senses=("least",)) for place in known.linkage.places),
+    ]
+    if _pathed(document):
+        found.append(Axis(PATH, "length", ("path_mean_square",), senses=("least",), power=2))
+    # A number of which a target seeks the most is worth its most where it is traded, too.
+    most = dict.fromkeys(name for name in _sought(document, "most") if name in known.numbers)
+    found += [Axis(name, _kind(known, name), senses=("most", "least")) for name in most]
+    return {axis.name: axis for axis in found}
+
+
+def _kind(known: Reading, name: str) -> str:
+    """Return the kind of quantity of a number."""
+    return str(known.numbers[name][0].__metadata__[0].kind)
+
+
+def _sought(document: Mapping[str, Any], *ends: str) -> Iterator[str]:
+    """Yield the figures and numbers of which targets seek the least, or the most."""
+    targets = document.get("targets", {})
+    for own in targets.values() if isinstance(targets, Mapping) else ():
+        for end in ends:
+            each = own.get(end, []) if isinstance(own, Mapping) else []
+            yield from (name for name in each if isinstance(name, str)) if isinstance(each, list | tuple) else ()
+
+
+def targets(document: Mapping[str, Any]) -> dict[str, Target]:
+    """Return the scene's own targets, in its order."""
+    raw, found = _given(document.get("targets", {}), "targets") or DEFAULT, {}
+    for name, own in raw.items():
+        own, said = _given(own, f"targets.{name}"), []
+        if own.get("point") is not None:
+            said.append(f"{own['point']} on its path")
+        for key in ("least", "most"):
+            each = own.get(key, ())
+            said += [f"{key} {figure}" for figure in each] if isinstance(each, list | tuple) else []
+        found[name] = Target(name, ", then ".join(said) or "nothing", TargetTable)
+    return found
+
+
+# The scene as a whole.
+
+EMPTY: Mapping[str, Any] = {
+    "parts": {"A": {"kind": "pivot"}, "crank": {"kind": "crank", "at": "A"}},
+    "output": {"angle": "crank"},
+}
+"""The tables of a scene that has none."""
+
+
+def schema(document: Mapping[str, Any]) -> SceneSchema:
+    """Return what a scene may hold, by its own tables. Raises BadInput."""
+    tables = {name: document.get(name, {}) for name in (*OWN, "limits", "targets")}
+    if "parts" not in document:
+        tables |= {**{name: {} for name in OWN}, **EMPTY}
+    return _schema(json.dumps(tables, default=str))
+
+
+@functools.lru_cache(maxsize=64)
+def _schema(text: str) -> SceneSchema:
+    document = json.loads(text)
+    known = reading(document)
+    fields = {name: (kind, Field(description=said)) for name, (kind, said) in known.numbers.items()}
+    mechanism = create_model("Mechanism", __base__=Table, __module__=__name__, **fields)  # type: ignore[call-overload]
+    own = targets(document)
+    effects = kinds.of("loomopt.physics.effects.linkage", "SLIDING" if known.linkage.output.slides else "EFFECT")
+    return SceneSchema(
+        name="linkage",
+        title="a planar linkage of one's own, described in the scene",
+        operation=Operation,
+        mechanism=mechanism,
+        effects={name: _fitted(effect, known.linkage) for name, effect in effects.items()},
+        variables={name: _kind(known, name) for name in known.numbers},
+        own_figures=figures(known, document),
+        targets=own,
+        default_target=next(iter(own)),
+        fault=functools.partial(fault, known.linkage),
+        own_margins={said: "number" for group in known.linkage.groups.values() for said in group.closes},
+        own_axes=axes(known, document),
+        tables=tuple(TABLES),
+    )
+
+
+def _fitted(effect: kinds.Effect, linkage: Linkage) -> kinds.Effect:
+    """Return an effect as the linkage has it."""
+    return effect.fitted(linkage.chain) if isinstance(effect, kinds.Check) and effect.fitted else effect
+
+
+def path(scene: Scene, target: str) -> Path | None:
+    """Return the path that a target asks for, else the first target that has one; None where none has. Raises."""
+    own = {name: table for name, table in scene.targets.items() if isinstance(table, TargetTable) and table.point}
+    name = target if target in own else next(iter(own), None)
+    if name is None:
+        return None
+    table, key = own[name], f"targets.{name}.table"
+    columns, given = {"x": "length", "y": "length"}, str(table.table)
+    timed = "phi" in csv_tables.columns(scene, given, key, csv_tables.header(columns))
+    columns = {"phi": "angle"} | columns if timed else columns
+    found, _ = csv_tables.read(scene, given, key, columns, fewest=FEWEST)
+    phi, x, y = found if timed else ((), *found)
+    return Path(str(table.point), phi, x, y)
+
+
+def _check_path(scene: Scene, known: Reading, name: str, table: TargetTable) -> None:
+    """Raise BadInput for a path without its point or its table; the table is read by what needs it."""
+    key = f"targets.{name}"
+    if table.point is None:
+        if table.table is not None:
+            problem = "a table is that of a point's path"
+            raise refusal(problem, scene.origin, f"{key}.point", remedy="Name the point")
+        return
+    joints = known.linkage.chain.joints
+    if table.point not in joints:
+        raise unknown("joint", table.point, joints, scene.origin, f"{key}.point")
+    if table.table is None:
+        columns = csv_tables.header({"phi": "angle", "x": "length", "y": "length"})
+        remedy = f'Write table = "path.csv"; the file has the columns {columns}'
+        raise refusal("a path needs a table", scene.origin, f"{key}.table", remedy=remedy)
+
+
+# What today's linkage must be, and what names must mean.
+
+JUMP, LEVEL = math.pi, 1e-3
+"""rad by which an output angle jumps between samples where it passes its cut; and share of the swing by which, where no
+`near` is given, one extreme must be beyond the others, so that a small change of the design cannot exchange them."""
+
+
+def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usual) -> str:
+    """Say at which crank angle a design does not close, or which of its events is not there; "" where it works."""
+    reason = chain.fault(linkage.chain, design, shown)
+    if reason:
+        return reason
+    try:
+        linkage.hints(Given(dict(design), {}), ())
+    except UnfoundError as error:
+        return error.problem
+    return ""
+
+
+def check(scene: Scene) -> None:
+    """Raise BadInput where today's linkage does not turn all round, or a name means nothing in it."""
+    known, faults = reading(scene.document), Faults()
+    for each in (_check_names, _check_effects, _check_targets, _check_windows):
+        with faults:
+            each(scene, known)
+    with faults:
+        parts.demand_used(known.linkage.chain, scene.document)
+    if faults.found:
+        raise faults.told().placed(scene.origin, scene.document)
+    reason = chain.fault(known.linkage.chain, scene.mechanism, scene.show)
+    if reason:
+        remedy = "Correct the dimensions: today's linkage must close at every crank angle"
+        raise refusal(f"today's linkage does not turn all round: {reason}", scene.origin, "mechanism", remedy=remedy)
+    _check_output(scene, known.linkage)
+    _check_events(scene, known.linkage)
+
+
+def _check_names(scene: Scene, known: Reading) -> None:
+    """Raise BadInput for a number that is called as something else is."""
+    taken = dict.fromkeys(scene.schema.figures, "a figure") | {"speed": "the crank's speed"}
+    taken |= dict.fromkeys(("omega", "omega_dot", "phi", "instance"), "a symbol of the equations")
+    taken |= {
+        kinds.label(effect, key): f"a number of effect {effect.name}"
+        for effect in scene.active
+        for key in effect.own.model_fields
+    }
+    for name in known.numbers:
+        parts.check_name(name, f"mechanism.{name}", taken)
+
+
+def _check_effects(scene: Scene, known: Reading) -> None:
+    """Raise BadInput for a link, joint or event that an effect names and the scene does not have."""
+    linked, events = known.linkage.chain, [place.name for place in known.linkage.places]
+    faults = Faults()
+    for effect, own in zip(scene.active, scene.effects.values(), strict=True):
+        path = ".".join(("effects", *effect.path))
+        bodies = {"mass": (*linked.links, *linked.joints), "load": linked.joints}.get(effect.kind)
+        if bodies is not None and effect.instance not in bodies:
+            sort = "joint" if effect.kind == "load" else "link or joint"
+            faults.add(unknown(sort, effect.instance, bodies, scene.origin, path))
+        for key, value in own.model_dump().items():
+            if not isinstance(value, str) or key == "table":
+                continue
+            joined = effect.kind == "spring"
+            places = linked.joints if joined else events
+            if value not in places:
+                sort = "joint" if joined else "event"
+                faults.add(unknown(sort, value, places, scene.origin, f"{path}.{key}", "Add it, or correct the name"))
+        with faults:
+            _check_sense(effect, own.model_dump(), path, scene.origin)
+    faults.tell()
+
+
+def _check_sense(effect: kinds.Effect, own: Mapping[str, Any], path: str, origin: str) -> None:
+    """Raise BadInput for keys of a table that mean nothing together."""
+    given = {key for key, value in own.items() if value is not None}
+    if effect.kind == "load":
+        if given.isdisjoint(("x", "y", "table")) or ("table" in given and not given.isdisjoint(("x", "y", "begins"))):
+            remedy = "Give x and y, with begins and ends or without, or a table"
+            raise refusal("the load is one of constant components and a table", origin, path, remedy=remedy)
+        if len(given & {"begins", "ends"}) == 1:
+            raise refusal("a load begins at an event and ends at another", origin, path, remedy="Give both, or none")
+        if "at" in given and "table" not in given:
+            raise refusal("at is of a table", origin, f"{path}.at", remedy="Take it out")
+    if {"begins", "ends"} <= given and own["begins"] == own["ends"]:
+        raise refusal("it begins where it ends", origin, f"{path}.ends", own["ends"], remedy="Name another")
+
+
+def _check_targets(scene: Scene, known: Reading) -> None:
+    """Raise BadInput for what a target seeks and the scene does not have, or has no such end of."""
+    faults, axes_ = Faults(), scene.schema.axes
+    bounded = [name for name, bound in scene.bounds.items() if bound.min < bound.max]
+    for name, table in scene.targets.items():
+        if not isinstance(table, TargetTable):
+            continue
+        key = f"targets.{name}"
+        if name in scene.document.get("targets", {}) and not table.sought:
+            faults.add(refusal("the target seeks nothing", scene.origin, key, remedy='Such as least = ["peak_torque"]'))
+        for figure, sense in table.sought:
+            path_ = f"{key}.{'point' if figure == PATH else sense}"
+            axis = axes_.get(figure)
+            if figure not in (*axes_, *bounded):
+                faults.add(unknown("figure or bounded number", figure, [*axes_, *bounded], scene.origin, path_))
+            elif axis and sense not in axis.senses:
+                other = "least" if sense == "most" else "most"
+                problem = f"of {figure} the {other} can be sought, not the {sense}"
+                faults.add(refusal(problem, scene.origin, path_, remedy=f"Write {other}, or seek another figure"))
+        if len(dict.fromkeys(table.sought)) < len(table.sought):
+            faults.add(refusal("a figure is sought twice", scene.origin, key, remedy="Take one out"))
+        with faults:
+            _check_path(scene, known, name, table)
+    faults.tell()
+
+
+def _check_windows(scene: Scene, known: Reading) -> None:
+    """Raise BadInput for a window that ends before it begins, or is longer than a turn."""
+    for window in known.windows:
+        ends = [scene.mechanism[ref.name] if ref.name else ref.value for ref in (window.begins, window.ends)]
+        if not 0.0 < ends[1] - ends[0] < 2 * math.pi:
+            told = " to ".join(scene.show(end, "angle") for end in ends)
+            remedy = "Let it end after it begins, within a turn"
+            raise refusal(f"the window goes from {told}", scene.origin, f"windows.{window.name}.ends", remedy=remedy)
+
+
+def _check_output(scene: Scene, linkage: Linkage) -> None:
+    """Raise BadInput for an output that stands still, or an angle that jumps at its cut."""
+    phi = np.linspace(0.0, 2 * math.pi, SCAN + 1)
+    given = Given(dict(scene.mechanism), {})
+    node = Node(phi, linkage.chain.switch(scene.mechanism, phi))
+    q = np.broadcast_to(np.asarray(linkage.pose(systems.numpy(), given, node).order(0), dtype=np.float64), phi.shape)
+    form, name = linkage.output.measure, linkage.output.name
+    if np.ptp(q) == 0.0:
+        problem = f"the output {form} of {name} stands still"
+        raise refusal(problem, scene.origin, f"output.{form}", remedy="Name what moves")
+    jumps = np.abs(np.diff(q)) > JUMP * (1.0 if linkage.output.scale is None else 0.0)
+    if form != "angle" or not np.any(jumps):
+        return
+    at = scene.show(float(phi[int(np.argmax(jumps))]), "angle")
+    unwrapped = np.unwrap(q)
+    if abs(unwrapped[-1] - unwrapped[0]) > math.pi:
+        problem = f"the output turns all round: its angle jumps by a turn at crank angle {at}, and it never turns back"
+        raise refusal(problem, scene.origin, "output.angle", name, remedy='Name a link that swings, or add "against"')
+    middle = float(np.rint(np.degrees((unwrapped.max() + unwrapped.min()) / 2))) * (
+        1 if linkage.output.sign > 0 else -1
+    )
+    problem = f"the output angle of {name} jumps at +-180 deg, at crank angle {at}"
+    remedy = f'Count it from where it swings about: zero = "{middle % 360:g} deg" in [output]'
+    raise refusal(problem, scene.origin, "output.angle", name, remedy=remedy)
+
+
+def _check_events(scene: Scene, linkage: Linkage) -> None:
+    """Raise BadInput for an event that today's linkage does not have, or not where it is said to be."""
+    given = Given(dict(scene.mechanism), {})
+    if all(place.angle is not None for place in linkage.places):
+        return
+    try:
+        turns = linkage.turns(given)
+        for place in linkage.places:
+            if place.extreme:
+                _check_extreme(scene, turns, place)
+        linkage.hints(given, ())
+    except UnfoundError as error:
+        key = f"events.{error.event}" if error.event else "output"
+        remedy = "Name another event, or let the output be what swings" if error.event else "Correct the dimensions"
+        raise refusal(error.problem, scene.origin, key, remedy=remedy) from None
+
+
+def _check_extreme(scene: Scene, turns: Sequence[Turn], place: Place) -> None:
+    """Raise BadInput for an extreme that is another, or that a small change of the design would exchange."""
+    key, told = (
+        f"events.{place.name}",
+        ", ".join(f"{turn.extreme} at {scene.show(turn.angle % (2 * math.pi), 'angle', 4)}" for turn in turns),
+    )
+    found = chosen(tuple(turns), place)
+    own = [turn for turn in turns if turn.extreme == place.extreme]
+    if place.near is None:
+        swing = max(turn.q for turn in turns) - min(turn.q for turn in turns)
+        alike = [turn for turn in own if abs(turn.q - found.q) <= LEVEL * swing]
+        if len(alike) > 1:
+            problem = f"several extremes are as far out, so that {place.name} would jump between them: {told}"
+            raise refusal(problem, scene.origin, key, remedy='Say which: near = "60 deg"')
+        return
+    far = [abs(apart(turn.angle, place.near)) for turn in own]
+    other = [abs(apart(turn.angle, place.near)) for turn in turns if turn.extreme != place.extreme]
+    if min(other) < min(far):
+        problem = f"near {scene.show(place.near, 'angle')} the output has no {place.extreme}: {told}"
+        raise refusal(problem, scene.origin, f"{key}.near", remedy="Correct near, or name the other extreme")

@@ -1,0 +1,316 @@
+"""The linkage's own views; what draws and prints is imported when it is first asked for.
+
+In its equations each link's angle is a symbol of its own name, its derivatives with respect to φ have primes; a part
+that slides has the place along its guide under its own name.
+"""
+
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from loomopt.jobs import registry
+from loomopt.jobs.linkage.model import LinkagePose, Output, event_value
+from loomopt.jobs.linkage.program import linkage_of
+from loomopt.maths import systems
+from loomopt.maths.systems import FLOAT, Number
+from loomopt.model.model import JobModel
+from loomopt.model.numbers import told
+from loomopt.physics.balance import Given
+from loomopt.physics.cycle import TURN
+from loomopt.physics.effects.kinds import Effect
+from loomopt.physics.mechanisms import chain
+from loomopt.physics.mechanisms.assur_groups import Slide
+from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part
+from loomopt.physics.mechanisms.dyad import Vector
+from loomopt.physics.mechanisms.moving import Joint, Link, total
+from loomopt.physics.schema import Values
+from loomopt.picture import effect_equations
+from loomopt.picture.equations import Angle, Equation, Expression, Symbols, equation, loop, moving, symbol, sympy
+from loomopt.picture.job_views import JobViews, Marks, Span, sized, tells_forces
+from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from loomopt.picture.motion import MechanismMotion
+    from loomopt.picture.panels import Curve
+    from loomopt.picture.shapes import Drawing, Floats
+
+LITERAL, FINEST = 1e-14, 720
+"""Share to which a literal is told as a fraction, and parts of a half turn up to which it is one of pi."""
+
+
+@dataclass
+class _Written:
+    """Parts as symbols: what they close by, in order.
+
+    pose: joints and links whose angles are symbols; taken: names of numbers; angles: those that move, by name.
+    """
+
+    pose: chain.Pose
+    taken: Collection[str] = ()
+    angles: dict[str, Angle] = field(default_factory=dict)
+    found: list[Equation] = field(default_factory=list)
+
+    def angle(self, name: str) -> str:
+        """Return what the angle of a link, or the place of what slides, is called: a number may be called so too."""
+        return f"theta_{name}" if name in self.taken else name
+
+    def link(self, name: str, origin: Joint, angle: Angle) -> Link:
+        """Add a link with an angle."""
+        sp = sympy()
+        self.angles[name] = angle
+        rates = (None, angle.rate, angle.second, symbol(f"{angle.name}'''"))
+        unit = Vector(sp.cos(angle.symbol), sp.sin(angle.symbol))
+        link = Link(origin, lambda: unit, lambda order: rates[order] if rates[order] != 0 else None)
+        self.pose.links[name] = link
+        return link
+
+    def pin(self, part: Part, link: Link, key: str) -> None:
+        """Add the pin at the end of a link whose length is a number of the part."""
+        if part.word("pin"):
+            self.pose.joints[part.word("pin")] = link.point(self.pose.number(part, key))
+
+    def close(self, part: Part, sides: Iterable[tuple[Expression, Expression]], unknown: list[str]) -> None:
+        """Write a loop's closure with its derivatives."""
+        sp = sympy()
+        pairs = [(sp.sympify(left), sp.sympify(right)) for left, right in sides]
+        symbols = {free for pair in pairs for side in pair for free in side.free_symbols}
+        known = [each for name, each in self.angles.items() if name not in unknown and each.symbol in symbols]
+        self.found += loop(pairs, symbol("phi"), [self.angles[name] for name in unknown], known, f"{part.name}: ")
+
+
+def symbolic(linked: Chain, taken: Collection[str] = ()) -> _Written:
+    """Return the parts as symbols, and what they close by; taken: names of numbers, which no angle has."""
+    exact = replace(systems.sympy(), number=_exact)
+    written = _Written(chain.Pose(exact, Symbols(), symbol("phi")), taken)
+    for part in linked.parts:
+        WRITTEN.get(part.kind, _placed)(written, part)
+    return written
+
+
+def _exact(value: float) -> Expression:
+    """Return a literal as a person would write it: a fraction, or one of pi."""
+    sp = sympy()
+    turned = sp.nsimplify(value / math.pi, rational=True, tolerance=LITERAL)
+    return turned * sp.pi if turned.q <= FINEST else sp.nsimplify(value, rational=True, tolerance=LITERAL)
+
+
+def _placed(written: _Written, part: Part) -> None:
+    """Run the part's own formula."""
+    written.pose.place(part)
+
+
+def _crank(written: _Written, part: Part) -> None:
+    start = written.pose.number(part, "start")
+    turned = part.ratio * symbol("phi")
+    angle = Angle(written.angle(part.name), sympy().Integer(part.ratio), sympy().Integer(0))
+    link = written.link(part.name, written.pose.joints[part.word("at")], angle)
+    written.found.append(equation(f"{part.name}: crank", angle.symbol, total(turned, start)))
+    written.pin(part, link, "length")
+
+
+def _gear(written: _Written, part: Part) -> None:
+    sp, pose = sympy(), written.pose
+    mate, carrier = symbol(written.angle(part.word("with"))), part.word("carrier")
+    ratio, zero, start = sp.nsimplify(part.ratio), pose.number(part, "zero"), pose.number(part, "start")
+    right = ratio * (mate if zero is None else mate - zero)
+    if carrier and carrier != FRAME_NAME:
+        right += (1 - ratio) * symbol(written.angle(carrier))
+    link = written.link(part.name, pose.joints[part.word("at")], moving(written.angle(part.name)))
+    written.found.append(
+        equation(f"{part.name}: gear", symbol(written.angle(part.name)), right if start is None else right + start)
+    )
+    written.pin(part, link, "length")
+
+
+def _cam(written: _Written, part: Part) -> None:
+    pose, sp = written.pose, sympy()
+    lift, start = pose.number(part, "lift"), pose.number(part, "start")
+    risen = lift * sp.Function(f"s_{part.word('law')}")(symbol("phi"))
+    link = written.link(part.name, pose.joints[part.word("at")], moving(written.angle(part.name)))
+    written.found.append(
+        equation(f"{part.name}: cam", symbol(written.angle(part.name)), risen if start is None else risen + start)
+    )
+    written.pin(part, link, "length")
+
+
+def _dyad(written: _Written, part: Part) -> None:
+    pose, names = written.pose, part.names("links")
+    ends = [pose.joints[joint] for joint in part.names("joins")]
+    links = [written.link(name, end, moving(written.angle(name))) for name, end in zip(names, ends, strict=True)]
+    reached = [link.point(pose.number(part, name)).place for link, name in zip(links, names, strict=True)]
+    written.close(part, zip(*reached, strict=True), list(names))
+    written.pin(part, links[1], names[1])
+
+
+def _guide(written: _Written, part: Part) -> Vector:
+    """Return the direction of a slider's guide."""
+    sp, guide, tilt = sympy(), part.word("guide"), written.pose.number(part, "direction")
+    angle = sp.Integer(0) if tilt is None else tilt
+    if guide and guide != FRAME_NAME:
+        angle = angle + symbol(written.angle(guide))
+    return Vector(sp.cos(angle), sp.sin(angle))
+
+
+def _slider(written: _Written, part: Part) -> None:
+    pose, (name,) = written.pose, part.names("links")
+    link = written.link(name, pose.joints[part.word("from")], moving(written.angle(name)))
+    written.angles[part.name] = moving(written.angle(part.name))
+    at, d, s = pose.joints[part.word("through")].place, _guide(written, part), symbol(written.angle(part.name))
+    e = pose.number(part, "offset")
+    along = Vector(at.x + s * d.x, at.y + s * d.y)
+    reached = along if e is None else Vector(along.x - e * d.y, along.y + e * d.x)
+    tip = link.point(pose.number(part, name)).place
+    written.close(part, zip(tip, reached, strict=True), [name, part.name])
+    pose.slides[part.name] = Slide(lambda order: symbol(written.angle(part.name) + "'" * order))
+    written.pin(part, link, name)
+
+
+def _slot(written: _Written, part: Part) -> None:
+    pose, name = written.pose, part.word("link")
+    link = written.link(name, pose.joints[part.word("at")], moving(written.angle(name)))
+    written.angles[part.name] = moving(written.angle(part.name))
+    reached = link.point(symbol(written.angle(part.name)), pose.number(part, "offset")).place
+    through = pose.joints[part.word("through")].place
+    written.close(part, zip(reached, through, strict=True), [name, part.name])
+    pose.slides[part.name] = Slide(lambda order: symbol(written.angle(part.name) + "'" * order))
+    written.pin(part, link, "length")
+
+
+WRITTEN = {"crank": _crank, "gear": _gear, "cam": _cam, "dyad": _dyad, "slider": _slider, "slot": _slot}
+"""How each kind of part is written; the others by their own formula."""
+
+
+class SymbolicPose(LinkagePose):
+    """The linkage as symbols, its output q with primes."""
+
+    def order(self, order: int) -> Number:
+        """Return q, or a derivative of it."""
+        return symbol("q" + "'" * order)
+
+    def travelled(self, given: Values, event: str) -> Number:
+        """Return q less its value at an event."""
+        return symbol("q") - symbol(f"q_{event}")
+
+
+def _output(out: Output, written: _Written) -> Expression:
+    """Return what the output is."""
+    if out.measure in ("x", "y"):
+        found = getattr(written.pose.joints[out.name].place, out.measure)
+    else:
+        found = symbol(written.angle(out.name)) - (symbol(written.angle(out.against)) if out.against else 0)
+    if out.scale is not None:
+        found = (symbol(out.scale.name) if out.scale.name else _exact(out.scale.value)) * found
+    return found if out.sign > 0 else -found
+
+
+def equations(model: JobModel) -> tuple[Equation, ...]:
+    """Return the equations of a linkage scene: how its parts close, the output, each term, balance, crank torque.
+
+    An effect that is not in the scene leaves no symbol and no term; numbers of a named effect have its name as index.
+    """
+    linkage = linkage_of(model)
+    out, written = linkage.output, symbolic(linkage.chain, model.known)
+    at = SymbolicPose(written.pose, out, symbol("omega"))
+    own_symbols = {f"{each.name}.{key}": _own(each, key) for each in model.effects for key in each.own.model_fields}
+    numbers = Symbols({name: own for name, own in own_symbols.items() if name in model.known})
+    numbers |= {event_value(place.name): symbol(f"phi_{place.name}") for place in linkage.places}
+    known = Given(numbers, {each.name: _own_values(model, each) for each in model.effects})
+    letter = "F" if out.slides else "M"
+    found = (*written.found, equation("output", symbol("q"), _output(out, written)))
+    return (*found, *effect_equations.forces(model, at, known, "Q", letter))
+
+
+def _own(effect: Effect, key: str) -> Expression:
+    """Return the symbol of a number of an effect's table; of a named one with its name as index."""
+    letter = effect.letters.get(key, key)
+    return symbol(f"{letter}_{effect.instance}" if effect.instance else letter)
+
+
+def _own_values(model: JobModel, effect: Effect) -> Values:
+    """Return the symbols and words of an effect's table, of those keys that are given."""
+    given = {key: _own(effect, key) for key in effect.own.model_fields if f"{effect.name}.{key}" in model.known}
+    words = model.words_of(effect.name)
+    return {**given, **words, **({"instance": effect.instance} if effect.instance else {})}
+
+
+class LinkageViews(JobViews):
+    """The linkage at its events, its equations, and where its windows lie."""
+
+    def linkage(self, scene: Scene, design: Mapping[str, float]) -> "Drawing":
+        """Return the linkage at its events, full scale. Raises BadInput."""
+        from loomopt.jobs.linkage import drawing
+        from loomopt.picture.shapes import drawn_units
+
+        sampler = registry.of(scene).sampler(scene, design)
+        forces = sized(scene, drawing.forces(sampler)) if tells_forces(scene) else None
+        return drawing.linkage(sampler, scene.name, drawn_units(scene), forces)
+
+    def joints_csv(self, scene: Scene, design: Mapping[str, float]) -> str:
+        """Return its joints at its events as CSV. Raises BadInput."""
+        from loomopt.jobs.linkage import drawing
+        from loomopt.picture.shapes import drawn_units
+
+        return drawing.joints_csv(registry.of(scene).sampler(scene, design), drawn_units(scene))
+
+    def motion(self, scene: Scene, design: Mapping[str, float], angles: "Floats") -> "MechanismMotion":
+        """Return the linkage at crank angles, rad. Raises BadInput."""
+        from loomopt.jobs.linkage import drawing
+
+        return drawing.motion(registry.of(scene).sampler(scene, design), angles)
+
+    def equations(self, scene: Scene) -> tuple[Equation, ...]:
+        """Return the equations the scene really uses."""
+        return equations(registry.of(scene).model(scene))
+
+    def marks(self, scene: Scene, design: Mapping[str, float]) -> Marks:
+        """Return the crank angles of the events, rad, and where the windows lie."""
+        sampler = registry.of(scene).sampler(scene, design)
+        model, given = sampler.model, sampler.given
+        found: dict[str, float | Span] = {
+            name: float(angle) % TURN for name, angle in model.kinematics.events(FLOAT, given).items()
+        }
+        for arc in model.arcs:
+            begin, end = (float(angle) for angle in arc.corners(FLOAT, given))
+            found[arc.name.removeprefix("window ")] = Span(begin % TURN, begin % TURN + end - begin)
+        return found
+
+    def words(self) -> "Mapping[str, Curve]":
+        """Return what the curves are called."""
+        from loomopt.picture.panels import Curve
+
+        return {
+            "q": Curve("output"),
+            "q_1": Curve("velocity of the output", peak="peak_velocity"),
+            "q_2": Curve("acceleration of the output", peak="peak_acceleration"),
+            "q_3": Curve("jerk of the output", peak="peak_jerk"),
+            "Q": Curve("load of the output"),
+            "Md": Curve("crank torque", peak="peak_torque"),
+        }
+
+    def remarks(self, scene: Scene, design: Mapping[str, float]) -> tuple[str, ...]:
+        """Return what to know beside the numbers: curves, and events that stand elsewhere than today's."""
+        found = told(scene)
+        moved = self._moved(scene, design)
+        return (*found, moved) if moved else found
+
+    def _moved(self, scene: Scene, design: Mapping[str, float]) -> str:
+        """Say where a design turns more or less often than today's: its events may be others."""
+        job = registry.of(scene)
+        here, today = job.sampler(scene, design), job.sampler(scene, {})
+        linkage = linkage_of(here.model)
+        if not any(place.extreme for place in linkage.places):
+            return ""
+        turns, before = (len(linkage.turns(each.given)) for each in (here, today))
+        if turns == before:
+            return ""
+        where = ", ".join(
+            f"{place.name} at {scene.show(float(here.given.values[place.value]) % TURN, 'angle', 5)}"
+            for place in linkage.places
+        )
+        often = f"the output turns {turns} times in a turn of the crank, today's {before} times"
+        return f"{often}; its events stand at {where}"
+
+
+VIEWS = LinkageViews()
+"""The one object that draws and writes."""
