@@ -1,7 +1,7 @@
 """Solve a scene's target: search → tie-break → certificate → proof → an answer that explains itself."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from loomopt.jobs import registry
@@ -14,8 +14,7 @@ from loomopt.solving.answer import report
 from loomopt.solving.answer.solution import Clash, Solution, Words
 from loomopt.solving.nlp.ipopt import IterationCallback
 from loomopt.solving.nlp.point import Point, Settings
-from loomopt.solving.options import GlobalProof
-from loomopt.solving.search import multistart
+from loomopt.solving.search import multistart, tie_break
 from loomopt.solving.search.search import Clock, Search
 
 
@@ -27,9 +26,10 @@ def solve(
     starts: int | None = None,
     seed: int = 0,
     near: Sequence[Point] = (),
+    backed_off: Mapping[tuple[str, int], float] | None = None,
     wholly: bool = True,
     prove: bool = False,
-    global_proof: GlobalProof | None = None,
+    global_proof: options.GlobalProof | None = None,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     on_step: Callable[[str], None] | None = None,
@@ -39,17 +39,16 @@ def solve(
 
     accuracy: relative, of whole-cycle values; starts: how many, the job's own first, then random ones from `seed`;
     without it a search for the best basin, its designs drawn with `seed`; near: where neighbours' solves ended, the
-    best of which counts (one of another structure is left alone); wholly: whether what is added goes where it is worth
-    next to nothing and no share is asked for; prove: whether to prove every limit of the answer at every crank angle;
-    global_proof: to prove that no admissible design is better, and how closely; on_iteration(number) is called at each
-    iteration, on_start(number, how many) at each start, on_step(what) before each step that may take long;
-    session: what earlier solves left, the current one's without it. Raises BadInput for an unknown target or one
-    the scene cannot serve, KeyboardInterrupt on Ctrl-C.
+    best of which counts, if of this structure; backed_off: name and sign of limits → by how much they are tightened,
+    SI; wholly: whether what is added goes where it is worth next to nothing and no share is asked for; prove: whether
+    every limit of the answer is proven at every crank angle; global_proof: that no admissible design is better, and
+    how closely; on_iteration(number), on_start(number, how many), on_step(what): progress; session: what earlier
+    solves left, the current one's without it. Raises BadInput for a target that the scene cannot serve, and
+    KeyboardInterrupt on Ctrl-C.
     """
     with working(session) as own:
-        # How many positions a solve evaluates does not depend on the one before.
-        own.forget(SAMPLERS)
-        clock, job, target = Clock(), registry.of(scene), options.target_name(scene, target)
+        clock, target = Clock(), options.target_name(scene, target, families=not prove)
+        job = registry.of_target(scene, target)
         job.demand(scene, target)
         options.check(scene, accuracy, starts, seed, global_proof)
         callback = IterationCallback(on_iteration) if on_iteration else None
@@ -57,11 +56,12 @@ def solve(
         with clock.charged("import"):
             import casadi  # noqa: F401  # so that building is not charged with it
         with clock.charged("build"):
-            program = job.program(scene, target)
+            program = job.program(scene, target).backed_off(backed_off or {})
             if not wholly and program.added and program.added.wholly:
                 program = replace(program, added=None)
         today = {**job.values(program, job.today(scene)), **program.today}
-
+        # How many positions a solve evaluates does not depend on the one before.
+        own.forget(SAMPLERS, tie_break.JUDGED)
         begun = own.positions
         search = multistart.resolved(Search(job, program, settings, today), starts, seed, near, on_start)
         bound, sold = None, job.sizes(scene)
@@ -90,7 +90,7 @@ def solve(
 
             say = replace(settings, step=f"trying sizes of {name}").say
             again = functools.partial(solve, target=target, accuracy=accuracy, starts=starts or 1, seed=seed)
-            solved = functools.partial(again, on_start=on_start, on_step=say)
+            solved = functools.partial(again, on_start=on_start, on_step=say, backed_off=backed_off)
             answer = stock_sizes.fitted(scene, answer, name, sizes, solved)
         if prove and answer.certificate:
             from loomopt.solving.proof import whole_cycle

@@ -9,6 +9,7 @@ from loomopt.base.errors import BadInput, nearest, refusal, shown
 from loomopt.physics.effects.kinds import EVALUATED
 from loomopt.physics.tolerances import COARSEST, TIGHTEST
 from loomopt.scenes.scene import Scene
+from loomopt.scenes.tables import FAMILY
 
 MOST_STARTS = 10_000
 """Starts that may be asked for: hours; more is a slip of the pen."""
@@ -65,8 +66,11 @@ def check_global_proof(proof: GlobalProof | None) -> None:
         )
 
 
-def target_name(scene: Scene, target: str | None) -> str:
-    """Return the target's name; without one that of the answer that the scene is of, else the job's default."""
+def target_name(scene: Scene, target: str | None, families: bool = False) -> str:
+    """Return the target's name; without one that of the answer that the scene is of, else the job's default.
+
+    families: whether what is asked is answered for several machines at once. Raises BadInput.
+    """
     if target is not None:
         arguments.text(target, "target", ", ".join(scene.schema.targets), "Choose one of them")
     name = target or scene.call.target or scene.schema.default_target
@@ -78,9 +82,20 @@ def target_name(scene: Scene, target: str | None) -> str:
             key="target",
             value=name,
             allowed=", ".join(scene.schema.targets),
-            remedy=f'Perhaps "{near}" is meant' if near else "Choose one of them",
+            remedy=_remedy(name, near),
+        )
+    if name == FAMILY and not families:
+        remedy = "Choose the target of one member, with its numbers set"
+        raise refusal(
+            "a family is solved and swept, and no more is asked of it", scene.origin, "target", name, remedy=remedy
         )
     return name
+
+
+def _remedy(name: str, near: str) -> str:
+    if name == FAMILY:
+        return f"Add the table [targets.{FAMILY}] with members, or choose one of them"
+    return f'Perhaps "{near}" is meant' if near else "Choose one of them"
 
 
 def check_sought(scene: Scene, what: str = "solve") -> None:

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -58,8 +58,22 @@ def evaluated(scene: Scene, job: Job, target: str, design: Mapping[str, float]) 
 
 
 @working()
-def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float]) -> Evaluated:
-    """Return a design's figures and limits, each limit judged from the figures alone."""
+def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], every: bool = False) -> Evaluated:
+    """Return a design's figures and limits, each limit judged from the figures alone.
+
+    every: whether all extremes that are figures are looked for at once, as where all figures are read.
+    """
+    if job.members:
+        from loomopt.solving.answer import family
+
+        return family.evaluation(scene, job, program, design, evaluation)
+    sampler = job.sampler(scene, design)
+    # The certificate has just looked for most of what is told.
+    sampler.share()
+    told = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
+    told += [name for objective in program.objectives for name in objective.quantities]
+    told += job.peaks(sampler.model).values() if every else []
+    sampler.search(name for name in told if sampler.model.has_quantity(name))
     figures = job.figures(scene, design)
     words = Words(scene)
     labels = numbers.labels(scene)
@@ -71,9 +85,10 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         design=shown,
         figures=figures,
         units={name: words.si(name) for name in (*shown, *figures)},
-        limits=_findings(program, figures, named, job.sampler(scene, design)),
+        limits=_findings(program, figures, named, sampler),
         reached={goal.figure: goal.reached(figures) for goal in program.goals},
         scene=scene,
+        undefined=sampler.model.undefined,
     )
 
 
@@ -83,7 +98,9 @@ def _findings(
     """Return every limit beside its value, the tightest of each side; held to 1e-9 of its natural size."""
     sides: dict[tuple[str, bool], dict[int, float]] = {}
     sizes: dict[tuple[str, bool], float] = {}
-    values: dict[str, float | None] = {**design, **figures, **sampler.static}
+    peaks: dict[str, float] = {}
+    # Figures that no limit speaks of are left to whoever reads them.
+    known = (peaks, sampler.static, figures, design)
     for limit in program.limits:
         if limit.hidden:
             continue
@@ -91,8 +108,8 @@ def _findings(
             if not sampler.model.has_quantity(limit.row):
                 # A row of the program alone: what it limits is told by the figure that it is read for.
                 continue
-            values[limit.name] = limit.figure(sampler)
-        elif limit.name not in values:
+            peaks[limit.name] = limit.figure(sampler)
+        elif not any(limit.name in values for values in known):
             continue
         chosen = limit.name in design and limit.is_of_variable
         key = limit.name, chosen
@@ -103,7 +120,8 @@ def _findings(
         sizes[key] = max(sizes.get(key, 0.0), size)
     found = []
     for (name, chosen), ends in sides.items():
-        value, slack = (design if chosen else values)[name], FEASIBLE * sizes[name, chosen]
+        values = design if chosen else next(values for values in known if name in values)
+        value, slack = values[name], FEASIBLE * sizes[name, chosen]
         low, high = ends.get(-1), ends.get(1)
         ok = value is not None and (low is None or value >= low - slack) and (high is None or value <= high + slack)
         found.append(Finding(name, value if value is not None else float("nan"), low, high, ok))
@@ -291,7 +309,7 @@ def with_optimum(
     """
     binding = prices(Words(scene), certificate)
     passed = certificate.passed and here.admissible
-    headline = job.say(scene, target, here.figures)
+    headline = _headline(job, scene, target, here, {price.limit for price in binding})
     if passed:
         message = " ".join(part for part in (headline, stops(binding), _left_open(certificate), searched) if part)
     else:
@@ -302,11 +320,21 @@ def with_optimum(
         target=target,
         status="optimal" if passed else "uncertified",
         message=message,
+        explanation=headline if job.members else "",
         binding=binding,
         certificate=certificate,
         solver=solver,
         today=today,
     )
+
+
+def _headline(job: Job, scene: Scene, target: str, here: Evaluated, priced: Collection[str]) -> str:
+    """Return what an optimum is worth, in words; priced: names of the limits that bind."""
+    if not job.members:
+        return job.say(scene, target, here.figures)
+    from loomopt.solving.answer import family
+
+    return family.said(scene, job, here, priced)
 
 
 def _little(words: Words, beside: Beside, answer: Solution) -> str:
@@ -337,10 +365,7 @@ def _left_open(certificate: Certificate) -> str:
 
 def prices(words: Words, certificate: Certificate) -> tuple[Price, ...]:
     """Return one price per limit and side."""
-    groups: dict[tuple[str, int], list[Any]] = {}
-    for binding in certificate.binding:
-        groups.setdefault((binding.limit.name, binding.side), []).append(binding)
-    return tuple(words.price(group) for group in groups.values())
+    return tuple(map(words.price, certificate.priced))
 
 
 def stops(binding: tuple[Price, ...]) -> str:

@@ -3,18 +3,20 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
-from loomopt.base.quantities import quantity_of
+from loomopt.base.errors import refusal
+from loomopt.base.quantities import quantities_of, quantity_of
 from loomopt.base.records import Shown, freeze, lazy
 from loomopt.base.units import SI_UNIT, factor, show
 from loomopt.model.limits import CycleLimit, Limit
-from loomopt.model.program import shortfall
+from loomopt.model.program import Alias, shortfall
 from loomopt.physics.effects.kinds import label
 from loomopt.physics.tolerances import SHOWN_AS_ZERO
 from loomopt.scenes.document import copied
 from loomopt.scenes.scene import Scene
-from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound
+from loomopt.scenes.tables import FAMILY
+from loomopt.solving.certificate.verdict import Binding, Certificate, GlobalBound, worth_of
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,7 @@ class Finding:
     """One limit beside its figure, SI; min or max is None where the limit has no such side.
 
     rounding: of one that is exceeded, whether by less than the rounding of the digits in which the design was given.
+    backed_off: by how much a nominal design was asked to keep clear of it, SI.
     """
 
     name: str
@@ -111,15 +114,19 @@ class Finding:
     max: float | None
     ok: bool
     rounding: bool = False
+    backed_off: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as JSON data; what is not exceeded says nothing of rounding."""
-        return {name: value for name, value in vars(self).items() if value or name != "rounding"}
+        """Return it as JSON data; what is not exceeded says nothing of rounding, nor a limit as it stands of more."""
+        return {name: value for name, value in vars(self).items() if value or name not in ("rounding", "backed_off")}
 
 
 @dataclass(frozen=True)
 class Price:
-    """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI."""
+    """A limit that binds; worth: objective figure → its fall per unit the limit is loosened, SI.
+
+    backed_off: how far from its value it binds already, SI.
+    """
 
     limit: str
     side: str
@@ -129,6 +136,12 @@ class Price:
     unit: Mapping[str, str]
     reading: str
     """The worth in the designer's own units, as a phrase."""
+    backed_off: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON data; a limit that binds where it stands says no more."""
+        told = {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(self).items() if k != "reading"}
+        return {k: v for k, v in told.items() if v or k != "backed_off"}
 
 
 @dataclass(frozen=True)
@@ -197,14 +210,20 @@ class Evaluated:
     limits: tuple[Finding, ...]
     reached: Mapping[str, bool] = field(default_factory=dict, kw_only=True)
     """Of each figure of which the target asks what may be out of reach, whether the design reaches it."""
+    undefined: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    """Why figures of effects that are on have no value, each a sentence without its full stop."""
     scene: "Scene | None" = field(default=None, kw_only=True, repr=False, compare=False)
     """What it holds in: the scene as it was asked for, with all that was set, put on and taken off."""
     terms: Terms | None = field(default=None, kw_only=True, repr=False, compare=False)
     """What it is judged by; None for its target alone."""
+    members: tuple["Evaluated", ...] = field(default=(), kw_only=True, repr=False)
+    """Of a family each machine by itself."""
+    change: Mapping[str, Any] = field(default_factory=dict, kw_only=True, repr=False)
+    """Of a member of a family what it changes of the scene: dotted key → its value."""
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
-        freeze(self, "design", "figures", "units", "reached")
+        freeze(self, "design", "figures", "units", "reached", "undefined")
 
     @property
     def admissible(self) -> bool:
@@ -213,7 +232,7 @@ class Evaluated:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the object `evaluate --json` prints."""
-        return {
+        found = {
             "problem": self.problem,
             "effects": list(self.effects),
             "design": dict(self.design),
@@ -222,6 +241,27 @@ class Evaluated:
             "limits": [limit.as_dict() for limit in self.limits],
             "reached": dict(self.reached),
         }
+        found |= {"undefined": dict(self.undefined)} if self.undefined else {}
+        return found | ({"members": [_member_dict(member) for member in self.members]} if self.members else {})
+
+
+def changed(member: Evaluated) -> str:
+    """Return what a member of a family changes of the scene, in words: "M0 600 N*m"."""
+    return ", ".join(f"{key.split('.', 1)[-1]} {value}" for key, value in member.change.items())
+
+
+def demand_single(found: Evaluated, what: str) -> None:
+    """Raise BadInput for a family, of which each member has its own; what: is asked for."""
+    if found.members:
+        origin = found.scene.origin if found.scene else ""
+        remedy = "Take one member: answer.members[0], or its numbers set and its own target"
+        raise refusal(f"a family has no {what}: each of its members has", origin, "target", FAMILY, remedy=remedy)
+
+
+def _member_dict(member: Evaluated) -> dict[str, Any]:
+    """Return a member of a family as JSON data, with what it changes of the scene."""
+    told = {key: value for key, value in member.as_dict().items() if key not in ("problem", "effects", "units")}
+    return {"change": dict(member.change), **told}
 
 
 @dataclass(frozen=True)
@@ -250,6 +290,104 @@ class Beside:
         return told | {"design": other["design"], "figures": other["figures"]}
 
 
+class Yield(NamedTuple):
+    """The share of machines that hold, with its standard error."""
+
+    value: float
+    se: float
+
+
+@dataclass(frozen=True)
+class Robust:
+    """How limits were backed off, so that machines hold them as they are made.
+
+    sigmas: standard deviations of its own figure by which each keeps clear; asked: the yield that was asked for, if
+    any; linear: standard deviations that the joint normal distribution asks for then, from which sampling set out;
+    yields: share of machines that hold, by limit and of "all"; nominal, nominal_yields: the optimum without back-off,
+    and its machines; kept: equalities and goals, which nothing backs off; corners: figures that bend at the design, of
+    whose two slopes in each number the steeper was taken; passes: solves until standard deviations were those of the
+    design.
+    """
+
+    sigmas: float
+    asked: float | None
+    linear: float | None
+    yields: Mapping[str, Yield]
+    nominal: Evaluated
+    nominal_yields: Mapping[str, Yield]
+    kept: tuple[str, ...]
+    corners: tuple[str, ...]
+    passes: int
+    samples: int
+    seed: int
+
+    def cost(self, answer: "Solution") -> dict[str, float]:
+        """Return what each figure that is sought has risen by, SI."""
+        return risen(answer, self.nominal)
+
+    def as_dict(self, answer: "Solution") -> dict[str, Any]:
+        """Return it as JSON data."""
+        nominal = self.nominal.as_dict()
+        return {
+            "sigmas": self.sigmas,
+            "asked": self.asked,
+            "linear_sigmas": self.linear,
+            "cost": self.cost(answer),
+            "kept": list(self.kept),
+            "corners": list(self.corners),
+            "nominal": {
+                "design": nominal["design"],
+                "figures": nominal["figures"],
+                "yield": {name: each._asdict() for name, each in self.nominal_yields.items()},
+            },
+            "passes": self.passes,
+            "samples": self.samples,
+            "seed": self.seed,
+        }
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """How numbers were put to sizes that can be ordered.
+
+    sizes: least and largest of each number's sizes, SI, and how many; points: of the lattice; admissible: those that
+    keep every limit, reaching: those of them that reach the goals, where all were looked at; boxes: solves of a branch
+    and bound, 0 where all were; gap: what the boxes left open may still be better by, in natural sizes of the first
+    level that they differ in; nominal: the optimum without sizes; rests: what the claim that nothing on the lattice is
+    better rests on.
+    """
+
+    sizes: Mapping[str, tuple[float, float, int]]
+    points: int
+    admissible: int | None
+    reaching: int | None
+    boxes: int
+    gap: float
+    nominal: Evaluated
+    rests: str
+
+    def cost(self, answer: "Solution") -> dict[str, float]:
+        """Return what each figure that is sought has risen by, SI."""
+        return risen(answer, self.nominal)
+
+    def as_dict(self, answer: "Solution") -> dict[str, Any]:
+        """Return it as JSON data."""
+        nominal = self.nominal.as_dict()
+        sizes = {name: {"least": low, "most": high, "count": n} for name, (low, high, n) in self.sizes.items()}
+        told = {"sizes": sizes, "points": self.points, "admissible": self.admissible, "reaching": self.reaching}
+        told |= {"boxes": self.boxes, "gap": _finite(self.gap), "rests": self.rests, "cost": self.cost(answer)}
+        return told | {"nominal": {"design": nominal["design"], "figures": nominal["figures"]}}
+
+
+def risen(answer: "Solution", nominal: Evaluated) -> dict[str, float]:
+    """Return what each figure that an answer seeks has risen by beside another design's, SI."""
+    levels = answer.certificate.levels if answer.certificate else ()
+    pairs = {
+        each.objective: (answer.figures.get(each.objective), nominal.figures.get(each.objective)) for each in levels
+    }
+    return {name: now - then for name, (now, then) in pairs.items() if now is not None and then is not None}
+
+
 @dataclass(frozen=True)
 class Solution(Evaluated):
     """A solved target. `status` is ours, `solver["status"]` is IPOPT's own word."""
@@ -276,6 +414,10 @@ class Solution(Evaluated):
     """The target as the call named it; None where it is the default."""
     beside: Beside | None = None
     """The design with, or without, what makes little difference."""
+    robust: Robust | None = None
+    """How limits were backed off, where that was asked for."""
+    rounded: Rounded | None = None
+    """How numbers were put to sizes, where that was asked for."""
     today: Callable[[], Evaluated] | None = None
     """Evaluates today's machine."""
     point: Any = field(default=None, repr=False)
@@ -283,7 +425,7 @@ class Solution(Evaluated):
 
     def __post_init__(self) -> None:
         """Freeze what a frozen dataclass would leave open."""
-        freeze(self, "design", "figures", "units", "reached", "solver", "time")
+        freeze(self, "design", "figures", "units", "reached", "undefined", "solver", "time")
 
     @property
     def outcome(self) -> str:
@@ -315,10 +457,7 @@ class Solution(Evaluated):
             head["scene"] = _scene_dict(self.scene, self.asked)
         head["reached"] = base["reached"]
         tail: dict[str, Any] = {
-            "binding": [
-                {k: (dict(v) if isinstance(v, Mapping) else v) for k, v in vars(price).items() if k != "reading"}
-                for price in self.binding
-            ],
+            "binding": [price.as_dict() for price in self.binding],
             "certificate": certificate_dict(self.certificate) if self.certificate else None,
             "solver": dict(self.solver),
             "global": self.global_bound.as_dict() if self.global_bound else None,
@@ -326,6 +465,11 @@ class Solution(Evaluated):
         }
         if self.proofs:
             tail["proofs"] = self.proofs.as_dict()["proofs"]
+        if self.robust:
+            tail["yield"] = {name: each._asdict() for name, each in self.robust.yields.items()}
+            tail["robust"] = self.robust.as_dict(self)
+        if self.rounded:
+            tail["rounded"] = self.rounded.as_dict(self)
         if self.beside:
             tail["indifference"] = self.beside.as_dict(self)
         if self.relaxation:
@@ -401,16 +545,29 @@ class Words:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
 
+    @lazy
+    def aliases(self) -> Mapping[str, str]:
+        """What is one member's of a family, where the scene has one, and what a member calls it."""
+        if FAMILY not in self.scene.schema.targets:
+            return {}
+        from loomopt.scenes import family
+
+        return family.called(self.scene)
+
     def kind(self, name: str) -> str:
         """Return what kind of quantity a variable, figure or limit is."""
+        name = name.of if isinstance(name, Alias) else self.aliases.get(name, name)
         schema = self.scene.schema
         if name in schema.figures and name not in schema.variables:
             return schema.figures[name].kind
         for kinds in (schema.variables, schema.lists, schema.margins):
             if name in kinds:
                 return kinds[name]
-        places = [(model, key, key) for model in (schema.operation, schema.mechanism) for key in model.model_fields]
-        places += [(e.own, key, label(e, key)) for e in self.scene.active for key in e.own.model_fields]
+        for model in (schema.operation, schema.mechanism):
+            known = quantities_of(model)
+            if name in known:
+                return known[name].kind
+        places = [(e.own, key, label(e, key)) for e in self.scene.active for key in e.own.model_fields]
         found = next((quantity_of(model, key) for model, key, called in places if called == name), None)
         return found.kind if found else UNKNOWN
 
@@ -437,11 +594,11 @@ class Words:
             return limit.name
         return f"{limit.name} {SIGNS[limit.sign]} {self.shown(limit.name, limit.value)}"
 
-    def price(self, bindings: list[Binding]) -> Price:
+    def price(self, bindings: Sequence[Binding]) -> Price:
         """Return a limit's price: what all its rows together are worth."""
         first = bindings[0]
         limit, figure = first.limit, first.objective.figure
-        worth = sum(binding.worth for binding in bindings if binding.objective == first.objective)
+        worth = worth_of(bindings)
         figure_unit, limit_unit = self.unit(figure), self.unit(limit.name)
         amount = worth * factor(limit_unit) / factor(figure_unit)
         per = limit_unit if limit_unit != "1" else "unit"

@@ -6,21 +6,22 @@ figure that decides is too near its threshold for floats, all is judged again in
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from loomopt.base.errors import BadInput, blamed
+from loomopt.base.records import lazy
 from loomopt.model.program import Program
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.tolerances import DOUBT, FEASIBLE, FLAT, JET_ERROR, POSITIVE, STATIONARY
 from loomopt.solving.certificate import kkt, second_order
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
-from loomopt.solving.certificate.kkt import LevelMultipliers, System, active_set, priced
+from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, active_set, priced
 from loomopt.solving.certificate.second_order import Curvature, Local
 from loomopt.solving.certificate.taylor_bounds import between_points, cycle_rows, judged
-from loomopt.solving.certificate.verdict import Binding, Certificate, Level
+from loomopt.solving.certificate.verdict import Binding, Certificate, FrameRow, Level
 from loomopt.solving.nlp.point import Settings
 
 COMPLEMENTARY = 1e-8
@@ -60,34 +61,111 @@ def certify(program: Program, x: Mapping[str, float], accuracy: float, shown: in
     By jets; by 40 digits where floats leave a verdict in doubt. shown: of how many first levels it is known that none
     falls here to higher order, from the certificate of a program with those levels that holds nothing more than this.
     """
-    quick = certified(JetDerivatives, program, x, accuracy, shown)
-    if quick.clear:
+    return begun(program, x, accuracy, shown).whole
+
+
+def begun(program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0) -> "Draft":
+    """Return the certificate as far as the extremes tell; what lies between them is looked at when that is asked for.
+
+    Parameters as for `certify`.
+    """
+    quick = _begun(JetDerivatives, program, x, accuracy, shown)
+    if quick.judged.clear:
         return quick
     from loomopt.solving.certificate.derivatives_mp import MpmathDerivatives
 
-    return certified(MpmathDerivatives, program, x, accuracy, shown)
+    return _begun(MpmathDerivatives, program, x, accuracy, shown)
 
 
 def certified(
     derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float, shown: int = 0
 ) -> Certificate:
     """Return the certificate of variables x (SI) by one way to derivatives; shown: as in `certify`."""
-    settings = Settings(accuracy)
+    return _begun(derivatives, program, x, accuracy, shown).whole
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A certificate before and after the whole cycle is looked at; scan(): what that shows.
+
+    judged: as if nothing lay between the refined points; put(cycle): the certificate with what does.
+    """
+
+    judged: Certificate
+    put: Callable[[WholeCycle], Certificate]
+    scan: Callable[[], WholeCycle] | None = None
+
+    def settled(self, rules: tuple[str, ...]) -> "Draft":
+        """Return it with what chose among equally good designs."""
+        if not rules:
+            return self
+        put = self.put
+        return Draft(replace(self.judged, settled=rules), lambda cycle: replace(put(cycle), settled=rules), self.scan)
+
+    @lazy
+    def whole(self) -> Certificate:
+        """The certificate."""
+        if self.scan is None:
+            return self.judged
+        try:
+            return self.put(self.scan())
+        except NUMBERLESS as error:
+            return _no_number(error, self.judged.by, self.judged.clear)
+
+
+def _begun(
+    derivatives: type[Derivatives], program: Program, x: Mapping[str, float], accuracy: float, shown: int
+) -> Draft:
+    """Return the certificate of variables x (SI) by one way to derivatives, its whole cycle still to be looked at."""
     try:
-        sampler = sampled(program.model, {**program.parameters, **x}, settings.sampled)
-        rows = cycle_rows(program)
-        sampler.search(name for name, _, _ in rows)
-        active = active_set(program, sampler)
+        sampler, active = prepared(program, x, accuracy)
         found = derivatives(program, x, sampler, active.rows)
-        local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
-        cycle = WholeCycle(between_points(sampler, rows, settings.checked), judged(sampler, rows, accuracy))
-        return _certificate(local, cycle, judged_levels(local), accuracy, _unserved(sampler))
-    except (ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError) as error:
-        told = blamed(error)
-        why = f": {told.problem}" if isinstance(told, BadInput) else f" ({type(error).__name__})"
-        reason = f"a value or a slope is no number here{why}"
-        by, clear = derivatives.by, derivatives.last
-        return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
+        return drafted(program, x, sampler, active, found, accuracy, shown)
+    except NUMBERLESS as error:
+        none = _no_number(error, derivatives.by, derivatives.last)
+        return Draft(none, lambda cycle: none)
+
+
+def _no_number(error: Exception, by: str, clear: bool) -> Certificate:
+    """Return the certificate of a design at which something has no value."""
+    told = blamed(error)
+    why = f": {told.problem}" if isinstance(told, BadInput) else f" ({type(error).__name__})"
+    reason = f"a value or a slope is no number here{why}"
+    return Certificate(False, (reason,), (), math.inf, math.inf, False, False, by=by, clear=clear)
+
+
+NUMBERLESS = ArithmeticError, TypeError, ValueError, np.linalg.LinAlgError
+"""What formulas raise where a design has no value."""
+
+
+def prepared(program: Program, x: Mapping[str, float], accuracy: float) -> tuple[Sampler, ActiveSet]:
+    """Return the sampler of variables x (SI), and their active set. Raises any of `NUMBERLESS`."""
+    sampler = sampled(program.model, {**program.parameters, **x}, Settings(accuracy).sampled)
+    sampler.search(name for name, _, _ in cycle_rows(program))
+    return sampler, active_set(program, sampler)
+
+
+def drafted(
+    program: Program,
+    x: Mapping[str, float],
+    sampler: Sampler,
+    active: ActiveSet,
+    found: Derivatives,
+    accuracy: float,
+    shown: int = 0,
+) -> Draft:
+    """Return the certificate of variables x (SI) by derivatives that are found. Raises any of `NUMBERLESS`."""
+    rows = cycle_rows(program)
+    local = Local(program, x, sampler, active, found, found.gradients(), shown=shown)
+    levels, unserved = judged_levels(local), _unserved(sampler)
+
+    def put(cycle: WholeCycle) -> Certificate:
+        return _certificate(local, cycle, levels, accuracy, unserved)
+
+    def scan() -> WholeCycle:
+        return WholeCycle(between_points(sampler, rows, Settings(accuracy).checked), judged(sampler, rows, accuracy))
+
+    return Draft(put(WholeCycle(0.0, "proven")), put, scan)
 
 
 def judged_levels(local: Local) -> list[JudgedLevel]:
@@ -206,7 +284,26 @@ def _certificate(
         correction=moved,
         step=float(np.abs(step).max(initial=0.0)),
         level=tuple(dict(zip(names, map(float, way), strict=True)) for way in level),
+        frame=tuple(map(_frame_row, _stopping(local, levels))),
     )
+
+
+def _stopping(local: Local, levels: Sequence[JudgedLevel]) -> list[ActiveRow]:
+    """Return the rows that stop a design; none where levels before the one that chooses do not vanish."""
+    active, last = local.active, len(levels) - 1
+    chooser = next((k for k, each in enumerate(levels) if each.curvature and each.curvature.settled), last)
+    if active.zero[chooser] or not all(active.zero[:chooser]):
+        return []
+    weights = levels[chooser].multipliers.of
+    vanishing = [active.levels[k][0] for k in range(chooser)]
+    pieces = [k for k in active.levels[chooser] if weights[k] > POSITIVE]
+    return [active.rows[k] for k in (*range(active.limits), *vanishing, *pieces)]
+
+
+def _frame_row(row: ActiveRow) -> FrameRow:
+    side = row.limit.sign if row.limit else 0
+    node = (row.node.piece, row.node.u, row.node.signed) if row.node else ()
+    return FrameRow(row.limit is None, row.place, row.reads, row.sign, side, *node)
 
 
 def _doubtful(local: Local, levels: Sequence[JudgedLevel]) -> bool:

@@ -80,8 +80,12 @@ class Boxes(Reading):
         return [{name: float(value) for name, value in switch.items()} for switch in pieces]
 
     def bound(self, name: str, sign: float, limit: float, where: Where | None = None) -> CycleBound:
-        """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`."""
-        cycle, used = self.cycle, 0
+        """Say whether sign · quantity ≤ limit (SI) all over the cycle, or over the pieces `where`.
+
+        What has a corner at 0, where no series is, is bounded by its square.
+        """
+        cycle, used, square = self.cycle, 0, self.model.square(name)
+        read, limit = (square, limit * abs(limit)) if square else (name, limit)
         for piece in map(int, np.flatnonzero(self.sampler.on(name, where))):
             tops = self._tops(name, sign, piece)
             boxes = [AngleBox(0.0, 1.0)]
@@ -89,7 +93,7 @@ class Boxes(Reading):
                 box = boxes.pop()
                 used += 1
                 at = box.nearest(tops)
-                holds, bend = judged_box(functools.partial(self._signed, name, sign, piece), limit, box, at)
+                holds, bend = judged_box(functools.partial(self._signed, read, sign, piece), limit, box, at)
                 if holds is False:
                     return CycleBound(
                         "violated", used, float(cycle.starts[piece] * (1 - at) + cycle.starts[piece + 1] * at)

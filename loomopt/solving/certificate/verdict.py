@@ -1,9 +1,9 @@
 """What a certificate says, and a proof of all designs: plain records."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from loomopt.model.limits import Limit
 from loomopt.model.objectives import Objective, Sought
@@ -35,6 +35,33 @@ class Binding:
     worth: float
 
 
+def worth_of(bindings: Sequence[Binding]) -> float:
+    """Return what all rows of a limit are worth together for the first objective that the first of them moves, SI."""
+    return sum(binding.worth for binding in bindings if binding.objective == bindings[0].objective)
+
+
+class FrameRow(NamedTuple):
+    """A row that stops an optimum, by what is the same of it at its neighbours.
+
+    level: whether it is a piece of an objective, else of a limit; place: of either in the program; side: the limit's
+    sign; piece, u: where it stands in the cycle, None of no node; signed: whether the quantity's value counts.
+    """
+
+    level: bool
+    place: int
+    reads: str
+    sign: float
+    side: int = 0
+    piece: int | None = None
+    u: float | None = None
+    signed: bool = False
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What must be the same of two optima for a way between them."""
+        return *self[:6], self.u if self.u in (0.0, 1.0) else None
+
+
 @dataclass(frozen=True)
 class Certificate:
     """What was verified of a design; reasons say why it did not pass."""
@@ -62,6 +89,9 @@ class Certificate:
     """Directions, in natural sizes and orthonormal, along which nothing curves at the last level that was judged."""
     change: Level | None = None
     """The residuals of least change from today, where that was a level of its own."""
+    frame: tuple[FrameRow, ...] = field(default=(), repr=False)
+    """What stops it: limits that are touched, objectives that vanish, the pieces that the level which chooses weighs;
+    nothing where levels before that one do not vanish, for then it hangs on how they curve."""
     open: tuple[str, ...] = ()
     """Variables, as a designer calls them, that are left as they came, though others are as good."""
 
@@ -69,6 +99,15 @@ class Certificate:
     def choices(self) -> tuple[str, ...]:
         """What chose among equally good designs, and what was left open."""
         return (*self.settled, *([f"open: {', '.join(self.open)}"] if self.open else []))
+
+    @property
+    def priced(self) -> tuple[tuple[Binding, ...], ...]:
+        """The limits that bind: all rows of each limit and side together."""
+        groups: dict[tuple[str, int], tuple[Binding, ...]] = {}
+        for binding in self.binding:
+            key = binding.limit.name, binding.side
+            groups[key] = (*groups.get(key, ()), binding)
+        return tuple(groups.values())
 
     @property
     def error(self) -> float:

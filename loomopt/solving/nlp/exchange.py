@@ -160,6 +160,9 @@ creep (tests/solving/search/test_infeasible.py)."""
 STANDS = 1e-7
 """Largest excess of a row at a point that the certificate should look at though IPOPT gave up: ACTIVE."""
 
+HINTED = 1e-8
+"""Change of a slope, as events are found anew, that counts as none: a hundredth of STATIONARY."""
+
 DRAWS = 200
 """Random starts drawn for each that is wanted: where fewer than one in 200 assembles, the ranges hold no machine."""
 
@@ -185,8 +188,8 @@ class _Place(NamedTuple):
 class _Round(NamedTuple):
     """What a round gave: IPOPT's answer, and where the next one begins.
 
-    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether the
-    switches at events are those that it was solved with; iterations: of all rounds so far.
+    reached: whether the answer is worth a certificate; violation: the largest excess of an extreme; steady: whether
+    events, and the switches there, are those that it was solved with; iterations: of all rounds so far.
     """
 
     after: _Place
@@ -214,10 +217,11 @@ def solve(
     if warm:
         within = {v.name: min(max(warm.x[v.name], v.lower), v.upper) for v in program.variables}
         warm = replace(warm, x=within)
-        followed = follow(calls, warm) if warm.reached else None
+        led = bool(warm.multipliers)
+        followed = follow(calls, warm) if warm.reached and led else None
         if followed:
             return followed
-        if warm.structure not in (None, program.structure):
+        if not led or warm.structure not in (None, program.structure):
             warm = None
     x = dict(warm.x if warm else start)
     sampler = calls.sampler(x)
@@ -273,14 +277,19 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         extra = calls.first_extra(nlp, here.sampler)
         answer = run(calls, nlp, here.sampler, here.x, extra, here.nodes, Multipliers())
         iterations += answer.iterations
-    if answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra):
-        return Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
+    beaten = answer.status in SUCCESS and calls.is_beaten(answer.value, answer.extra)
+    beaten_as = Point(answer.x, "Beaten", False, iterations, built=calls.built, value=answer.value)
+    if beaten and not here.sampler.hints:
+        return beaten_as
     sampler = calls.sampler(answer.x)
     if sampler is None:
-        return Point(answer.x, "Invalid_Number_Detected", False, iterations)
+        return beaten_as if beaten else Point(answer.x, "Invalid_Number_Detected", False, iterations)
     nodes, before = here.nodes, here.sampler.cycle
     if sampler.cycle.order != before.order:
         nodes = tuple(tuple(_carried(e, before, sampler) for e in of) for of in nodes)
+    hinted = not _moved(calls, nlp, answer, here, sampler, nodes)
+    if beaten and hinted:
+        return beaten_as
     peaks, violation = _frozen(calls.peaks(sampler)), 0.0
     if not calls.settings.uniform:
         violation = calls.violation(peaks, answer.extra)
@@ -290,8 +299,29 @@ def _round(calls: Calls, here: _Place, iterations: int) -> _Round | Point:
         )
     after = _Place(answer.x, sampler, peaks, nodes, answer.multipliers, answer.extra)
     reached = answer.status in SUCCESS or _stands(calls, nlp, after, answer.extra)
-    steady = sampler.stills == here.sampler.stills
+    steady = sampler.stills == here.sampler.stills and hinted
     return _Round(after, nlp, answer, reached, violation, steady, iterations)
+
+
+def _moved(
+    calls: Calls, nlp: Transcription, answer: IpoptAnswer, before: _Place, sampler: Sampler, nodes: NodeRows
+) -> bool:
+    """Say whether what IPOPT was given is another where events are found anew at the point that it reached.
+
+    An event that no formula gives is one step from its hint: right near it only. What no row reads changes none.
+    sampler: of the point; nodes: those it was solved at, in the point's own cycle.
+    """
+    hints = before.sampler.hints
+    if sampler.hints == hints:
+        return False
+    if tuple(sampler.hints) != tuple(hints) or sampler.corner_count != before.sampler.corner_count:
+        return True
+    then = calls.arguments(nlp, before.sampler, answer.x, answer.extra, before.nodes)
+    now = calls.arguments(nlp, sampler, answer.x, answer.extra, nodes)
+    rows, worth = ([read(then["x0"], each["p"]) for each in (then, now)] for read in (nlp.jacobian, nlp.gradient))
+    pairs = [*zip(*rows, strict=True), *zip(*worth, strict=True)]
+    most = (calls.settings.excess, HINTED, calls.settings.excess * max(calls.weights), HINTED)
+    return any(not np.abs(np.asarray(a - b)).max(initial=0.0) <= m for (a, b), m in zip(pairs, most, strict=True))
 
 
 def _compared(calls: Calls, begin: _Place, result: _Round | Point) -> _Round | Point:

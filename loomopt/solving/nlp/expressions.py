@@ -373,7 +373,7 @@ class _Built:
             stations = [self.structure.stations[place] for place in self.structure.held[k]]
             corners = [self.rows.corners[corner] for corner, _ in stations]
             switches = [{**opened[place], **self.structure.stations[place].switch} for place in self.structure.held[k]]
-            values = map(self.rows.quantity, itertools.repeat(family.row), corners, switches)
+            values = map(self.rows.quantity, itertools.repeat(family.square or family.row), corners, switches)
             found.append(self._rows(family, ca.vertcat(*layout.read(self.vector, f"sign {k}")), ca.vertcat(*values)))
         return found
 
@@ -382,16 +382,23 @@ class _Built:
         found = []
         for k, family in enumerate(self.structure.families):
             slots = self.structure.layout.columns(self.column, f"family {k}")
-            found += [slot[0] * self._rows(family, slot[1], self.rows.at(family.row, slot[2:])) for slot in slots]
+            read = family.square or family.row
+            found += [slot[0] * self._rows(family, slot[1], self.rows.at(read, slot[2:])) for slot in slots]
         return found
 
     def _rows(self, family: RowFamily, sign: Any, value: Any) -> Any:
-        """Return by how much a whole-cycle quantity exceeds its bound, in its natural size."""
+        """Return by how much a whole-cycle quantity exceeds its bound, in its natural size.
+
+        Of squares the difference over the bound and one size more: near the bound's own size it is as steep.
+        """
         if family.epigraph >= 0:
             scale = self.scales[self.structure.epigraphs[family.epigraph].objective]
             return sign * value / scale - self.extra[family.epigraph]
         scale = self.limit_scales[family.limit]
-        return sign * value / scale - (self.bounds[family.limit] / scale + self.given_way(family.limit))
+        bound = self.bounds[family.limit] / scale + self.given_way(family.limit)
+        if family.square:
+            return (sign * value / scale**2 - bound**2) / (1 + bound)
+        return sign * value / scale - bound
 
 
 def second_derivative(

@@ -18,6 +18,7 @@ from loomopt.base.records import lazy
 from loomopt.maths import systems
 from loomopt.maths.systems import Maths, Number
 from loomopt.model.kinematics import Chain
+from loomopt.model.limits import CycleLimit
 from loomopt.model.model import Integral, JobModel
 from loomopt.model.program import Program
 from loomopt.model.reading import DATUM, quadrature
@@ -84,6 +85,7 @@ class RowFamily(NamedTuple):
     """The whole-cycle rows of one quantity: below an epigraph variable, or below a limit, each by its place.
 
     where: the pieces they are asked for, every one without it; known: those where the quantity is known at all.
+    square: the quantity that is its square, where rows below a limit compare squares: it has a corner at 0 itself.
     """
 
     row: str
@@ -91,6 +93,7 @@ class RowFamily(NamedTuple):
     limit: int = -1
     where: Where | None = None
     known: tuple[Where, ...] = ()
+    square: str = ""
 
     def counts(self, switch: Values) -> bool:
         """Say whether it has rows on the pieces of a switch."""
@@ -111,8 +114,13 @@ def families(program: Program, elastic: bool = False) -> list[RowFamily]:
     limits, known = program.cycle_limits.items(), program.model.known_of
     return [
         *(RowFamily(row, epigraph=k, known=known(row)) for k, row in peaks),
-        *(RowFamily(limit.row, limit=k, where=limit.where, known=known(limit.row)) for k, limit in limits),
+        *(RowFamily(limit.row, -1, k, limit.where, known(limit.row), squared(program, limit)) for k, limit in limits),
     ]
+
+
+def squared(program: Program, limit: CycleLimit) -> str:
+    """Return the quantity that is the square of what a limit reads, where both may be squared; "" else."""
+    return program.model.square(limit.row) if limit.bound > 0.0 else ""
 
 
 class Station(NamedTuple):
@@ -478,7 +486,8 @@ class Structure:
     @property
     def key(self) -> Hashable:
         """Equal for structures that one built NLP serves."""
-        return self.program.structure, self.slots, self.elastic, self.hints, self.corners, self.points
+        squares = tuple(family.square for family in self.families)
+        return self.program.structure, self.slots, self.elastic, self.hints, self.corners, self.points, squares
 
     @functools.cached_property
     def families(self) -> list[RowFamily]:

@@ -101,7 +101,6 @@ class Elimination:
         self._d_x = Entries(pattern, definitions, self.full.own_variables(columns))
         self._d_z = Entries(pattern, definitions, self.full.lifted_variables(columns))
         self._bends = Entries(bend.sparsity(), columns, columns)
-        self._last: tuple[Any, Any, _Local] | None = None
 
     def start(self, x: Floats, p: Floats) -> Floats:
         """Return what the lifted variables are worth."""
@@ -149,13 +148,10 @@ class Elimination:
         return float(value), np.asarray(slope, dtype=np.float64).ravel()
 
     def _at(self, x: Floats, p: Floats) -> _Local:
-        if self._last is None or not (np.array_equal(self._last[0], x) and np.array_equal(self._last[1], p)):
-            full = np.concatenate([x, self.start(x, p)])
-            rows, slopes = self.functions["jac_g"](full, p)
-            entries = np.array(slopes.nonzeros())
-            local = _Local(full, np.asarray(rows, dtype=np.float64).ravel(), entries, self._follow(entries))
-            self._last = np.array(x), np.array(p), local
-        return self._last[2]
+        full = np.concatenate([x, self.start(x, p)])
+        rows, slopes = self.functions["jac_g"](full, p)
+        entries = np.array(slopes.nonzeros())
+        return _Local(full, np.asarray(rows, dtype=np.float64).ravel(), entries, self._follow(entries))
 
     def _follow(self, entries: Floats) -> Floats:
         """Return dz/dx: each row from those before it."""
@@ -255,6 +251,38 @@ NLPS, CACHE_SIZE = "NLPs", 32
 """What a session calls built NLPs, and how many it keeps; a study of many scenes meets no more structures at a time."""
 
 
+class Buffered:
+    """A CasADi function of dense numbers, called with arrays or floats: it reads and writes the same memory every time.
+
+    A call with arrays makes matrices of CasADi's own of them, and arrays of what comes out: that takes longer than most
+    evaluations.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._run = function.buffer()
+        self._given = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._found = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        for k, own in enumerate(self._given):
+            self._buffer.set_arg(k, own.data)
+        for k, own in enumerate(self._found):
+            self._buffer.set_res(k, own.data)
+        patterns = [function.sparsity_out(k) for k in range(function.n_out())]
+        self._shapes = [pattern.shape for pattern in patterns]
+        self._places = [np.array(pattern.find(), dtype=np.intp) for pattern in patterns]
+
+    def __call__(self, *arguments: Floats | float) -> tuple[Floats, ...]:
+        """Return what the function does, all of it as matrices."""
+        for own, given in zip(self._given, arguments, strict=True):
+            own[:] = given
+        self._run()
+        results = []
+        for values, shape, places in zip(self._found, self._shapes, self._places, strict=True):
+            found = np.zeros(shape[0] * shape[1])
+            found[places] = values
+            results.append(found.reshape(shape, order="F"))
+        return tuple(results)
+
+
 class Transcription:
     """One built NLP, with its solvers and derivatives as they are first asked for.
 
@@ -268,6 +296,7 @@ class Transcription:
         self._eliminated = Elimination(written, self.rows) if written.lifts.defined else None
         self._solvers: dict[Hashable, Any] = {}
         self._derivatives: dict[str, Any] = {}
+        self._buffered: dict[str, Buffered] = {}
         if self._eliminated:
             self.nlp, self._derivatives = self._eliminated.nlp, self._eliminated.functions
 
@@ -299,17 +328,30 @@ class Transcription:
     @property
     def jacobian(self) -> Any:
         """Rows and their derivatives, as the solver computes them: (x, p) → (g, dg/dx)."""
-        return self._eliminated.jacobian if self._eliminated else self._derivatives["jac_g"]
+        return self._eliminated.jacobian if self._eliminated else self._called("jac_g")
 
     @property
     def gradient(self) -> Any:
         """The objective and its derivatives: (x, p) → (f, df/dx)."""
-        return self._eliminated.gradient if self._eliminated else self._derivatives["grad_f"]
+        return self._eliminated.gradient if self._eliminated else self._gradient
 
     @property
     def curvature(self) -> Any:
         """Second derivatives of the Lagrangian: (x, p, weight of f, multipliers) → their upper triangle."""
-        return self._eliminated.curvature if self._eliminated else self._derivatives["hess_lag"]
+        return self._eliminated.curvature if self._eliminated else self._curvature
+
+    def _gradient(self, x: Floats, p: Floats) -> tuple[float, Floats]:
+        value, slope = self._called("grad_f")(x, p)
+        return float(value[0, 0]), slope
+
+    def _curvature(self, x: Floats, p: Floats, weight: float, multipliers: Floats) -> Floats:
+        (bends,) = self._called("hess_lag")(x, p, weight, multipliers)
+        return bends
+
+    def _called(self, name: str) -> Buffered:
+        if name not in self._buffered:
+            self._buffered[name] = Buffered(self._derivatives[name])
+        return self._buffered[name]
 
 
 def transcribe(

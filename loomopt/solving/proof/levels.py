@@ -8,7 +8,10 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from loomopt.jobs.base import Job
+from loomopt.maths import systems
 from loomopt.maths.intervals import Floats
 from loomopt.model.objectives import Objective
 from loomopt.model.program import Program
@@ -94,11 +97,33 @@ def loosening(job: Job, program: Program) -> tuple[str, ...]:
 
 def _unserved(program: Program, sampler: Sampler) -> str:
     """Return why boxes say nothing of a program, "" where they do."""
-    if sampler.hints:
+    if sampler.hints and _read(program, sampler):
         return "corners of the cycle are found by iteration, which boxes do not enclose"
     if names := ", ".join(state.name for state in program.model.states):
         return f"the steady state of {names} is not bounded by boxes of designs"
     return ""
+
+
+def _read(program: Program, sampler: Sampler) -> bool:
+    """Say whether a program reads events that no formula gives: without their hints it is another, or none."""
+    model, system = program.model, systems.numpy()
+    read = {row for limit in program.limits for row in limit.reads}
+    read |= {row for objective in program.objectives for row in objective.rows}
+    means = {name: mean.quantity for mean in model.integrals for name in (mean.name, mean.root)}
+    quantities = sorted({means.get(row, row) for row in read if row in means or model.has_quantity(row)})
+    rows = [row for row in read if model.has_row(row) and row not in means]
+    try:
+        plain = model.given(systems.FLOAT, sampler.values)
+        if model.corners(systems.FLOAT, plain) != model.corners(systems.FLOAT, sampler.given):
+            return True
+        both = [model.static(systems.FLOAT, given, sampler.stills, rows) for given in (plain, sampler.given)]
+        together = [model.together(system, given, sampler.node(*sampler.grid())) for given in (plain, sampler.given)]
+        pairs = ([value(name) for value in together] for name in quantities)
+        same = (np.array_equal(one, other, equal_nan=True) for one, other in pairs)
+        return both[0] != both[1] or not all(same)
+    except (ArithmeticError, KeyError, ValueError):
+        # The angle of an event is not given, or none that is real follows from what is.
+        return True
 
 
 def _no_larger(program: Program, merits: list[float]) -> dict[str, float]:

@@ -16,7 +16,7 @@ from loomopt.model.sampling import sampled
 from loomopt.physics.tolerances import INDIFFERENT, MOVED, SAME_OBJECTIVE, SHOWN_AS_ZERO
 from loomopt.solving.certificate.verdict import Level
 from loomopt.solving.nlp.point import Known
-from loomopt.solving.search.search import Candidate, Search, Spared, judged, objectives, tried
+from loomopt.solving.search.search import Candidate, Search, Spared, judged, objectives, tried, worths
 
 LOOKED_AT = 10.0
 """Shares by which a level may change where what is added is left out and all else stays: what changes more, of its
@@ -64,8 +64,8 @@ def _without(search: Search, best: Candidate, added: Added) -> Search | None:
     if not gone:
         return None
     share = added.share or INDIFFERENT
-    before, after = objectives(program, best.x), objectives(program, {**best.x, **gone})
-    if any(there - here > LOOKED_AT * share * max(1.0, abs(here)) for here, there in zip(before, after, strict=True)):
+    levels = zip(worths(program, best.x), worths(program, {**best.x, **gone}), strict=True)
+    if any(there - here > LOOKED_AT * share * max(1.0, abs(here)) for here, there in levels):
         return None
     variables = (replace(v, lower=gone[v.name], upper=gone[v.name]) if v.name in gone else v for v in program.variables)
     limits = tuple(limit for limit in program.limits if limit.row not in gone)

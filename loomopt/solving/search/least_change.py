@@ -43,9 +43,7 @@ def with_least_change(search: Search) -> Search:
     if best is None or not best.certificate.passed or not best.certificate.level:
         return search
     began, program = time.perf_counter(), search.program
-    here = as_read(search, best.x)
-    kept = _kept(program, here, best.certificate)
-    ways = left(program, here, best.certificate, kept)
+    kept, ways = unsettled(search, best)
     unique = best.certificate.unique
     if len(ways) <= unique:
         # Of one direction it is known whether limits close it; between two of them there may be a third.
@@ -57,6 +55,13 @@ def with_least_change(search: Search) -> Search:
     elif moved and unique and not _differ(program, moved.x, best.x):
         moved = None
     return replace(search, best=moved or best, tie_broken=search.tie_broken + time.perf_counter() - began)
+
+
+def unsettled(search: Search, best: Candidate) -> tuple[frozenset[str], Floats]:
+    """Return the variables that moves settle one by one, and the directions (k, variables) that no move settles."""
+    here = as_read(search, best.x)
+    kept = _kept(search.program, here, best.certificate)
+    return kept, left(search.program, here, best.certificate, kept)
 
 
 def _differ(program: Program, one: Mapping[str, float], other: Mapping[str, float], most: float = MOVED) -> bool:

@@ -11,13 +11,13 @@ import numpy as np
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.sobol import points
-from loomopt.maths.systems import Maths, Number
-from loomopt.model.model import Integral, with_words_fixed
+from loomopt.maths.systems import Number
+from loomopt.model.model import with_words_fixed
 from loomopt.model.program import Program
-from loomopt.model.reading import DATUM, Reading, quadrature
+from loomopt.model.reading import BatchReading, plain, wide
 from loomopt.model.sampling import Sampler
 from loomopt.model.session import working
-from loomopt.physics.cycle import Floats, Node, Pieces, Where
+from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import SAME_OBJECTIVE
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Known, Point, sampler_at
@@ -29,54 +29,8 @@ SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8,
 steps, and starts kept of these and of those as drawn (benchmarks/adversarial/attack.py)."""
 
 
-class BatchReading(Reading):
-    """Designs read at once: variables are (designs,), whole-cycle quantities (nodes, designs)."""
-
-    def __init__(self, program: Program, system: Maths, values: Mapping[str, Number], like: Sampler) -> None:
-        given = program.model.given(system, values)
-        super().__init__(program.model, system, given, like.cycle, like.stills)
-        self.like, self.count = like, max(np.size(_plain(value)) for value in values.values())
-        self._looked: tuple[Pieces, dict[str, Number]] = np.zeros(0, dtype=np.intp), {}
-
-    def node(self, pieces: Pieces, u: Floats) -> Node:
-        """Return nodes (pieces, u), each (nodes,), of all designs."""
-        begins = [_wide(start, self.count) for start in self.starts]
-        begin, end = _picked(begins, pieces), _picked(begins, pieces + 1)
-        switch = {name: column[:, None] for name, column in self.cycle.switch(pieces).items()}
-        return Node(begin + u[:, None] * (end - begin), switch)
-
-    def quantities(self, names: Sequence[str], node: Node) -> dict[str, Number]:
-        """Return whole-cycle quantities (nodes, designs) at nodes, their poses computed once for all."""
-        read = self.model.together(self.maths, self.given, node)
-        shape = np.shape(_plain(node.phi))
-        return {name: _shaped(read(name), shape) for name in names}
-
-    def look(self, names: Sequence[str], pieces: Pieces, u: Floats) -> None:
-        """Look at quantities at nodes (pieces, u) of the whole cycle, their poses computed once for all."""
-        self._looked = pieces, self.quantities(names, self.node(pieces, u))
-
-    def highest(self, name: str, where: Where | None = None) -> Number:
-        """Return the largest |quantity| (of a signed one, value) of each design at the nodes looked at, (designs,)."""
-        pieces, looked = self._looked
-        values, signed = looked[name], name in self.model.signed
-        on = np.flatnonzero(self.like.on(name, where)[pieces])
-        plain = _plain(values)[on]
-        heights = plain if signed else np.abs(plain)
-        top = on[np.argmax(np.where(np.isfinite(heights), heights, np.inf), axis=0)]
-        highest = values[top, np.arange(plain.shape[1])]
-        return highest if signed else np.where(_plain(highest) < 0.0, -1.0, 1.0) * highest
-
-    def mean(self, integral: Integral) -> Number:
-        """Return a mean by its rule, all nodes of all designs at once, (designs,), SI."""
-        name = integral.quantity
-        if integral.angles:
-            angles = np.broadcast_to(np.array(integral.angles)[:, None], (len(integral.angles), self.count))
-            node = Node(angles, {DATUM: np.array(integral.data)[:, None]})
-            return _total(self.quantities((name,), node)[name]) / len(integral.angles)
-        pieces, u, weights = quadrature(self.cycle, integral)
-        begins = [_wide(start, self.count) for start in self.starts]
-        widths = weights[:, None] * (_picked(begins, pieces + 1) - _picked(begins, pieces))
-        return _total(widths * self.quantities((name,), self.node(pieces, u))[name]) / _total(widths)
+AT_ENDS = 16
+"""Designs at which a number that no level reads is put to both its ends."""
 
 
 class Judged(NamedTuple):
@@ -95,7 +49,7 @@ class Judged(NamedTuple):
         """The largest residual of each design."""
         found = np.zeros(len(self.objectives))
         for residual, equal in zip(self.residuals, self.equal, strict=True):
-            value = _plain(residual)
+            value = plain(residual)
             found = np.maximum(found, np.abs(value) if equal else value)
         return np.where(np.isfinite(found), found, np.inf)
 
@@ -120,7 +74,7 @@ class Batch:
             objectives = self.program.objectives if directions is None else ()
             names = self.whole | {row for objective in objectives for row in objective.quantities}
             reading.look(sorted(names), self.pieces, self.u)
-            residuals = [_wide(limit.residual(reading) / limit.scale, len(x)) for limit in self.limits]
+            residuals = [wide(limit.residual(reading) / limit.scale, len(x)) for limit in self.limits]
             columns = [np.broadcast_to(level.worth(reading) / level.scale, (len(x),)) for level in objectives]
         found = np.stack(columns, axis=1) if columns else np.zeros((len(x), 0))
         return Judged(np.where(np.isfinite(found), found, np.inf), residuals, [o.sign == 0 for o in self.limits])
@@ -130,7 +84,21 @@ class Batch:
         if directions is not None:
             system, columns = systems.jets(), variables(columns, directions, curved=False)
         known = {**self.program.parameters, **self.like.hints}
-        return BatchReading(self.program, system, {**known, **dict(zip(self.names, columns, strict=True))}, self.like)
+        values = {**known, **dict(zip(self.names, columns, strict=True))}
+        return BatchReading(self.program.model, system, values, self.like.cycle, self.like.stills)
+
+    def read(self, x: Floats) -> set[str]:
+        """Return the variables that a level reads at crank angles that stay where they are, at designs x."""
+        count, found = len(self.names), list[Number]()
+        with np.errstate(all="ignore"):
+            reading = self._reading(x, np.eye(count))
+            node = reading.node(self.pieces, self.u)
+            still = node._replace(phi=plain(node.phi))
+            for level in self.program.objectives:
+                found += [reading.single(row) for row, _ in level.sides]
+                found += reading.quantities(level.quantities, still).values() if level.quantities else []
+        slopes = [np.abs(np.nan_to_num(each.g)).reshape(-1, count) for each in found if isinstance(each, Jet)]
+        return {self.names[place] for each in slopes for place in np.flatnonzero(each.max(axis=0))}
 
     def tops(self, x: Floats) -> Floats:
         """Return designs with the variables that stand where a quantity is largest put there, roughly."""
@@ -142,39 +110,9 @@ class Batch:
             node = reading.node(self.pieces, self.u)
             values = reading.quantities(tuple(self.program.tops.values()), node)
             for variable, name in self.program.tops.items():
-                moved[:, self.names.index(variable)] = _vertex(node.phi, values[name]) % (2 * np.pi)
+                angles = np.broadcast_to(node.phi, values[name].shape)
+                moved[:, self.names.index(variable)] = _vertex(angles, values[name]) % (2 * np.pi)
         return moved
-
-
-def _plain(value: Number) -> Number:
-    """Return a number's value without its derivatives."""
-    return value.v if isinstance(value, Jet) else value
-
-
-def _shaped(value: Number, shape: tuple[int, ...]) -> Number:
-    """Return a number, or a jet, in full shape."""
-    if not isinstance(value, Jet):
-        return np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
-    width = value.g.shape[-1]
-    return Jet(np.broadcast_to(value.v, shape), np.broadcast_to(value.g, (*shape, width)))
-
-
-def _wide(value: Number, count: int) -> Number:
-    return _shaped(value, (count,))
-
-
-def _picked(numbers: Sequence[Number], places: Pieces) -> Number:
-    """Return numbers (designs,) by place, (places, designs)."""
-    if not any(isinstance(number, Jet) for number in numbers):
-        return np.array(numbers)[places]
-    width = next(number.g.shape[-1] for number in numbers if isinstance(number, Jet))
-    slopes = [number.g if isinstance(number, Jet) else np.zeros((len(number), width)) for number in numbers]
-    return Jet(np.array([_plain(number) for number in numbers])[places], np.array(slopes)[places])
-
-
-def _total(values: Number) -> Number:
-    """Return the sum over the nodes, (designs,)."""
-    return Jet(values.v.sum(axis=0), values.g.sum(axis=0)) if isinstance(values, Jet) else values.sum(axis=0)
 
 
 def _vertex(angles: Floats, values: Floats) -> Floats:
@@ -251,6 +189,28 @@ class Screening:
         found = np.tile(self.base, (len(shares), 1))
         found[:, self.free] = self.low[self.free] + shares * (self.high - self.low)[self.free]
         return self.batch.tops(found)
+
+    def unread(self) -> dict[str, list[tuple[Floats, bool]]]:
+        """Return the free variables that no level reads, with what limits say of each at some designs.
+
+        Of every limit: how much more it is exceeded with the variable at its upper end than at its lower, in natural
+        sizes, and whether it is an equality.
+        """
+        designs = self.placed(points(AT_ENDS, len(self.free), 0))
+        read, found = self.batch.read(designs), {}
+        for place in (int(each) for each in self.free if self.batch.names[each] not in read):
+            low, high = (self.batch.judged(self._put(designs, place, ends[place])) for ends in (self.low, self.high))
+            pairs = zip(low.residuals, high.residuals, low.equal, strict=True)
+            with np.errstate(all="ignore"):
+                apart = [(np.asarray(other) - np.asarray(one), equal) for one, other, equal in pairs]
+            found[self.batch.names[place]] = [(each[np.isfinite(each)], equal) for each, equal in apart]
+        return found
+
+    @staticmethod
+    def _put(designs: Floats, place: int, value: float) -> Floats:
+        moved = designs.copy()
+        moved[:, place] = value
+        return moved
 
     def start(self, design: Floats) -> Start:
         """Return a design by variable, SI."""
@@ -347,13 +307,30 @@ def resolved(
     is left alone. Raises KeyboardInterrupt on Ctrl-C.
     """
     same = [point for point in near if point.structure == search.program.structure]
-    search = searched(search, starts, seed, same, on_start)
+    search = rewarded(search, starts, seed, same, on_start) or searched(search, starts, seed, same, on_start)
     for _ in range(RESOLVED if search.best else 0):
         finer = _finer(search)
         if finer is search.program:
             break
         search = searched(replace(search, program=finer, candidates=(), best=None), starts, seed, (), on_start)
     return search
+
+
+def rewarded(
+    search: Search, count: int | None, seed: int, near: Sequence[Point], on_start: OnStart | None
+) -> Search | None:
+    """Return the search without the numbers that serve no level; None without any, or where it leads to no answer."""
+    if not search.program.any_numbers:
+        return None
+    from loomopt.solving.search import unrewarded
+
+    screening = _screening(search, exchange.starts(search.program, 1, seed))
+    held = unrewarded.held(search, screening.unread()) if screening else None
+    if held is None:
+        return None
+    found = searched(replace(search, program=held), count, seed, near, on_start)
+    found = unrewarded.freed(found, search.program) if found.passed else found
+    return found if found.passed else None
 
 
 def _finer(search: Search) -> Program:

@@ -19,7 +19,7 @@ from loomopt.physics.tolerances import (
     SAME_OBJECTIVE,
     STATIONARY,
 )
-from loomopt.solving.certificate.certificate import certify
+from loomopt.solving.certificate.certificate import Draft, begun
 from loomopt.solving.certificate.verdict import Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import SUCCESS, Known, Point, Settings, sampler_at
@@ -150,10 +150,14 @@ def tried(search: Search, start: Mapping[str, float], warm: Point | None = None,
 
 def objectives(program: Program, x: Mapping[str, float]) -> tuple[float, ...]:
     """Return the objectives of variables x (SI) in their natural sizes; infinite where they have no value."""
+    return tuple(worths(program, x))
+
+
+def worths(program: Program, x: Mapping[str, float]) -> Iterator[float]:
+    """Yield the objectives of variables x (SI) in their natural sizes, each when it is asked for."""
     sampler = sampler_at(program, x)
-    if sampler is None:
-        return (math.inf,) * len(program.objectives)
-    return tuple(objective.merit(sampler) / objective.scale for objective in program.objectives)
+    for objective in program.objectives:
+        yield math.inf if sampler is None else objective.merit(sampler) / objective.scale
 
 
 def compared(one: Candidate, other: Candidate) -> int:
@@ -251,26 +255,29 @@ def _too_weak(settings: Settings, certificate: Certificate) -> bool:
 def _certified(search: Search, candidate: Candidate) -> Search:
     """Return the search with a candidate as its best; where there is a slope left, it is followed to its end."""
     accuracy = search.settings.accuracy
-    search, x, certificate = _judged_at(search, candidate.point.x)
+    search, x, draft = _judged_at(search, candidate.point.x)
     for _ in range(CORRECTIONS):
-        precise = max(min(PRECISE, accuracy), ROUNDING)
-        close = certificate.residual <= precise and certificate.error <= accuracy
-        if not certificate.correction or close:
+        here, precise = draft.judged, max(min(PRECISE, accuracy), ROUNDING)
+        # What lies between the refined points only counts where all else is close.
+        close = here.residual <= precise and here.error <= accuracy and draft.whole.error <= accuracy
+        if not here.correction or close:
             break
-        stepped = _stepped(search.program, x, certificate.correction)
+        stepped = _stepped(search.program, x, here.correction)
         if sampler_at(search.program, stepped) is None:
             break
         search, moved, better = _judged_at(search, stepped)
-        if better.residual >= certificate.residual or better.feasibility > FEASIBLE:
+        if better.judged.residual >= here.residual or better.judged.feasibility > FEASIBLE:
             break
-        x, certificate = moved, better
-    return replace(search, best=replace(candidate, moved=x, certificate=certificate))
+        x, draft = moved, better
+    began = time.perf_counter()
+    best = replace(candidate, moved=x, certificate=draft.whole)
+    return replace(search, best=best, certified=search.certified + time.perf_counter() - began)
 
 
 def _judged_at(
     search: Search, x: Mapping[str, float], known: Mapping[str, float] | None = None
-) -> tuple[Search, dict[str, float], Certificate]:
-    """Return the search with the seconds this took, x (SI) after the tie-break, and its certificate.
+) -> tuple[Search, dict[str, float], Draft]:
+    """Return the search with the seconds this took, x (SI) after the tie-break, and its certificate begun.
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
@@ -279,9 +286,9 @@ def _judged_at(
     moved, rules = tie_break.moved(program, job.tidy(program, x))
     at, there = time.perf_counter(), as_read(search, moved)
     shown = len(program.objectives) - 1 if there == known else 0
-    certificate = replace(certify(program, there, search.settings.accuracy, shown), settled=rules)
+    draft = begun(program, there, search.settings.accuracy, shown).settled(rules)
     certified = search.certified + time.perf_counter() - at
-    return replace(search, tie_broken=search.tie_broken + at - began, certified=certified), moved, certificate
+    return replace(search, tie_broken=search.tie_broken + at - began, certified=certified), moved, draft
 
 
 def as_read(search: Search, x: Mapping[str, float]) -> dict[str, float]:
@@ -294,8 +301,8 @@ def judged_as_is(search: Search, candidate: Candidate, known: Mapping[str, float
 
     known: where (SI) all levels but the last have a certificate, if anywhere.
     """
-    _, x, certificate = _judged_at(search, candidate.point.x, known)
-    return replace(candidate, moved=x, certificate=certificate)
+    _, x, draft = _judged_at(search, candidate.point.x, known)
+    return replace(candidate, moved=x, certificate=draft.whole)
 
 
 def corrected(search: Search, found: Candidate) -> Candidate:
@@ -303,7 +310,8 @@ def corrected(search: Search, found: Candidate) -> Candidate:
     x = _stepped(search.program, found.x, found.certificate.correction)
     if not found.certificate.correction or sampler_at(search.program, x) is None:
         return found
-    _, x, certificate = _judged_at(search, x)
+    _, x, draft = _judged_at(search, x)
+    certificate = draft.whole
     ranks = [(not of.passed, of.residual) for of in (certificate, found.certificate)]
     return replace(found, moved=x, certificate=certificate) if ranks[0] <= ranks[1] else found
 

@@ -1,0 +1,138 @@
+"""What an answer for several machines says: each by itself, and of all of them who decides."""
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+
+from loomopt.jobs.base import Job
+from loomopt.jobs.family import FamilyJob
+from loomopt.model import numbers
+from loomopt.model.family import of_member
+from loomopt.model.program import Alias, Program
+from loomopt.physics.tolerances import SAME_OBJECTIVE, SHOWN_AS_ZERO
+from loomopt.scenes import family
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluated, Finding, Words, changed
+
+Evaluation = Callable[[Scene, Job, Program, Mapping[str, float]], Evaluated]
+
+
+def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, float], alone: Evaluation) -> Evaluated:
+    """Return a family's design with every member by itself; alone: evaluates one machine.
+
+    A figure of the family is the one that all members have, else each has its own; of one that is sought there is that
+    of the member that decides it beside these.
+    """
+    assert isinstance(job, FamilyJob)
+    own = zip(job.members, job.parts, job.own_designs(design), strict=True)
+    found = [alone(member, job.job, part.program, each) for member, part, each in own]
+    members = tuple(replace(each, change=change) for each, change in zip(found, family.changes(scene), strict=True))
+    sought = {level.figure: level.power for level in job.parts[0].program.objectives}
+    figures = {
+        name: _together([member.figures[name] for member in members], sought.get(name)) for name in members[0].figures
+    }
+    for name in members[0].figures:
+        each = [member.figures[name] for member in members]
+        if any(value != each[0] for value in each):
+            figures |= {of_member(name, k): value for k, value in enumerate(each)}
+    words, labels = Words(scene), numbers.labels(scene)
+    shown = {_labelled(name, labels): value for name, value in design.items()}
+    return Evaluated(
+        problem=scene.name,
+        effects=members[0].effects,
+        design=shown,
+        figures=figures,
+        units={name: words.si(name) for name in (*shown, *figures)},
+        limits=_limits(job, members),
+        reached={name: all(member.reached[name] for member in members) for name in members[0].reached},
+        scene=scene,
+        undefined=members[0].undefined,
+        members=members,
+    )
+
+
+def _labelled(name: str, labels: Mapping[str, str]) -> str:
+    """Return a number of the whole by what a designer calls it."""
+    of = name.of if isinstance(name, Alias) else name
+    label = labels.get(of, of)
+    return Alias(f"{label}{name.removeprefix(of)}", label) if isinstance(name, Alias) else label
+
+
+def said(scene: Scene, job: Job, found: Evaluated, priced: Collection[str]) -> str:
+    """Return who decides each level, which members reach their goals, and what physics says of those that do not.
+
+    priced: names of the limits that bind; of what all members share those decide it whose own limits do.
+    """
+    assert isinstance(job, FamilyJob)
+    words, members, summed = Words(scene), found.members, family.table(scene).combine == "sum"
+    called = [f"member {k + 1} ({changed(member)})" for k, member in enumerate(members)]
+    sentences = []
+    for level in job.parts[0].program.objectives:
+        values = [member.figures.get(level.figure) for member in members]
+        sizes = [abs(value) for value in values if value is not None]
+        if len(sizes) < len(members):
+            continue
+        worst = max(sizes) if level.power > 0 else min(sizes)
+        nothing = worst <= SHOWN_AS_ZERO * level.scale
+        shown = words.shown(level.figure, 0.0 if nothing else worst)
+        name = f"|{level.figure}|" if level.is_magnitude else level.figure
+        if nothing or len(set(values)) == 1:
+            asking = [called[k] for k, part in enumerate(job.parts) if not {*part.limits.values()}.isdisjoint(priced)]
+            wanted = f": {listed(asking)} ask{'s' if len(asking) == 1 else ''} for it" if asking and not nothing else ""
+            sentences.append(f"The least {name} that serves all members is {shown}{wanted}.")
+            continue
+        deciding = [called[k] for k, size in enumerate(sizes) if abs(size - worst) <= SAME_OBJECTIVE * level.scale]
+        if summed:
+            total = words.shown(level.figure, sum(size**level.power for size in sizes) ** (1 / level.power))
+            what = family.sum_name(level.figure, level.is_magnitude, level.power)
+            sentences.append(f"The least {what} is {total}; the worst {name} is {shown}, of {listed(deciding)}.")
+        else:
+            decide = f"{listed(deciding)} decide{'s' if len(deciding) == 1 else ''} it"
+            sentences.append(f"The least worst {name} is {shown}: {decide}.")
+    sentences += [_reached(goal, members) for goal in found.reached]
+    if all(found.reached.values()):
+        return " ".join(sentences)
+    each = [(scene, member.design, member.figures) for scene, member in zip(job.members, members, strict=True)]
+    return " ".join([*sentences, job.job.say_together(each, job.own)]).strip()
+
+
+def _reached(goal: str, members: Sequence[Evaluated]) -> str:
+    met = [str(k + 1) for k, member in enumerate(members) if member.reached[goal]]
+    rest = [str(k + 1) for k, member in enumerate(members) if not member.reached[goal]]
+    if not met or not rest:
+        return f"{'All members reach' if met else 'No member reaches'} {goal}."
+    return f"{_counted(met, 'reaches', 'reach')} {goal}, {_counted(rest, 'does', 'do').lower()} not."
+
+
+def _counted(names: Sequence[str], one: str, many: str) -> str:
+    return f"Member {names[0]} {one}" if len(names) == 1 else f"Members {listed(names)} {many}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in words."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _together(values: list[float | None], power: int | None) -> float | None:
+    known = [value for value in values if value is not None]
+    if len(known) < len(values):
+        return None
+    if power is None:
+        return known[0] if len(set(known)) == 1 else None
+    return max(known, key=abs) if power > 0 else min(known, key=abs)
+
+
+def _limits(job: FamilyJob, members: tuple[Evaluated, ...]) -> tuple[Finding, ...]:
+    found: dict[str, Finding] = {}
+    for member, part in zip(members, job.parts, strict=True):
+        for limit in member.limits:
+            name = part.limits.get(limit.name, limit.name)
+            if name not in found or _room(limit) < _room(found[name]):
+                found[name] = replace(limit, name=name)
+    return tuple(found.values())
+
+
+def _room(limit: Finding) -> float:
+    """Return how far a value is from the nearer end."""
+    low = limit.value - limit.min if limit.min is not None else math.inf
+    return min(low, limit.max - limit.value if limit.max is not None else math.inf)

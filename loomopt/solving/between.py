@@ -1,0 +1,59 @@
+"""A scene's target beside answers of its neighbours: how it begins, what is told of it, what the next begins from."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from loomopt.jobs import registry
+from loomopt.model.program import Program
+from loomopt.model.session import working
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Clash, Evaluated, Solution
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.search import stretch
+from loomopt.solving.search.search import Clock, Search
+from loomopt.solving.search.stretch import Optimum
+
+
+def begun(scene: Scene, target: str, accuracy: float, beside: Sequence[Any]) -> stretch.Between | None:
+    """Return a target between two optima; None where more than a search makes its answer, or they are of another one.
+
+    beside: both optima as JSON data, and how far the target lies from the first to the second.
+    """
+    job = registry.of_target(scene, target)
+    if job.sizes(scene):
+        return None
+    program = job.program(scene, target)
+    first, second = map(stretch.read_optimum, beside[:2])
+    if not (first.serves(program) and second.serves(program)):
+        return None
+    search = Search(job, program, Settings(accuracy), {**job.values(program, job.today(scene)), **program.today})
+    return stretch.Between(search, first, second, beside[2])
+
+
+@working()
+def evaluated(scene: Scene, search: Search) -> Evaluated | None:
+    """Return the figures of a search that ended beside its neighbours; None where they do not show it admissible."""
+    best = search.best
+    assert best is not None
+    found = report.evaluation(scene, search.job, search.program, search.job.design(search.program, best.x), every=True)
+    return found if found.admissible else None
+
+
+@working()
+def told(scene: Scene, target: str, search: Search) -> Solution:
+    """Return the answer of a search that ended beside its neighbours."""
+    clock = Clock()
+    with clock.charged("report"):
+        answer = report.answer(scene, target, search, Clash())
+    return report.completed(answer, None, 0, clock.seconds(search))
+
+
+def optimum(scene: Scene, program: Program, answer: Solution) -> Optimum | None:
+    """Return an answer's optimum; None where none can begin from it, as where what it adds was weighed."""
+    if answer.status != "optimal" or answer.certificate is None or answer.beside is not None or answer.members:
+        return None
+    full = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    job = registry.of(scene)
+    return stretch.optimum(job, program, job.values(program, full), answer.certificate)
