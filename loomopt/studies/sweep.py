@@ -1,11 +1,13 @@
 """Solve a scene for every combination of some of its numbers: a row each."""
 
+import contextlib
 import functools
 import itertools
 import json
 import math
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,20 +15,26 @@ from loomopt.base import arguments
 from loomopt.base.errors import BadInput, misread, refusal
 from loomopt.base.units import QuantityError
 from loomopt.jobs import registry
+from loomopt.model.program import Program
+from loomopt.model.session import current
 from loomopt.physics.tolerances import ACCURACY
 from loomopt.scenes import designs, numbers
 from loomopt.scenes.numbers import files, quantity
 from loomopt.scenes.provenance import versions
 from loomopt.scenes.scene import Scene
-from loomopt.solving import engine
-from loomopt.solving.answer.solution import Solution
+from loomopt.solving import between, engine
+from loomopt.solving.answer.solution import SIDES, Solution
+from loomopt.solving.certificate.verdict import worth_of
 from loomopt.solving.nlp.point import Point
 from loomopt.solving.options import check_numbers, check_sought, target_name
+from loomopt.solving.search import stretch
+from loomopt.solving.search.search import Search
 from loomopt.studies.run import rows
-from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, Side, StudyTask
+from loomopt.studies.run.rows import Change, Findings, Multiplier, Row, Side, StudyTask, enough_together
 
-COARSE = 8
-"""Steps of each axis between two points that are searched from scratch; a power of two."""
+COARSE, MOST_COARSE = 8, 4
+"""Steps of each axis between two points that are searched from scratch, a power of two, and how many such steps an axis
+has at most: of a longer one each is twice, four times ... as many."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +61,11 @@ class Lattice:
     def rounds(self) -> list[list[int]]:
         """The points of each round that has any, in order."""
         finest = np.zeros(self.size, dtype=int)
+        last = max(map(_halvings, map(len, self.ranks)), default=0)
         for axis, ranks in enumerate(self.ranks):
-            rounds = np.array([_round(rank, len(ranks)) for rank in range(len(ranks))])
+            rounds = np.array([_round(rank, len(ranks), last) for rank in range(len(ranks))])
             finest = np.maximum(finest, rounds[self.points[:, axis]])
-        found = [np.flatnonzero(finest == each).tolist() for each in range(1 + int(math.log2(COARSE)))]
+        found = [np.flatnonzero(finest == each).tolist() for each in range(1 + last)]
         return [points for points in found if points]
 
     def neighbours(self, point: int, usable: Sequence[int]) -> list[int]:
@@ -67,15 +76,35 @@ class Lattice:
         mirrored = np.flatnonzero((away == -away[place]).all(axis=1))
         return [usable[place], *(usable[k] for k in mirrored[:1] if k != place)]
 
+    def across(self, point: int, parent: int, usable: Sequence[int]) -> int | None:
+        """Return the mirror image of a point's parent, along one axis the nearest beyond it; None of none usable."""
+        own, known = self.points[point], self.points[list(usable)]
+        away, step = known - own, self.points[parent] - own
+        mirrored = np.flatnonzero((away == -step).all(axis=1))
+        if len(mirrored) or len(self.ranks) > 1:
+            return usable[mirrored[0]] if len(mirrored) and step.any() else None
+        beyond = np.flatnonzero(away[:, 0] * step[0] < 0)
+        return usable[beyond[np.argmin(np.abs(away[beyond, 0]))]] if len(beyond) else None
 
-def _round(rank: int, count: int) -> int:
-    """Return the round in which a rank of an axis of so many values is first met."""
-    if rank % COARSE == 0 or rank == count - 1:
+
+def _halvings(count: int) -> int:
+    """Return how often steps between points of an axis of so many values are halved that are searched from scratch."""
+    step = COARSE
+    while count - 1 > MOST_COARSE * step:
+        step *= 2
+    return int(math.log2(step))
+
+
+def _round(rank: int, count: int, last: int) -> int:
+    """Return the round, of 0 to last, in which a rank of an axis of so many values is first met."""
+    if rank % 2 ** _halvings(count) == 0 or rank == count - 1:
         return 0
-    return int(math.log2(COARSE)) - int(math.log2(rank & -rank))
+    return last - int(math.log2(rank & -rank))
 
 
-PLAN = 2
+SCENES, KEPT = "scenes of a sweep", 32
+"""What a session calls them, and how many it keeps: as many as are solved together."""
+PLAN = 4
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 Over = Mapping[str, str | Sequence[str | float]]
 """Dotted key of a scene → "LO:HI:STEP UNIT", or its values as a scene would give them."""
@@ -122,7 +151,7 @@ class Sweep:
     @property
     def shown(self) -> list[str]:
         """The figures that the target is about, in its order."""
-        program = registry.of(self.scene).program(self.scene, self.target)
+        program = registry.of_target(self.scene, self.target).program(self.scene, self.target)
         return list(dict.fromkeys(each.figure for each in program.objectives))
 
     @property
@@ -177,31 +206,59 @@ class Sweep:
         done = list(itertools.accumulate(map(len, rounds), initial=0)).index(len(rows))
         known = {row.point: row for row in rows if row.warm}
         usable = sorted(known)
-        return [self._task(point, usable, known) for point in (rounds[done] if done < len(rounds) else ())]
+        tasks = (self._task(point, usable, known) for point in (rounds[done] if done < len(rounds) else ()))
+        return enough_together(list(tasks))
 
     def _task(self, point: int, usable: Sequence[int], known: Mapping[int, Row]) -> StudyTask:
         places = zip(self.axes, self.lattice.places(point), strict=True)
         parent, *beyond = self.lattice.neighbours(point, usable) if usable else [None]
         ask = {"beyond": [dict(known[other].warm) for other in beyond if other is not None]}
-        return StudyTask(point, parent, {axis.key: axis.values[k] for axis, k in places}, ask)
+        place = {axis.key: axis.values[k] for axis, k in places}
+        across = None if parent is None else self.lattice.across(point, parent, usable)
+        beside = [] if parent is None or across is None else self._beside(place, known[parent], known[across])
+        return StudyTask(point, parent, place, ask, beside=beside)
+
+    def _beside(self, place: Mapping[str, float], parent: Row, across: Row) -> list[object]:
+        """Return the optima of two rows, and how far a place lies from the first to the second; nothing without one."""
+        optima = [row.warm.get("optimum") for row in (parent, across)]
+        key = next((k for k, value in parent.place.items() if value != across.place[k]), None)
+        if key is None or not all(optima):
+            return []
+        return [*optima, (place[key] - parent.place[key]) / (across.place[key] - parent.place[key])]
 
     def scene_at(self, point: int) -> Scene:
         """Return the scene of a point. Raises BadInput for a combination that is none."""
         places = zip(self.axes, self.lattice.places(point), strict=True)
-        return self.scene.update({axis.key: axis.texts[k] for axis, k in places})
+        asked = {axis.key: axis.texts[k] for axis, k in places}
+        return current().kept(SCENES, KEPT, (self.key, point), lambda: self.scene.update(asked))
 
     def solve(self, task: StudyTask, parent: Row | None) -> Solution:
         """Return the answer of a task. Raises BadInput for a combination that is no scene."""
+        (search,) = self._between([task])
+        answer = between.told(self.scene_at(task.point), self.target, search) if search else None
+        return answer if answer and answer.status == "optimal" else self._alone(task, parent)
+
+    def _alone(self, task: StudyTask, parent: Row | None) -> Solution:
+        """Return the answer of a task by a solve of its own."""
         scene = self.scene_at(task.point)
-        program = registry.of(scene).program(scene, self.target)
+        program = registry.of_target(scene, self.target).program(scene, self.target)
         starts = [parent.warm if parent else {}, *task.ask["beyond"]]
         near: list[Point] = [point for data in starts if (point := rows.read(data, program))]
         return engine.solve(scene, self.target, accuracy=self.accuracy, seed=self.seed, near=near)
 
-    def _warm(self, task: StudyTask, answer: Solution) -> dict[str, object]:
-        """Return what a neighbour can start from."""
-        scene = self.scene_at(task.point)
-        return rows.written(answer.point, registry.of(scene).program(scene, self.target))
+    def _between(self, tasks: Sequence[StudyTask]) -> list[Search | None]:
+        """Return the searches between two neighbours' optima; None of a task that must be solved alone."""
+        found: list[Search | None] = [None] * len(tasks)
+        begun = [(k, each) for k, task in enumerate(tasks) if task.beside and (each := self._begun(task))]
+        for (k, _), search in zip(begun, stretch.solved([each for _, each in begun]), strict=True):
+            found[k] = search
+        return found
+
+    def _begun(self, task: StudyTask) -> stretch.Between | None:
+        """Return a task between its neighbours' optima; None where it is no scene, which it tells by itself."""
+        with contextlib.suppress(BadInput):
+            return between.begun(self.scene_at(task.point), self.target, self.accuracy, task.beside)
+        return None
 
     def place(self, row: Row) -> Mapping[str, float]:
         """Return the numbers that are swept, SI, at a row."""
@@ -222,9 +279,52 @@ class Sweep:
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task. Raises BadInput for a combination that is no scene."""
-        answer = self.solve(task, parent)
+        return self.solved_together([task])[0] or self.solved_alone(task, parent)
+
+    def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
+        """Return the rows of tasks between two neighbours' optima, whoever stands beside them; None of the others."""
+        began = time.perf_counter()
+        pairs = zip(tasks, self._between(tasks), strict=True)
+        found = [self._row_between(task, search) if search else None for task, search in pairs]
+        shared = (time.perf_counter() - began) / max(1, sum(map(bool, found)))
+        return [replace(row, seconds=shared) if row else None for row in found]
+
+    def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
+        """Return the row of a task by a solve of its own. Raises BadInput for a combination that is no scene."""
+        return self._row(task, self._alone(task, parent))
+
+    def _row_between(self, task: StudyTask, search: Search) -> Row | None:
+        """Return the row of a search that ended between two neighbours; None where it must be solved alone."""
+        best, program = search.best, search.program
+        here = between.evaluated(self.scene_at(task.point), search)
+        if best is None or here is None:
+            return None
+        optimum = stretch.optimum(search.job, program, best.x, best.certificate)
+        return Row(
+            point=task.point,
+            place=task.place,
+            parent=task.parent,
+            status="optimal",
+            reason=None,
+            design=designs.flat(here.design),
+            figures={name: _finite(value) for name, value in here.figures.items()},
+            multipliers={
+                Multiplier(each[0].objective.figure, Side(each[0].limit.name, SIDES[each[0].side])): worth_of(each)
+                for each in best.certificate.priced
+            },
+            reached=here.reached,
+            certified=True,
+            warm=_warm(best.point, program, optimum),
+        )
+
+    def _row(self, task: StudyTask, answer: Solution) -> Row:
+        """Return the row of an answer."""
+        scene = self.scene_at(task.point)
         passed = answer.certificate is not None and answer.certificate.passed
-        leads = passed and not self.cold
+        warm: Mapping[str, object] = {}
+        if passed and not self.cold:
+            program = registry.of_target(scene, self.target).program(scene, self.target)
+            warm = _warm(answer.point, program, between.optimum(scene, program, answer))
         return Row(
             point=task.point,
             place=task.place,
@@ -237,8 +337,13 @@ class Sweep:
             reached=answer.reached,
             certified=passed,
             seconds=answer.time["total_s"],
-            warm=self._warm(task, answer) if leads else {},
+            warm=warm,
         )
+
+
+def _warm(point: Point, program: Program, optimum: stretch.Optimum | None) -> dict[str, object]:
+    """Return what a neighbour can start from."""
+    return {**rows.written(point, program), **({"optimum": optimum.as_dict()} if optimum else {})}
 
 
 def multipliers(answer: Solution) -> dict[Multiplier, float]:
@@ -261,9 +366,9 @@ def _changes(line: Sequence[Row]) -> Iterator[Change]:
 
 def _gaps(line: Sequence[Row]) -> Iterator[tuple[float, float]]:
     """Yield the stretches of one number, SI, where no admissible design exists."""
-    for empty, stretch in itertools.groupby(line, key=lambda row: row.status == "infeasible"):
+    for empty, alike in itertools.groupby(line, key=lambda row: row.status == "infeasible"):
         if empty:
-            values = [next(iter(row.place.values())) for row in stretch]
+            values = [next(iter(row.place.values())) for row in alike]
             yield values[0], values[-1]
 
 
@@ -279,7 +384,7 @@ def _finite(value: float | None) -> float | None:
 
 def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: float = ACCURACY, seed: int = 0) -> Sweep:
     """Return the plan of a sweep, every value of which has been checked by itself. Raises BadInput."""
-    name = target_name(scene, target)
+    name = target_name(scene, target, families=True)
     check_numbers(accuracy, None, seed)
     named = 'Name a number and its values: {"operation.speed": "300:600:50 rpm"}'
     over = arguments.table(over, "over", "key of the scene → its values", named)
@@ -296,7 +401,7 @@ def planned(scene: Scene, over: Over, target: str | None = None, *, accuracy: fl
     ends = [{key: texts[k] for key, texts in listed.items()} for k in (0, -1)]
     base = scene.update(ends[0])
     axes = tuple(_axis(base, key, texts, ends) for key, texts in listed.items())
-    job = registry.of(base)
+    job = registry.of_target(base, name)
     job.demand(base, name)
     check_sought(base)
     return Sweep(base, name, axes, float(accuracy), int(seed), bool(job.program(base, name).single))

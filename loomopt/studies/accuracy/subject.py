@@ -321,7 +321,8 @@ class StudiedTarget:
 
     def variables(self, answer: Solution) -> dict[str, float]:
         """Return an answer's NLP variables, SI."""
-        found = self.job.values(self.program, designs.flat(answer.design))
+        named = {self.scene.full(name): value for name, value in designs.flat(answer.design).items()}
+        found = self.job.values(self.program, named)
         return {v.name: found[v.name] for v in self.program.variables}
 
     @functools.cached_property

@@ -56,7 +56,9 @@ def without_values(scene: Scene, given: Iterable[Effect]) -> dict[str, str]:
 def _checked_request(effect: Effect) -> str:
     own = f"effects.{effect.name}.NAME" if effect.many else f"effects.{effect.name}"
     keys = [f"{own}.{key}" for key in required(effect)]
-    return f"no values: set {', '.join(keys)}" if keys else f"it has no values to set: --with {effect.name}"
+    if keys or effect.many:
+        return f"no values: set {', '.join(keys) or own}"
+    return f"it has no values to set: --with {effect.name}"
 
 
 def combined(given: Mapping[Effect, Table], scene: Scene) -> Together:

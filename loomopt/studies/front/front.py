@@ -59,8 +59,8 @@ def trade(
     """Return the front of two axes as a plan, the first one sought, the second one what it costs.
 
     target: whose demands hold, None for none; maximise, minimise: axes of which the most, the least is sought; of any
-    other the end that it offers alone, or the least. ranges: axis → from, to, SI: of a number that the scene does not
-    bound they bound it. Raises BadInput.
+    other the end that it offers alone or first, or the least. ranges: axis → from, to, SI: of a number that the scene
+    does not bound they bound it. A number that the scene holds is freed as an axis. Raises BadInput.
     """
     check_numbers(accuracy, None)
     check_sought(scene)
@@ -89,7 +89,7 @@ def trade(
             )
     senses = _sense(scene, first, minimise, maximise), _sense(scene, second, minimise, maximise)
     found = Trade(
-        _bounded(scene, ranges or {}),
+        _freed(_bounded(scene, ranges or {}), axes),
         (first, second),
         senses,
         target,
@@ -106,7 +106,7 @@ def _sense(scene: Scene, name: str, minimise: Sequence[str], maximise: Sequence[
     if name in maximise:
         return "most"
     own = scene.schema.axes.get(name)
-    return own.senses[0] if own and len(own.senses) == 1 and name not in minimise else "least"
+    return own.senses[0] if own and name not in minimise else "least"
 
 
 def si(scene: Scene, given: Given) -> dict[str, tuple[float, float]]:
@@ -165,3 +165,9 @@ def _bounded(scene: Scene, ranges: Ranges) -> Scene:
         for side, end in (("min", low), ("max", high)):
             changes[f"bounds.{name}.{side}"] = f"{end!r} {unit}" if unit != SI_UNIT["number"] else end
     return scene.update(changes) if changes else scene
+
+
+def _freed(scene: Scene, axes: Sequence[str]) -> Scene:
+    """Return the scene with those of the axes free that it holds between bounds."""
+    held = [name for name in axes if (b := scene.bounds.get(name)) and not b.free and b.min < b.max]
+    return scene.free(held) if held else scene

@@ -84,7 +84,7 @@ class Next(NamedTuple):
 
     near: rows to start from, the first one its parent; again: which row it redoes; fine: whether it narrows a change;
     spare: a row whose design is admissible there, to start from where those lead nowhere; end: which end is sought, at
-    any b.
+    any b; beside: the rows on either side, and how far it lies from the first to the second.
     """
 
     b: float
@@ -93,6 +93,7 @@ class Next(NamedTuple):
     fine: bool = False
     spare: int | None = None
     end: int | None = None
+    beside: tuple[int, int, float] | None = None
 
 
 def sloped(axes: tuple[str, str]) -> Multiplier:
@@ -233,9 +234,10 @@ def _between(front: Sequence[Spot], b: float) -> Next:
     left = max((spot for spot in front if spot.b <= b), key=lambda spot: spot.b)
     right = min((spot for spot in front if spot.b > b), key=lambda spot: spot.b)
     near, other = sorted((left, right), key=lambda spot: (abs(spot.b - b), spot.point))
+    beside = left.point, right.point, (b - left.b) / (right.b - left.b)
     if near.active != other.active:
-        return Next(b, (near.point, other.point))
-    return Next(b, (near.point,), spare=None if near is left else left.point)
+        return Next(b, (near.point, other.point), beside=beside)
+    return Next(b, (near.point,), spare=None if near is left else left.point, beside=beside)
 
 
 def crossing(left: Spot, right: Spot) -> float | None:

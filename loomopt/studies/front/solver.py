@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from loomopt.base.records import lazy
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
 from loomopt.model.axes import Requested, Traded, opposite
@@ -23,8 +24,8 @@ from loomopt.solving.certificate.kkt import ActiveRow, active_set
 from loomopt.solving.certificate.verdict import Binding, Certificate
 from loomopt.solving.nlp import exchange
 from loomopt.solving.nlp.point import Settings
-from loomopt.solving.search import elastic, least_change, multistart
-from loomopt.solving.search.multistart import searched, spread, tied
+from loomopt.solving.search import elastic, least_change, multistart, stretch
+from loomopt.solving.search.multistart import rewarded, searched, spread, tied
 from loomopt.solving.search.search import Candidate, Search, judged, objectives, tried
 from loomopt.studies.front.plan import Touched, sloped
 from loomopt.studies.run import rows
@@ -140,10 +141,25 @@ class Solver:
                 search, asking = after, asking._replace(levels=2)
         return self._told(least_change.with_least_change(search), asking)
 
+    def between(self, asked: Sequence[Asking], ends: Sequence[Sequence[Any]]) -> list[Reached | None]:
+        """Return what programs of one level come to between two optima; None of one that must be solved alone.
+
+        ends: both optima as JSON data, and how far a program lies from the first to the second.
+        """
+        begun = [
+            stretch.Between(self._begun(asking), stretch.read_optimum(first), stretch.read_optimum(second), share)
+            for asking, (first, second, share) in zip(asked, ends, strict=True)
+        ]
+        searches = zip(asked, stretch.solved(begun), strict=True)
+        return [self._told(search, of) if search and self._priced(search, of) else None for of, search in searches]
+
     def _begun(self, asking: Asking) -> Search:
-        program = self.program(asking)
-        today = {**self.job.values(program, self.job.today(self.scene)), **program.today}
-        return Search(self.job, program, Settings(self.accuracy), today)
+        return Search(self.job, self.program(asking), Settings(self.accuracy), self._today)
+
+    @lazy
+    def _today(self) -> Mapping[str, float]:
+        """Today's machine by variable, SI."""
+        return {**self.job.values(self.base, self.job.today(self.scene)), **self.base.today}
 
     def _searched(
         self,
@@ -160,7 +176,7 @@ class Solver:
         if wide and search.passed:
             search = self._spread(search)
         if not (search.passed or wide is None):
-            search = searched(search, None, 0, (), None)
+            search = rewarded(search, None, 0, (), None) or searched(search, None, 0, (), None)
         return search
 
     def _beside(self, search: Search, near: Sequence[Mapping[str, Any]]) -> Search:
@@ -192,7 +208,7 @@ class Solver:
             last = search.candidates[-1].point.status if search.candidates else "no start assembles"
             return Reached(status, "limits clash: no admissible design was found" if search.clashes else last)
         program = search.program
-        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x))
+        here = report.evaluation(self.scene, self.job, self.base, self.job.design(program, best.x), every=True)
         held = self._held(search, best, asking)
         certified = best.certificate.passed and here.admissible and not held
         reason = held or "; ".join(best.certificate.reasons) or "a limit does not hold on independent evaluation"
@@ -204,11 +220,13 @@ class Solver:
             "axes": axes,
             "held": list(objectives(program, best.x)[: self.held]),
         }
+        optimum = stretch.optimum(self.job, program, best.x, best.certificate) if asking[::2] == (0, 1) else None
+        told |= {"optimum": optimum.as_dict()} if optimum else {}
         return Reached(
             status,
             None if certified else reason,
             dict(here.design),
-            dict(here.figures),
+            dict(here.figures.items()),
             self._multipliers(best, axes, asking),
             dict(here.reached),
             told,

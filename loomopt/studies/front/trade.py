@@ -25,9 +25,9 @@ from loomopt.solving.answer.solution import Solution, Words
 from loomopt.studies.front import plan, solver
 from loomopt.studies.front.plan import ENDS, FrontScale, Next
 from loomopt.studies.front.solver import Asking, Reached, Solver
-from loomopt.studies.run.rows import Findings, Row, StudyTask
+from loomopt.studies.run.rows import Findings, Row, StudyTask, enough_together
 
-PLAN = 5
+PLAN = 6
 """Raised when the plan or what a row holds changes: rows of another plan are other rows."""
 POINTS = 40
 SEARCHED = 1
@@ -117,6 +117,8 @@ class Trade:
         whose = self.target or self.scene.schema.default_target
         first = {level.figure for level in base.objectives[: self.solver.held]}
         held = [f"{_demand(words, goal)}{' or as near as it comes' * (goal.figure in first)}" for goal in base.goals]
+        aimed = {goal.figure for goal in base.goals}
+        held += [f"least {level.figure}" for level in base.objectives[: self.solver.held] if level.figure not in aimed]
         try:
             wanted = job.program(self.scene, whose).goals
         except BadInput:
@@ -173,7 +175,8 @@ class Trade:
         found = plan.following(rows, scale, self.points)
         wide = _spread(len(found)) if len(rows) == len(ENDS) else set()
         first = len(rows)
-        return [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
+        tasks = [self._task(first + k, each, scale, by_point, k in wide) for k, each in enumerate(found)]
+        return enough_together(tasks)
 
     def _task(self, point: int, each: Next, scale: FrontScale, rows: Mapping[int, Row], wide: bool) -> StudyTask:
         others = [rows[other].warm for other in each.near[1:]]
@@ -184,7 +187,13 @@ class Trade:
         if each.end is not None:
             return StudyTask(point, each.near[0], {}, {**ask, "end": each.end}, length)
         ask |= {"spare": [rows[each.spare].warm]} if each.spare is not None else {}
-        return StudyTask(point, each.near[0], {self.axes[1]: scale.figure(1, each.b)}, ask, length)
+        place = {self.axes[1]: scale.figure(1, each.b)}
+        if wide or each.beside is None:
+            return StudyTask(point, each.near[0], place, ask, length)
+        *ends, share = each.beside
+        optima = [rows[end].warm.get("optimum") for end in ends]
+        beside = [*optima, share] if all(optima) else []
+        return StudyTask(point, each.near[0], place, ask, length, beside)
 
     @property
     def sizes(self) -> tuple[float, float]:
@@ -257,31 +266,46 @@ class Trade:
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task; it depends on nothing but its arguments."""
+        return self.solved_together([task])[0] or self.solved_alone(task, parent)
+
+    def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
+        """Return the rows of tasks between two neighbours' optima, whoever stands beside them; None of the others."""
         began = time.perf_counter()
-        found, _, place = self.reach(task, parent)
-        told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near")}}
-        return Row(
-            task.point,
-            place,
-            task.parent,
-            found.status,
-            found.reason,
-            designs.flat(found.design),
-            found.figures,
-            found.multipliers,
-            found.reached,
-            found.certified,
-            time.perf_counter() - began,
-            told,
-        )
+        found = self._beside(tasks)
+        shared = (time.perf_counter() - began) / max(1, sum(map(bool, found)))
+        return [_row(task, met, shared) if met else None for task, met in zip(tasks, found, strict=True)]
+
+    def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
+        """Return the row of a task by solves of its own."""
+        began = time.perf_counter()
+        met = self._alone(task, parent)
+        return _row(task, met, time.perf_counter() - began)
 
     def reach(self, task: StudyTask, parent: Row | None) -> Met:
         """Return what a task comes to."""
+        (found,) = self._beside([task])
+        return found or self._alone(task, parent)
+
+    def _beside(self, tasks: Sequence[StudyTask]) -> list[Met | None]:
+        """Return what tasks between two neighbours' optima come to; None of one that must be solved alone."""
+        places = [k for k, task in enumerate(tasks) if task.beside]
+        asked = [self._asking(tasks[k]) for k in places]
+        ends = [tasks[k].beside for k in places]
+        found: list[Met | None] = [None] * len(tasks)
+        for k, asking, reached in zip(places, asked, self.solver.between(asked, ends), strict=True):
+            met = reached and _kept(reached, tasks[k].ask["held"])
+            found[k] = Met(met, asking, dict(tasks[k].place)) if met and met.certified else None
+        return found
+
+    def _asking(self, task: StudyTask) -> Asking:
+        return Asking(0, (self._cap(0), self.solver.axes[1].value(task.place[self.axes[1]])))
+
+    def _alone(self, task: StudyTask, parent: Row | None) -> Met:
+        """Return what a task comes to by solves of its own."""
         near = [*([parent.warm] if parent else []), *task.ask.get("also", ())]
         if "end" in task.ask:
             return self._end(int(task.ask["end"]), near)
-        cap = self.solver.axes[1].value(task.place[self.axes[1]])
-        asking = Asking(0, (self._cap(0), cap))
+        asking = self._asking(task)
         found = self.solver.solve(asking, near, bool(task.ask["wide"]), task.ask.get("spare", ()))
         return Met(_kept(found, task.ask["held"]), asking, dict(task.place))
 
@@ -324,6 +348,26 @@ class Trade:
         apart = [abs(known.get(name, math.inf) - found.warm["axes"][name]) for name in self.axes]
         same = all(a <= SAME_OBJECTIVE * size for a, size in zip(apart, self.sizes, strict=True))
         return Met(again, asking, {}) if same else Met(found, Asking(1, (self._cap(0), None)), {})
+
+
+def _row(task: StudyTask, met: Met, seconds: float) -> Row:
+    """Return the row of what a task came to."""
+    found, _, place = met
+    told = {**found.warm, **{name: task.ask.get(name) for name in ("again", "fine", "near")}}
+    return Row(
+        task.point,
+        place,
+        task.parent,
+        found.status,
+        found.reason,
+        designs.flat(found.design),
+        found.figures,
+        found.multipliers,
+        found.reached,
+        found.certified,
+        seconds,
+        told,
+    )
 
 
 def _demand(words: Words, goal: Goal) -> str:

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -151,7 +151,9 @@ class StudyTask:
     """One point to be solved.
 
     place: as of its row; parent: the point, of an earlier batch, that it starts warm from, None for a cold start;
-    ask: what else is asked, as JSON data; length: how long it takes beside others of its batch, roughly.
+    ask: what else is asked, as JSON data; length: how long it takes beside others of its batch, roughly; beside:
+    optima of two neighbours as JSON data and how far it lies from the first to the second, where it may be solved
+    between them along with others of its batch, and comes to the same row as alone.
     """
 
     point: int
@@ -159,6 +161,17 @@ class StudyTask:
     place: Mapping[str, float]
     ask: Mapping[str, Any] = field(default_factory=dict)
     length: int = 1
+    beside: Sequence[Any] = ()
+
+
+def enough_together(tasks: Sequence[StudyTask]) -> list[StudyTask]:
+    """Return tasks; where fewer may be solved together than it takes, each by itself."""
+    enough = sum(bool(task.beside) for task in tasks) >= FEWEST
+    return list(tasks) if enough else [replace(task, beside=()) for task in tasks]
+
+
+FEWEST = 4
+"""Tasks of a batch from which on a pass over all of them costs less than solves of their own."""
 
 
 class Study(Protocol):
@@ -173,6 +186,21 @@ class Study(Protocol):
 
     def solved(self, task: StudyTask, parent: Row | None) -> Row:
         """Return the row of a task, from its arguments and from nothing else."""
+
+
+Work = tuple[StudyTask, Row | None]
+"""A task with the row of its parent."""
+
+
+@runtime_checkable
+class Together(Protocol):
+    """A study whose tasks may be solved along with others."""
+
+    def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
+        """Return the rows of tasks, whoever stands beside them; None of one that must be solved alone."""
+
+    def solved_alone(self, task: StudyTask, parent: Row | None) -> Row:
+        """Return the row of a task that must."""
 
 
 class Change(NamedTuple):

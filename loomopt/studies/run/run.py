@@ -3,6 +3,8 @@
 import contextlib
 import functools
 import importlib
+import json
+import math
 import multiprocessing
 import os
 import pickle
@@ -19,7 +21,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from loomopt.base import arguments
 from loomopt.base.errors import BadInput, blamed, refusal, shown
 from loomopt.model.session import working
-from loomopt.studies.run.rows import Row, Study, StudyTask, agree
+from loomopt.studies.run.rows import Row, Study, StudyTask, Together, Work, agree
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -157,9 +159,6 @@ def dask(address: str) -> Iterator[Executor]:
 if TYPE_CHECKING:
     from loomopt.studies.run.store import Store
 
-    Work = tuple[StudyTask, Row | None]
-    """A task with the row of its parent."""
-
 OnRow = Callable[[Row], None]
 Making = Callable[[], Executor]
 """Makes an executor, again where the one before has broken."""
@@ -239,19 +238,32 @@ KILLED = "KilledWorker"
 DIED = f"the process that solved it died {MOST_DEATHS} times: out of memory?"
 
 
-def solved(study: bytes, task: "StudyTask", parent: "Row | None") -> str:
-    """Return the row of a task as JSON text; what goes wrong is a failed row with its reason."""
-    import json
-
+def solved(study: bytes, works: "Sequence[Work]") -> list[str]:
+    """Return the rows of tasks as JSON text; what goes wrong is a failed row with its reason."""
     with working():
-        began = time.perf_counter()
-        try:
-            row = _unpickled(study).solved(task, parent)
-        except (Exception, SystemExit) as error:
-            told = blamed(error)
-            why = "; ".join([f"{told}" or type(told).__name__, *getattr(told, "__notes__", ())])
-            row = _failed(task, " ".join(why.split()), time.perf_counter() - began)
-        return json.dumps(row.as_dict())
+        known = _unpickled(study)
+        rows = _together(known, [task for task, _ in works])
+        pairs = zip(works, rows, strict=True)
+        return [json.dumps((row or _solved(known, *work, alone=any(rows))).as_dict()) for work, row in pairs]
+
+
+def _together(study: "Study", tasks: "Sequence[StudyTask]") -> "Sequence[Row | None]":
+    """Return the rows of tasks that can be solved together, None of each other one."""
+    if len(tasks) > 1 and isinstance(study, Together):
+        # What fails tells so where it is solved by itself.
+        with contextlib.suppress(Exception, SystemExit):
+            return study.solved_together(tasks)
+    return [None] * len(tasks)
+
+
+def _solved(study: "Study", task: "StudyTask", parent: "Row | None", alone: bool) -> "Row":
+    began = time.perf_counter()
+    try:
+        return study.solved_alone(task, parent) if alone and isinstance(study, Together) else study.solved(task, parent)
+    except (Exception, SystemExit) as error:
+        told = blamed(error)
+        why = "; ".join([f"{told}" or type(told).__name__, *getattr(told, "__notes__", ())])
+        return _failed(task, " ".join(why.split()), time.perf_counter() - began)
 
 
 @functools.lru_cache(maxsize=4)
@@ -261,17 +273,17 @@ def _unpickled(study: bytes) -> "Study":
 
 
 def _unpacked_row(text: str) -> "Row":
-    import json
-
-    from loomopt.studies.run.rows import Row
-
     return Row.from_dict(json.loads(text))
 
 
 def _failed(task: "StudyTask", reason: str, seconds: float = 0.0) -> "Row":
-    from loomopt.studies.run.rows import Row
-
     return Row(task.point, task.place, task.parent, "failed", reason, seconds=seconds)
+
+
+Group = list[Work]
+"""Tasks that are handed out together."""
+TOGETHER = 32
+"""Tasks of a group: lost with Ctrl-C, and long enough for what they share."""
 
 
 class Crew:
@@ -284,7 +296,7 @@ class Crew:
         self.payload = pickle.dumps(study)
         self.make = None if isinstance(given, Executor) else given
         self.executor = given if isinstance(given, Executor) else None
-        self.running: dict[Future[str], Work] = {}
+        self.running: dict[Future[list[str]], Group] = {}
         self.deaths: Counter[int] = Counter()
 
     def __enter__(self) -> "Crew":
@@ -307,46 +319,54 @@ class Crew:
         Workers begin with the longest tasks, so that they end together.
         """
         if self.executor is None and self.make is None:
-            for task, parent in tasks:
-                kept(_unpacked_row(solved(self.payload, task, parent)))
+            for group in _groups(tasks, TOGETHER):
+                for text in solved(self.payload, group):
+                    kept(_unpacked_row(text))
             return
         try:
-            for row in self._rows(deque(sorted(tasks, key=lambda work: -work[0].length))):
+            several = max(1, self._most() // 2)
+            groups = _groups(tasks, min(TOGETHER, max(1, math.ceil(len(tasks) / several))))
+            for row in self._rows(deque(sorted(groups, key=lambda group: -sum(task.length for task, _ in group)))):
                 kept(row)
         except KeyboardInterrupt:
             for future in self.running:
                 if future.done() and not future.cancelled() and future.exception() is None:
-                    kept(_unpacked_row(future.result()))
+                    for text in future.result():
+                        kept(_unpacked_row(text))
             raise
 
-    def _rows(self, waiting: "deque[Work]") -> "Iterator[Row]":
+    def _most(self) -> int:
+        """Return how many groups of tasks the executor is given at a time."""
+        return int(getattr(self._made(), "in_flight", IN_FLIGHT))
+
+    def _rows(self, waiting: "deque[Group]") -> "Iterator[Row]":
         """Yield the rows of tasks as they come.
 
         Where a pool broke nobody knows which task was to blame: each that was at work then has a new pool to itself.
         """
-        suspects: deque[Work] = deque()
+        suspects: deque[Group] = deque()
         while waiting or suspects or self.running:
             lost = self._hand_out(suspects or waiting, alone=bool(suspects))
             for future in wait(self.running, return_when=FIRST_COMPLETED).done if self.running else ():
-                work, error = self.running.pop(future), future.exception()
+                group, error = self.running.pop(future), future.exception()
                 if error is None:
-                    yield _unpacked_row(future.result())
+                    yield from map(_unpacked_row, future.result())
                 elif isinstance(error, BrokenExecutor) and self.make:
-                    lost.append(work)
+                    lost += group
                 elif type(error).__name__ == KILLED:
-                    yield _failed(work[0], DIED)
+                    yield from (_failed(task, DIED) for task, _ in group)
                 else:
                     raise error
             if lost:
-                lost += self.running.values()
+                lost += [work for group in self.running.values() for work in group]
                 self.running.clear()
                 self._leave(finished=False)
                 self.deaths.update(task.point for task, _ in lost)
                 yield from (_failed(task, DIED) for task, _ in lost if self.deaths[task.point] >= MOST_DEATHS)
-                suspects.extend(work for work in lost if self.deaths[work[0].point] < MOST_DEATHS)
+                suspects.extend([work] for work in lost if self.deaths[work[0].point] < MOST_DEATHS)
 
-    def _hand_out(self, waiting: "deque[Work]", alone: bool) -> "list[Work]":
-        """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
+    def _made(self) -> Executor:
+        """Return the executor, made where there is none yet."""
         if self.executor is None and self.make:
             made: object = self.make()
             if not isinstance(made, Executor):
@@ -354,13 +374,26 @@ class Crew:
                 raise refusal("what it makes is no executor", "", "executor", made, "any of concurrent.futures", remedy)
             self.executor = made
         assert self.executor
-        most = 1 if alone else getattr(self.executor, "in_flight", IN_FLIGHT)
+        return self.executor
+
+    def _hand_out(self, waiting: "deque[Group]", alone: bool) -> "list[Work]":
+        """Give the executor as many tasks as it wants, or one alone; return what a broken one has not taken."""
+        executor, most = self._made(), 1 if alone else self._most()
         while waiting and len(self.running) < most:
-            task, parent = work = waiting.popleft()
+            group = waiting.popleft()
             try:
-                self.running[self.executor.submit(solved, self.payload, task, parent)] = work
+                self.running[executor.submit(solved, self.payload, group)] = group
             except BrokenExecutor:
                 if not self.make:
                     raise
-                return [work]
+                return group
         return []
+
+
+def _groups(works: "Sequence[Work]", most: int) -> "list[Group]":
+    """Return tasks in groups: so many at most of those that take less together, each other one by itself."""
+    several = [work for work in works if work[0].beside]
+    return [
+        *([work] for work in works if not work[0].beside),
+        *(several[begin : begin + most] for begin in range(0, len(several), most)),
+    ]

@@ -148,6 +148,15 @@ class Store:
         with self._told(), self._transaction():
             self._file.execute("INSERT OR IGNORE INTO study VALUES (?, ?)", (key, json.dumps(told)))
 
+    def studies(self) -> dict[str, dict[str, Any]]:
+        """Return what is said of each study that is there, by key. Raises BadInput for one that was damaged."""
+        with self._told():
+            found = self._file.execute("SELECT key, told FROM study ORDER BY rowid").fetchall()
+        read = {key: _read_told(told) for key, told in found}
+        if not all(read.values()):
+            raise BadInput("what it says of a study is damaged", file=str(self.path), key="store", remedy=_OTHER)
+        return read
+
     def rows(self, key: str) -> list[Row]:
         """Return the rows of a study that are there. Raises BadInput for one that was damaged."""
         with self._told():
@@ -176,6 +185,14 @@ class Store:
         marks = ", ".join("?" * (2 + len(COLUMNS)))
         with self._told(), self._transaction():
             self._file.execute(f"INSERT INTO row VALUES ({marks})", (key, *values, _checksum(key, values)))
+
+
+def _read_told(told: object) -> dict[str, Any]:
+    """Return what a store says of a study; {} where it is not as it was written."""
+    with contextlib.suppress(ValueError, RecursionError):
+        found = json.loads(told) if isinstance(told, str) else {}
+        return found if isinstance(found, dict) else {}
+    return {}
 
 
 def _checksum(key: str, cells: Sequence[object]) -> str:

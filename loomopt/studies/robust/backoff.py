@@ -1,0 +1,426 @@
+"""Back-off: an optimum whose limits are tightened by so many standard deviations of their own figures.
+
+The standard deviations are those of the optimum that they lead to: a fixed point. What it buys is sampled: machines as
+they are made, judged by the limits as they stand.
+"""
+
+import functools
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt.base import arguments
+from loomopt.base.errors import refusal
+from loomopt.base.records import Frozen
+from loomopt.jobs import registry
+from loomopt.maths import normal
+from loomopt.model.session import working
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import SIDES, SIGNS, Finding, Price, Robust, Solution, Words, Yield
+from loomopt.solving.options import check_sought, target_name
+from loomopt.studies.robust import margins as own_margins
+from loomopt.studies.robust.margins import Margin, check_crossings, margins, share
+from loomopt.studies.tolerance.plan import SCRAMBLES, Plan, planned
+from loomopt.studies.tolerance.study import ALL, Sums, summed, yielded
+
+SAMPLES = 2**15
+"""Machines that are drawn to verify a yield."""
+PASSES, SETTLED = 40, 1e-10
+"""Solves until standard deviations are those of the design, and the share of a back-off that may then be left."""
+SEARCHES = 3
+"""Times that a search from scratch may lead to another optimum, with standard deviations of its own."""
+MOST_SIGMAS = 12.0
+"""Standard deviations that may be asked for; nothing is lost beyond 8."""
+TRIALS, MOST_BESIDE = 12, 0.5
+"""Sampled yields that are looked at on the way to one that is asked for, and how far beyond it one may be, in standard
+errors."""
+ROOT, ROOTS = 1e-12, 60
+"""Last step to a linear yield's root, in standard deviations, and steps at most."""
+
+
+Solve = Callable[..., Solution]
+"""solve(near=…, backed_off=…): the answer as it is asked for, but for its start and the tightening."""
+
+
+class Pass(NamedTuple):
+    """An answer, what its limits leave, and the back-off that it was solved with: standard deviations of a pass ago."""
+
+    answer: Solution
+    plan: Plan
+    margins: tuple[Margin, ...]
+    sigmas: float = 0.0
+    passes: int = 0
+    frozen: Mapping[str, float] = Frozen()
+    """Half widths, m, of numbers whose class would flip from pass to pass."""
+    linear: float | None = None
+    """Standard deviations that the linear joint normal asks for, where a yield is."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for: so many sigmas, or a yield; samples, seed: of the machines that are drawn."""
+
+    scene: Scene
+    target: str
+    sigmas: float | None = None
+    share: float | None = None
+    samples: int = SAMPLES
+    seed: int = 0
+
+    def plan(self, answer: Solution, frozen: Mapping[str, float]) -> Plan:
+        """Return the study of an answer's machines; frozen: half widths, m, of numbers whose class would flip."""
+        given = self.scene.document["tolerances"]
+        own = {name: {key: value for key, value in given[name].items() if key != "class"} for name in frozen}
+        made = {f"tolerances.{name}": {**own[name], "plus_minus": f"{half!r} m"} for name, half in frozen.items()}
+        scene = self.scene.update(made) if made else self.scene
+        return planned(scene, designs.flat(answer.design), self.target, self.samples, self.seed)
+
+
+def asked(scene: Scene, target: str | None, sigmas: float | None, least: float | None, seed: int = 0) -> Asked:
+    """Return what is asked for, checked. Raises BadInput."""
+    name = target_name(scene, target)
+    check_sought(scene, "back-off")
+    if sigmas is not None and least is not None:
+        remedy = "Give one of them"
+        raise refusal("--robust and --yield say the same twice", "", "robust", sigmas, remedy=remedy)
+    if sigmas is not None:
+        allowed = f"more than 0, at most {MOST_SIGMAS:g} standard deviations"
+        if not 0.0 < arguments.number(sigmas, "robust", allowed, "Write --robust 3") <= MOST_SIGMAS:
+            raise refusal("there is no such back-off", "", "robust", sigmas, allowed, "Write --robust 3")
+    if least is not None:
+        allowed = "a share of all machines between 0 and 1"
+        if not 0.0 < arguments.number(least, "yield_", allowed, "Write --yield 0.99") < 1.0:
+            raise refusal("there is no such yield", "", "yield_", least, allowed, "Write --yield 0.99")
+    planned(scene, None, name)
+    return Asked(scene, name, sigmas, least, seed=seed)
+
+
+@working()
+def solved(
+    asked: Asked, solve: Solve, last: Solve | None = None, on_step: Callable[[str], None] | None = None
+) -> Solution:
+    """Return the optimum whose limits are backed off; last: the solve whose answer is told, `solve` without it.
+
+    Where there is none, an answer that says why. Raises BadInput where a figure jumps within the back-off.
+    """
+    began, spent, say = time.perf_counter(), Counter[str](), on_step or (lambda text: None)
+
+    def timed(of: Solve) -> Solve:
+        def noted(answer: Solution) -> Solution:
+            spent.update(answer.time)
+            return answer
+
+        return lambda **how: noted(of(**how))
+
+    solve, last = timed(solve), timed(last or solve)
+    found = _solved(asked, solve, last, say)
+    return replace(found, time={**spent, "total_s": time.perf_counter() - began})
+
+
+def _solved(asked: Asked, solve: Solve, last: Solve, say: Callable[[str], None]) -> Solution:
+    nominal, solves = solve(), (solve, last)
+    if nominal.status != "optimal":
+        return nominal
+    plan = asked.plan(nominal, {})
+    found = margins(plan)
+    start = Pass(nominal, plan, found)
+    if not any(each.sigma for each in found if not each.fixed):
+        problem = "no limit of a figure moves with what [tolerances] names, so that there is nothing to back off"
+        raise refusal(problem, asked.scene.origin, "tolerances", remedy="Give more numbers a tolerance, or take it off")
+    say("drawing machines of the optimum")
+    before = _yields(plan)
+    if asked.sigmas is not None:
+        ended = _searched(asked, solves, start, lambda at: asked.sigmas or 0.0, say)
+    else:
+        ended = _yielding(asked, solves, start, before, say)
+    if isinstance(ended, Solution):
+        return ended
+    say("drawing machines")
+    return _told(asked, ended, nominal, _yields(ended.plan), before)
+
+
+Sigmas = Callable[[Pass], float]
+"""How many standard deviations a design's limits are to be backed off by."""
+
+
+def _searched(
+    asked: Asked, solves: tuple[Solve, Solve], start: Pass, sigmas: Sigmas, say: Callable[[str], None]
+) -> Pass | Solution:
+    """Return the fixed point that a search from scratch leads to as well, or why there is none."""
+    here, (solve, last) = start, solves
+    for _ in range(SEARCHES):
+        settled = _settled(asked, solve, here, sigmas, say)
+        if isinstance(settled, Solution):
+            return settled
+        here = settled
+        say("looking for better designs as far from their limits")
+        again = last(backed_off=tightened(here))
+        if again.status != "optimal":
+            return _in_the_way(asked, again, here.sigmas)
+        same = _same(again, here.answer)
+        here = here._replace(answer=again, plan=asked.plan(again, here.frozen))
+        if same:
+            return here
+        here = here._replace(margins=margins(here.plan))
+    return _unsettled(asked, here)
+
+
+def _same(one: Solution, other: Solution) -> bool:
+    """Say whether two answers are one: every figure that is sought to the certificate's accuracy."""
+    names = [level.objective for level in one.certificate.levels] if one.certificate else []
+    pairs = [(one.figures.get(name) or 0.0, other.figures.get(name) or 0.0) for name in names]
+    size = max((abs(value) for pair in pairs for value in pair), default=0.0)
+    return all(abs(a - b) <= SAME * size for a, b in pairs)
+
+
+SAME = 1e-8
+"""Share of the largest figure sought by which two answers' figures may differ and be one."""
+
+
+def _settled(asked: Asked, solve: Solve, here: Pass, sigmas: Sigmas, say: Callable[[str], None]) -> Pass | Solution:
+    """Return the pass whose standard deviations are those of its own design."""
+    before: dict[tuple[str, int], float] = {}
+    halves: dict[str, list[float]] = {}
+    for number in range(PASSES):
+        say(f"backing off, pass {number + 1}")
+        here = here._replace(sigmas=sigmas(here))
+        if math.isnan(here.sigmas):
+            return _out_of_reach(asked, here)
+        check_crossings(here.plan, here.sigmas)
+        narrow = own_margins.bands(here.margins, here.sigmas, Words(asked.scene))
+        if narrow:
+            return _infeasible(asked, here.answer, f"{narrow} on both sides: {here.sigmas:.6g} sigma each")
+        off = tightened(here)
+        size = max(off.values(), default=0.0)
+        if before and all(abs(off[key] - before.get(key, 0.0)) <= SETTLED * (off[key] or size) for key in off):
+            return here
+        answer = solve(near=[here.answer.point] if here.answer.point else [], backed_off=off)
+        if answer.status != "optimal":
+            return _in_the_way(asked, answer, here.sigmas)
+        plan, frozen = asked.plan(answer, here.frozen), dict(here.frozen)
+        for name, made in plan.made.items():
+            if made.standard:
+                widths = halves.setdefault(made.number, [])
+                if plan.halves[name] in widths[:-1] and plan.halves[name] != widths[-1]:
+                    # A class that flips back and forth stays at its wider half.
+                    frozen[made.number] = max(widths)
+                widths.append(plan.halves[name])
+        plan = asked.plan(answer, frozen) if frozen != here.frozen else plan
+        here = here._replace(answer=answer, plan=plan, margins=margins(plan), frozen=Frozen(frozen))
+        here, before = here._replace(passes=here.passes + 1), off
+    return _unsettled(asked, here)
+
+
+def tightened(here: Pass) -> dict[tuple[str, int], float]:
+    """Return by how much each side is tightened, SI."""
+    return {each.key: here.sigmas * each.sigma for each in here.margins if not each.fixed}
+
+
+# A yield that is asked for.
+
+
+def _yielding(
+    asked: Asked, solves: tuple[Solve, Solve], start: Pass, before: Mapping[str, Yield], say: Callable[[str], None]
+) -> Pass | Solution:
+    """Return the back-off whose sampled yield is no less than asked for, and hardly more."""
+    least, solve = asked.share or 0.0, solves[0]
+    if before[ALL].value >= least:
+        return start
+    here = _settled(asked, solve, start, lambda at: linear(at.margins, least, at.sigmas), say)
+    if isinstance(here, Solution):
+        return here
+    passes = here = here._replace(linear=here.sigmas)
+    low, high = (0.0, before[ALL].value), (math.inf, 1.0)
+    for _ in range(TRIALS):
+        say(f"drawing machines at {passes.sigmas:.6g} sigma")
+        found = _yields(passes.plan)[ALL]
+        here = passes if found.value >= least else here
+        if found.value >= least:
+            high = min(high, (passes.sigmas, found.value))
+        else:
+            low = max(low, (passes.sigmas, found.value))
+        grain = max(MOST_BESIDE * found.se, 2.0 / asked.samples)
+        if 0.0 <= found.value - least <= grain or high[0] - low[0] <= SETTLED:
+            break
+        following = _between(passes, low, high, found.value, least)
+        if following > MOST_SIGMAS:
+            return _out_of_reach(asked, passes)
+        settled = _settled(asked, solve, passes, lambda at, k=following: k, say)  # type: ignore[misc]
+        if isinstance(settled, Solution):
+            return settled
+        passes = settled
+    if math.isinf(high[0]):
+        return _unsettled(asked, passes)
+    return _searched(asked, solves, here, lambda at: high[0], say)
+
+
+def _between(at: Pass, low: tuple[float, float], high: tuple[float, float], found: float, least: float) -> float:
+    """Return where a yield is likely to be what is asked for: by the linear one's slope, within what is known."""
+    step = 1e-4
+    slope = _scored(share(at.margins, at.sigmas + step, at.sigmas)) - _scored(share(at.margins, at.sigmas, at.sigmas))
+    # A little beyond it, for what is found must be no less.
+    following = at.sigmas + (_scored(least) - _scored(found)) / (slope / step or 1.0) * 1.02
+    if low[0] < following < high[0]:
+        return following
+    return (low[0] + high[0]) / 2 if math.isfinite(high[0]) else low[0] + 0.1
+
+
+def _scored(value: float) -> float:
+    """Return the value below which a share of the standard normal distribution lies, for all but none and all."""
+    return float(normal.quantile(np.array([min(max(value, 1e-12), 1 - 1e-12)]))[0])
+
+
+def linear(found: Sequence[Margin], least: float, at: float) -> float:
+    """Return of how many standard deviations the linear joint normal yield is `least`; no number where of none.
+
+    at: of how many it is now. By secants of what a normal distribution has below it, nearly straight in them.
+    """
+
+    def short(sigmas: float) -> float:
+        return _scored(share(found, sigmas, at)) - _scored(least)
+
+    if short(0.0) >= 0.0:
+        return 0.0
+    if short(MOST_SIGMAS) < 0.0:
+        return math.nan
+    low, high, here = 0.0, MOST_SIGMAS, at or 2.0
+    before, value_before = here + 0.01, short(here + 0.01)
+    for _ in range(ROOTS):
+        value = short(here)
+        low, high = (here, high) if value < 0.0 else (low, here)
+        slope = (value - value_before) / (here - before)
+        following = here - value / slope if slope else low
+        if not low < following < high:
+            following = (low + high) / 2
+        if abs(following - here) <= ROOT:
+            return following
+        before, value_before, here = here, value, following
+    return here
+
+
+def _yields(plan: Plan) -> dict[str, Yield]:
+    """Return the share of machines that hold, by limit and of all, drawn with the plan's seed."""
+    sums: list[Sums] = list(map(functools.partial(summed, plan, {}), range(SCRAMBLES)))
+    return {name: yielded([each.holding[name] / each.machines for each in sums]) for name in sums[0].holding}
+
+
+# What is told.
+
+
+def _told(
+    asked: Asked, ended: Pass, nominal: Solution, yields: Mapping[str, Yield], before: Mapping[str, Yield]
+) -> Solution:
+    """Return the answer with its limits as the scene has them, the back-off beside each."""
+    scene, answer, off = asked.scene, ended.answer, tightened(ended)
+    words = Words(scene)
+    here = report.evaluated(scene, registry.of(scene), asked.target, ended.plan.full)
+    corners = dict.fromkeys(each.name for each in ended.margins if each.corner and not each.fixed)
+    robust = Robust(
+        ended.sigmas,
+        asked.share,
+        ended.linear,
+        dict(yields),
+        nominal,
+        dict(before),
+        ended.plan.unjudged + tuple(ended.plan.accepted),
+        tuple(corners),
+        ended.passes,
+        asked.samples,
+        asked.seed,
+    )
+    by_name = {name: by for (name, _), by in off.items()}
+    limits = tuple(replace(each, backed_off=by_name.get(each.name, 0.0)) for each in here.limits)
+    binding = tuple(_priced(words, price, off) for price in answer.binding)
+    found = replace(answer, limits=limits, reached=here.reached, scene=scene, binding=binding, robust=robust)
+    said = " ".join(_said(scene, found, robust))
+    message = answer.message.replace(report.stops(answer.binding), report.stops(binding))
+    explanation = " ".join(text for text in (answer.explanation, said) if text)
+    return replace(found, message=f"{message} {said}", explanation=explanation)
+
+
+def _priced(words: Words, price: Price, off: Mapping[tuple[str, int], float]) -> Price:
+    """Return a price of a limit as the scene has it, the back-off apart."""
+    signs = {word: sign for sign, word in SIDES.items()}
+    sign = signs[price.side]
+    by = off.get((price.limit, sign), 0.0)
+    if not by:
+        return price
+    value = price.value + sign * by
+    stands = f"{price.limit} {SIGNS[sign]} {words.shown(price.limit, value)}"
+    text = f"{stands}, backed off by {words.shown(price.limit, by, 4)}"
+    return replace(price, value=value, text=text, backed_off=by)
+
+
+def _said(scene: Scene, answer: Solution, robust: Robust) -> list[str]:
+    """Return what back-off costs and what it buys, as sentences."""
+    words, told = Words(scene), list[str]()
+    for name, change in robust.cost(answer).items():
+        then = robust.nominal.figures[name] or 0.0
+        size = max(abs(value or 0.0) for figure, value in answer.figures.items() if words.si(figure) == words.si(name))
+        if abs(change) > SAME * size:
+            share_of = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > SAME * size else ""
+            text = f"{name} {words.shown(name, answer.figures[name] or 0.0, 9)} instead of {words.shown(name, then, 9)}"
+            told.append(f"{text}{share_of}")
+    now, was = robust.yields[ALL], robust.nominal_yields[ALL]
+    costs = f"It costs {', '.join(told)}." if told else "It costs nothing of what is sought."
+    found = [
+        f"That is with each limit backed off by {robust.sigmas:.6g} sigma of its own figure.",
+        costs,
+        f"All limits hold on {_percent(now)} of the machines instead of {100 * was.value:.4g} %.",
+    ]
+    if robust.kept:
+        found.append(f"Nothing backs off {', '.join(robust.kept)}: an equality or a goal, kept as it is.")
+    if robust.corners:
+        found.append(
+            f"At the design {', '.join(robust.corners)} bends: its sigma is of the steeper slope in each number."
+        )
+    return found
+
+
+def _percent(share_of: Yield) -> str:
+    return f"{100 * share_of.value:.6g} % (standard error {100 * share_of.se:.2g} %)"
+
+
+def _infeasible(asked: Asked, answer: Solution, why: str) -> Solution:
+    """Return that no design keeps its limits with the back-off."""
+    message = f"No admissible design keeps clear of its limits as asked: {why}."
+    return replace(_as_stands(asked, answer, "infeasible"), message=message)
+
+
+def _in_the_way(asked: Asked, answer: Solution, sigmas: float) -> Solution:
+    """Return an answer that is no optimum with what it was asked for."""
+    message = f"With limits backed off by {sigmas:.6g} sigma: {answer.message}"
+    return replace(answer, scene=asked.scene, limits=_limits(asked, answer), message=message)
+
+
+def _as_stands(asked: Asked, answer: Solution, status: str) -> Solution:
+    return replace(
+        answer, status=status, limits=_limits(asked, answer), scene=asked.scene, certificate=None, binding=()
+    )
+
+
+def _limits(asked: Asked, answer: Solution) -> tuple[Finding, ...]:
+    """Return an answer's limits as the scene has them."""
+    own = {asked.scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    return report.evaluated(asked.scene, registry.of(asked.scene), asked.target, own).limits
+
+
+def _out_of_reach(asked: Asked, here: Pass) -> Solution:
+    fixed = ", ".join(dict.fromkeys(each.name for each in here.margins if each.fixed))
+    kept = f", for nothing backs off {fixed}" if fixed else ""
+    least = 100 * (asked.share or 0.0)
+    why = f"no back-off up to {MOST_SIGMAS:g} sigma lets all limits hold on {least:.6g} % of the machines{kept}"
+    return _infeasible(asked, here.answer, why)
+
+
+def _unsettled(asked: Asked, here: Pass) -> Solution:
+    """Return that no fixed point was found."""
+    message = f"The standard deviations of limits do not settle within {PASSES} passes; ask for fewer sigmas."
+    return replace(_as_stands(asked, here.answer, "failed"), message=message)

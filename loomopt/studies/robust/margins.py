@@ -1,0 +1,156 @@
+"""What a design's limits leave to its machines: each side's room in standard deviations of its own figure, linear."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt.base.errors import refusal
+from loomopt.jobs import registry
+from loomopt.jobs.base import Crossing
+from loomopt.maths import joint_normal
+from loomopt.model.sampling import Sampler, sampled
+from loomopt.physics.cycle import Floats
+from loomopt.solving.answer.solution import SIDES, Words
+from loomopt.studies.tolerance.plan import Judged, Plan
+from loomopt.studies.tolerance.study import Slopes, slopes
+
+MET = 1e-5
+"""Share of a back-off by which a side's room may differ from it and the side counts as met."""
+
+
+class Margin(NamedTuple):
+    """One side of what machines are judged by.
+
+    sign: +1 where the figure may be no more; room: how far the nominal design keeps clear, SI; way: what each
+    independent standard normal number does to what is left of it, (numbers,), SI; fixed: whether nothing backs it off.
+    """
+
+    name: str
+    sign: int
+    room: float
+    way: Floats
+    fixed: bool
+    corner: bool
+
+    @property
+    def sigma(self) -> float:
+        """The standard deviation, SI."""
+        return float(np.linalg.norm(self.way))
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Name and sign."""
+        return self.name, self.sign
+
+
+def margins(plan: Plan) -> tuple[Margin, ...]:
+    """Return every side of what a design's machines are judged by. Raises BadInput for what has no value."""
+    found, own = list[Margin](), slopes(plan)
+    values = plan.read({name: np.full(1, plan.nominal[name]) for name in plan.made})
+    bands = {goal.figure for goal in plan.goals}
+    for each in plan.judged:
+        value = float(values[each.name][0]) if each.name in values else math.nan
+        if not math.isfinite(value) or not all(map(math.isfinite, own[each.name].by_number.values())):
+            problem = f"the spread of {each.name} is unknown, so that it cannot be backed off"
+            raise refusal(problem, plan.scene.origin, f"limits.{each.name}", remedy="Take the limit out")
+        for sign, end, side in ((-1, each.low, "low"), (1, each.high, "high")):
+            if end is not None and math.isfinite(end):
+                way = _way(plan, each, own[each.name], side)
+                fixed = each.name in bands
+                found.append(Margin(each.name, sign, sign * (end - value), way, fixed, own[each.name].corner))
+    return tuple(found)
+
+
+def _way(plan: Plan, judged: Judged, slope: Slopes, side: str) -> Floats:
+    """Return what independent numbers do to a side's figure, less its own end where that is one of the numbers."""
+    end = plan.scene.full(judged.name) if side in judged.follows else None
+    groups = sorted({each.group for each in plan.made.values() if each.group})
+    way = np.zeros(len(plan.made) + len(groups))
+    for k, (name, made) in enumerate(plan.made.items()):
+        left = slope.steeper[name] - (name == end)
+        # A figure that is its own limit's number moves with it, and what is left of its slope is rounding.
+        moved = 0.0 if name == end and abs(left) <= MET else left * plan.sigmas[name]
+        way[k] = math.sqrt(1 - made.correlation) * moved
+        if made.group:
+            way[len(plan.made) + groups.index(made.group)] += math.sqrt(made.correlation) * moved
+    return way
+
+
+def share(found: Sequence[Margin], sigmas: float, at: float) -> float:
+    """Return the linear share of machines that hold all sides, were those that are met `sigmas` away, not `at`."""
+    if not found:
+        return 1.0
+    rooms = [each.room if each.fixed else _room(each, sigmas, at) for each in found]
+    ways = np.array([each.way for each in found])
+    high = np.array([room * sign for room, sign in zip(rooms, (each.sign for each in found), strict=True)])
+    low = np.where([each.sign < 0 for each in found], high, -np.inf)
+    high = np.where([each.sign > 0 for each in found], high, np.inf)
+    return joint_normal.within(ways, low, high)
+
+
+def _room(margin: Margin, sigmas: float, at: float) -> float:
+    met = margin.room <= at * margin.sigma * (1 + MET) + MET * margin.sigma
+    return sigmas * margin.sigma if met else max(margin.room, sigmas * margin.sigma)
+
+
+def check_crossings(plan: Plan, sigmas: float) -> None:
+    """Raise BadInput where a travel turns so near the level whose crossing a limit reads that some machines' jumps."""
+    judged, words = {each.name for each in plan.judged}, Words(plan.scene)
+    for name, crossings in registry.of(plan.scene).crossings(plan.scene).items():
+        for crossing in crossings if name in judged else ():
+            level = plan.nominal[crossing.level]
+            for angle, height, sigma in _tops(plan, crossing):
+                if not abs(height - level) > sigmas * sigma:
+                    beside, reach = (words.shown(crossing.level, size, 3) for size in (abs(height - level), sigma))
+                    problem = (
+                        f"{name} jumps on some machines: at {plan.scene.show(angle, 'angle', 4)} the travel turns "
+                        f"{beside} from {crossing.level}, which {sigmas:.3g} sigma of {reach} each reach"
+                    )
+                    key, remedy = f"operation.{name}", "Tighten the tolerances, or ask for fewer sigmas"
+                    raise refusal(problem, plan.scene.origin, key, remedy=remedy)
+
+
+def _tops(plan: Plan, crossing: Crossing) -> Iterator[tuple[float, float, float]]:
+    """Yield angle, size and its standard deviation, SI, of the extremes of a travel up to the first past a crossing."""
+    quantity, side, dwell = crossing.quantity, crossing.side, plan.figures[crossing.figure]
+    found = _extremes(plan.like, quantity, side)
+    inside = [angle for angle in found if 0.0 < angle < dwell]
+    beyond = [angle for angle in found if angle >= dwell][:1]
+    here = {angle: found[angle] for angle in (*inside, *beyond)}
+    for angle, height in here.items():
+        # To first order an extreme is as high as the curve at its angle.
+        sides = [
+            [abs(_moved(plan, name, turn).at_angle((quantity,), side * angle)[0]) for turn in (1, -1)]
+            for name in plan.made
+        ]
+        yield side * angle, height, math.hypot(*((above - below) / 2 for above, below in sides))
+
+
+def _moved(plan: Plan, name: str, sigmas: int) -> Sampler:
+    """Return a machine of which one number is off by so many standard deviations."""
+    return sampled(plan.model, {**plan.nominal, name: plan.nominal[name] + sigmas * plan.sigmas[name]})
+
+
+def _extremes(sampler: Sampler, quantity: str, side: int) -> dict[float, float]:
+    """Return |quantity| where it turns by how far the crank has turned on one side of angle 0, in order."""
+    turn = 2 * math.pi
+    # What is highest at an end of a piece only turns with the cycle's pieces.
+    inside = [each for each in sampler.extremes(quantity) if 0.0 < each.u < 1.0]
+    return dict(sorted(((side * sampler.angle(each)) % turn, abs(each.value)) for each in inside))
+
+
+def bands(found: Sequence[Margin], sigmas: float, words: Words) -> str:
+    """Return which band is narrower than back-off on both of its sides takes, as a phrase; "" for none."""
+    sides: dict[str, dict[int, Margin]] = {}
+    for each in found:
+        if not each.fixed:
+            sides.setdefault(each.name, {})[each.sign] = each
+    for name, own in sides.items():
+        if len(own) < len(SIDES):
+            continue
+        width, needed = own[-1].room + own[1].room, sigmas * (own[-1].sigma + own[1].sigma)
+        if width <= needed:
+            return f"the band of {name}, {words.shown(name, width, 4)}, is no wider than {words.shown(name, needed, 4)}"
+    return ""

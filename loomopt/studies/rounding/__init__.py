@@ -1,0 +1,1 @@
+"""Optima whose numbers are sizes that can be ordered."""

@@ -1,0 +1,442 @@
+"""Rounding: the best design whose numbers are sizes that can be ordered, what else is free chosen anew and certified.
+
+The whole lattice is read at once where it is small enough and at most one number is left to choose, which the first
+level then makes zero; else branch and bound over boxes of sizes, each solved without them.
+"""
+
+import functools
+import heapq
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from loomopt.base.errors import Faults, refusal
+from loomopt.base.records import lazy
+from loomopt.base.units import SI_UNIT
+from loomopt.jobs import registry
+from loomopt.jobs.base import Job
+from loomopt.maths import systems
+from loomopt.model.limits import CycleLimit, RatioLimit, SingleLimit
+from loomopt.model.machines import Machines, read_all
+from loomopt.model.objectives import Magnitude
+from loomopt.model.program import Program
+from loomopt.model.reading import BatchReading, wide
+from loomopt.model.sampling import Sampler, sampled
+from loomopt.model.session import working
+from loomopt.physics.cycle import Floats
+from loomopt.physics.tolerances import FEASIBLE, SAME_OBJECTIVE
+from loomopt.scenes import designs, numbers, sizes
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Rounded, Solution, Words, risen
+from loomopt.solving.options import check_sought, target_name
+from loomopt.solving.search.search import objectives
+
+MOST_POINTS, BLOCK = 10_000_000, 2**16
+"""Points of a lattice that are all looked at, and how many at once."""
+MOST_BOXES = 600
+"""Boxes of sizes that are solved at most."""
+AFFINE = 1e-9
+"""Natural size of a level within which it is zero where a straight line says so."""
+AGREES = 1e-7
+"""Share of its natural size by which a level read on the lattice and as solved may differ."""
+
+Solve = Callable[..., Solution]
+"""solve(scene, near=…): the answer of a scene as it is asked for."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked for; sizes: of each number by what a designer calls it, SI, ascending, within its bounds."""
+
+    scene: Scene
+    target: str
+    sizes: Mapping[str, tuple[float, ...]]
+
+    @property
+    def points(self) -> int:
+        """How many points the lattice has."""
+        return math.prod(map(len, self.sizes.values()))
+
+    @lazy
+    def job(self) -> Job:
+        """The job."""
+        return registry.of(self.scene)
+
+    @lazy
+    def program(self) -> Program:
+        """The task without sizes."""
+        return self.job.program(self.scene, self.target)
+
+    def within(self, ends: Mapping[str, tuple[float, float]]) -> Scene:
+        """Return the scene with numbers between sizes, SI."""
+        found: dict[str, object] = {}
+        for name, (low, high) in ends.items():
+            si = SI_UNIT[numbers.quantity(self.scene, f"bounds.{name}").kind]
+            text = [repr(end) if si == "1" else f"{end!r} {si}" for end in (low, high)]
+            found[f"bounds.{name}"] = text[0] if low == high else {"min": text[0], "max": text[1]}
+        return self.scene.update(found)
+
+
+def asked(scene: Scene, target: str | None, given: Mapping[str, object] | None) -> Asked:
+    """Return what is asked for, checked; given: steps by number or pattern beside the scene's own. Raises BadInput."""
+    name = target_name(scene, target)
+    check_sought(scene, "rounding")
+    # A pattern speaks of what is free, a name of itself: the refusal of one that is not tells it.
+    loose = [key for key, bound in scene.bounds.items() if bound.free or key in (given or ())]
+    own = scene.update({f"steps.{key}": step for key, step in sizes.named(given, loose).items()}) if given else scene
+    steps, stock = numbers.sizes(own)
+    if not steps and not stock:
+        remedy = "Write --round l1=0.5mm, or add [steps] to the scene"
+        raise refusal("nothing says which sizes there are", own.origin, "steps", remedy=remedy)
+    found: dict[str, tuple[float, ...]] = {}
+    for number in dict.fromkeys((*steps, *stock)):
+        key = f"steps.{number}" if number in steps else f"stock.{number}"
+        bound = scene.bounds.get(number)
+        if bound is None or not bound.free or bound.min == bound.max:
+            problem = f"{number} is not free, so that there is nothing to round"
+            raise refusal(problem, own.origin, key, remedy="Give it min and max in [bounds], or take it out")
+        if math.isinf(bound.max - bound.min):
+            raise refusal(f"{number} has no end", own.origin, key, remedy="Give it min and max in [bounds]")
+        known = stock.get(number) or sizes.multiples(steps[number], bound.min, bound.max)
+        inside = tuple(size for size in known if bound.min <= size <= bound.max)
+        if number in stock and number in steps:
+            raise refusal(f"{number} has a step and sizes that are sold", own.origin, key, remedy="Give one of them")
+        if not inside:
+            problem = f"no size of {number} lies within its bounds"
+            remedy = f"Take {'a smaller step' if number in steps else 'other sizes'}, or wider bounds"
+            raise refusal(problem, own.origin, key, remedy=remedy)
+        found[number] = inside
+    return Asked(scene, name, found)
+
+
+class Best(NamedTuple):
+    """The best point, SI by number, and how it was found; levels: what it is worth there, in natural sizes."""
+
+    point: Mapping[str, float] | None
+    admissible: int | None
+    boxes: int
+    gap: float
+    rests: str
+    levels: tuple[float, ...] = ()
+    reaching: int | None = None
+
+
+@working()
+def solved(
+    asked: Asked, solve: Solve, last: Solve | None = None, on_step: Callable[[str], None] | None = None
+) -> Solution:
+    """Return the certified optimum with numbers at sizes; last: the solve whose answer is told.
+
+    Raises BadInput where a goal is out of reach on the lattice alone, and no band says how close is close enough.
+    """
+    say = on_step or (lambda text: None)
+    nominal = solve(asked.scene)
+    if nominal.status != "optimal" or nominal.point is None:
+        return nominal
+    whole = _whole(asked, nominal, say) if asked.points < MOST_POINTS else None
+    best = whole or _branched(asked, nominal, solve, say)
+    if best.point is None:
+        return _without(asked, nominal, best)
+    say("solving with the best sizes")
+    fixed = asked.within({name: (value, value) for name, value in best.point.items()})
+    answer = (last or solve)(fixed)
+    if answer.status != "optimal":
+        return replace(answer, scene=asked.scene, message=f"With the best sizes found: {answer.message}")
+    _check_goals(asked, nominal, answer)
+    if best.levels and not _agree(asked, answer, best):
+        message = "What was read on the lattice and what was solved there differ; please report it."
+        return replace(answer, status="uncertified", message=message, scene=asked.scene)
+    return _told(asked, answer, nominal, best)
+
+
+def _check_goals(asked: Asked, nominal: Solution, answer: Solution) -> None:
+    """Raise BadInput for a goal that sizes put out of reach where [accept] has no band for it."""
+    from loomopt.scenes import tolerances
+
+    scene = asked.scene
+    bands = tolerances.accepted(scene.document.get("accept", {}), scene.schema, scene.origin, Faults())
+    for goal in asked.program.goals:
+        name, value = goal.figure, answer.figures.get(goal.figure)
+        lost = nominal.reached.get(name) and not answer.reached.get(name)
+        if lost and not (name in bands and value is not None and abs(value) <= bands[name] + abs(goal.high)):
+            told = Words(scene).shown(name, value or 0.0)
+            problem = f"no sizes meet {name} exactly: the nearest found leave {told}"
+            remedy = f"Leave a number that moves it free, or say what is close enough: [accept] {name}"
+            raise refusal(problem, scene.origin, f"accept.{name}", remedy=remedy)
+
+
+def _agree(asked: Asked, answer: Solution, best: Best) -> bool:
+    """Say whether an answer is worth what its point was read to be."""
+    x = asked.job.values(asked.program, {asked.scene.full(k): v for k, v in answer.design.items()})
+    found = objectives(asked.program, x)
+    return all(abs(a - b) <= AGREES for a, b in zip(found, best.levels, strict=True))
+
+
+# The whole lattice.
+
+
+def _whole(asked: Asked, nominal: Solution, say: Callable[[str], None]) -> Best | None:
+    """Return the best point of all; None where what is left to choose is more than one number."""
+    program, job = asked.program, asked.job
+    assert nominal.point is not None
+    names = {asked.scene.full(name): own for name, own in asked.sizes.items()}
+    known = {v.name: v for v in program.variables}
+    if not names.keys() <= known.keys() or program.tops:
+        return None
+    free = [v for v in program.variables if v.lower < v.upper and v.name not in names]
+    loose = {v.name: v.upper for v in free if job.loosening.get(v.name) in known}
+    chosen = [v.name for v in free if v.name not in loose]
+    if len(chosen) > 1 or (chosen and not isinstance(program.objectives[0], Magnitude)):
+        return None
+    fixed = {v.name: v.lower for v in program.variables if v.lower == v.upper}
+    base = {**program.parameters, **fixed, **loose}
+    like = sampled(program.model, {**program.parameters, **nominal.point.x})
+    reader = _Reader(program, base, like, chosen[0] if chosen else "")
+    kept: list[dict[str, Floats]] = []
+    grids = list(names.values())
+    for first in range(0, asked.points, BLOCK):
+        say(f"reading the lattice, {first} of {asked.points} points")
+        places = np.unravel_index(np.arange(first, min(first + BLOCK, asked.points)), [len(own) for own in grids])
+        point = {name: np.array(own)[at] for (name, own), at in zip(names.items(), places, strict=True)}
+        part = reader.admissible(point)
+        if part is None:
+            return None
+        kept.append(part)
+    every = {name: np.concatenate([each[name] for each in kept]) for name in kept[0]}
+    levels = reader.levels(every)
+    well = np.all(np.isfinite(levels), axis=1)
+    count = int(np.sum(well))
+    rests = f"all {asked.points} points were read, at each the extremes of the whole cycle refined"
+    bounds = asked.scene.bounds.items()
+    loosely = [name for name, own in bounds if own.free and own.min != own.max and name not in asked.sizes]
+    rests += f" and {', '.join(loosely)} chosen so that {program.objectives[0].figure} is least" if chosen else ""
+    if not count:
+        return Best(None, 0, 0, 0.0, rests)
+    left = np.flatnonzero(well)
+    for level in levels.T:
+        left = left[level[left] <= level[left].min() + SAME_OBJECTIVE]
+    at = int(left[0])
+    found = {name: float(every[asked.scene.full(name)][at]) for name in asked.sizes}
+    reaching = int(np.sum(well & (levels[:, 0] <= SAME_OBJECTIVE))) if chosen else count
+    return Best(found, count, 0, 0.0, rests, tuple(map(float, levels[at])), reaching)
+
+
+class _Reader:
+    """Reads points of a lattice; chosen: the number that the first level makes zero, "" for none."""
+
+    def __init__(self, program: Program, base: Mapping[str, float], like: Sampler, chosen: str) -> None:
+        self.program, self.base, self.like, self.chosen = program, base, like, chosen
+        own = [limit for limit in program.limits if isinstance(limit, SingleLimit) and not limit.is_of_variable]
+        self.single = own
+        self.ratios = [each for each in program.limits if isinstance(each, RatioLimit)]
+        self.cycles = [limit for limit in program.limits if isinstance(limit, CycleLimit)]
+
+    def reading(self, point: Mapping[str, Floats]) -> BatchReading:
+        """Return what reads points."""
+        values = {**self.base, **self.like.hints, **point}
+        return BatchReading(self.program.model, systems.numpy(), values, self.like.cycle, self.like.stills)
+
+    def admissible(self, point: Mapping[str, Floats]) -> dict[str, Floats] | None:
+        """Return the points that keep all limits of one position, with what is chosen; None where no line chooses."""
+        count = len(next(iter(point.values())))
+        with np.errstate(all="ignore"):
+            full = dict(point)
+            if self.chosen:
+                found = self._zero(point, count)
+                if found is None:
+                    return None
+                full[self.chosen] = found
+            reading = self.reading(full)
+            well = np.ones(count, dtype=bool)
+            for limit in self.single:
+                excess = wide(limit.residual(reading), count) / limit.scale
+                well &= (np.abs(excess) if limit.sign == 0 else excess) <= FEASIBLE
+        return {name: values[well] for name, values in full.items()}
+
+    def _zero(self, point: Mapping[str, Floats], count: int) -> Floats | None:
+        """Return where the first level is least between what limits leave, (points,); None where it is no line."""
+        level, name = self.program.objectives[0], self.chosen
+        own = next(v for v in self.program.variables if v.name == name)
+        low, high = np.full(count, own.lower), np.full(count, own.upper)
+        probe = self.reading({**point, name: np.zeros(count)})
+        for limit in self.ratios:
+            if limit.row == name:
+                # It is a difference: where the row is 0 it says what the row is compared with.
+                end = wide(limit.residual(probe), count) * (1 if limit.sign < 0 else -1)
+                low = np.maximum(low, end) if limit.sign <= 0 else low
+                high = np.minimum(high, end) if limit.sign >= 0 else high
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            return None
+
+        def at(x: Floats) -> Floats:
+            return np.asarray(wide(self.reading({**point, name: x}).single(level.row), count), dtype=float)
+
+        below, above = at(low), at(high)
+        share = np.clip(np.where(above != below, below / (below - above), 0.0), 0.0, 1.0)
+        found = low + share * (high - low)
+        straight = below + share * (above - below)
+        known = np.isfinite(straight)
+        if np.abs(at(found)[known] - straight[known]).max(initial=0.0) > AFFINE * level.scale:
+            return None
+        return np.asarray(found)
+
+    def levels(self, points: Mapping[str, Floats]) -> Floats:
+        """Return what points are worth, (points, levels) in natural sizes; infinite where a cycle's limit is broken."""
+        program = self.program
+        if not len(next(iter(points.values()))):
+            return np.zeros((0, len(program.objectives)))
+        quantities = [row for each in program.objectives for row in each.quantities]
+        keys = [str(k) for k in range(len(program.objectives))]
+
+        def many(machines: Machines) -> dict[str, Floats]:
+            machines.search(tuple(quantities))
+            broken = np.zeros(machines.count, dtype=bool)
+            for limit in self.cycles:
+                peak = machines.peak(limit.row, limit.where)
+                broken |= ~((peak - limit.bound) / limit.scale <= FEASIBLE)
+            told = {}
+            for key, each in zip(keys, program.objectives, strict=True):
+                sides = [sign * machines.single(row) for row, sign in each.sides]
+                worth = functools.reduce(np.maximum, [*sides, *map(machines.peak, each.quantities)])
+                told[key] = np.where(broken, np.inf, worth / each.scale)
+            return told
+
+        def alone(values: Mapping[str, float]) -> dict[str, float]:
+            try:
+                sampler = sampled(program.model, values)
+                kept = all(each.violation(sampler) <= FEASIBLE for each in self.cycles)
+                worths = [each.merit(sampler) / each.scale for each in program.objectives]
+            except (ArithmeticError, ValueError):
+                return dict.fromkeys(keys, math.inf)
+            return {key: worth if kept else math.inf for key, worth in zip(keys, worths, strict=True)}
+
+        found = read_all(program.model, {**self.base, **points}, self.like, many, alone)
+        return np.column_stack([found[key] for key in keys])
+
+
+# Branch and bound.
+
+Ends = Mapping[str, tuple[int, int]]
+
+
+def _branched(asked: Asked, nominal: Solution, solve: Solve, say: Callable[[str], None]) -> Best:
+    """Return the best point that boxes of sizes lead to, the most promising first."""
+    order = itertools.count()
+    whole: Ends = {name: (0, len(own) - 1) for name, own in asked.sizes.items()}
+    queue: list[tuple[tuple[float, ...], int, Ends, Solution]] = []
+    best: tuple[float, ...] | None = None
+    point: Mapping[str, float] | None = None
+    boxes, rests = (
+        0,
+        "each box of sizes was solved without them from its neighbour, to an optimum nearby",
+    )
+
+    def take(ends: Ends, near: Solution) -> None:
+        nonlocal best, point, boxes
+        boxes += 1
+        say(f"box {boxes} of sizes")
+        scene = asked.within({k: (asked.sizes[k][a], asked.sizes[k][b]) for k, (a, b) in ends.items()})
+        answer = solve(scene, near=[near.point] if near.point else [])
+        if answer.status != "optimal" or answer.point is None:
+            return
+        program = asked.job.program(scene, asked.target)
+        rescaled = zip(objectives(program, answer.point.x), program.objectives, asked.program.objectives, strict=True)
+        worth = tuple(
+            round(value * now.scale / then.scale / SAME_OBJECTIVE) * SAME_OBJECTIVE for value, now, then in rescaled
+        )
+        if best is not None and worth >= best:
+            return
+        if all(_off(asked, k, float(answer.design[k])) is None for k in asked.sizes):
+            best, point = worth, {k: _nearest(asked.sizes[k], float(answer.design[k])) for k in asked.sizes}
+            return
+        heapq.heappush(queue, (worth, next(order), ends, answer))
+
+    take(whole, nominal)
+    while queue and boxes < MOST_BOXES and (best is None or queue[0][0] < best):
+        _, _, ends, answer = heapq.heappop(queue)
+        name, below = _split(asked, ends, answer)
+        low, high = ends[name]
+        take({**ends, name: (low, below)}, answer)
+        take({**ends, name: (below + 1, high)}, answer)
+    gap = 0.0
+    if best is not None and queue and queue[0][0] < best:
+        gap = next(b - a for a, b in zip(queue[0][0], best, strict=True) if b > a)
+    elif best is None and queue:
+        gap = math.inf
+    return Best(point, None, boxes, gap, rests)
+
+
+def _off(asked: Asked, name: str, value: float) -> float | None:
+    """Return how far a number is from its nearest size, in widths between sizes; None where it is one."""
+    near = _nearest(asked.sizes[name], value)
+    own = asked.sizes[name]
+    width = (own[-1] - own[0]) / max(len(own) - 1, 1) or abs(near) or 1.0
+    off = abs(value - near) / width
+    return None if off <= sizes.WITHIN else off
+
+
+def _nearest(own: tuple[float, ...], value: float) -> float:
+    return min(own, key=lambda size: abs(size - value))
+
+
+def _split(asked: Asked, ends: Ends, answer: Solution) -> tuple[str, int]:
+    """Return the number that is farthest from a size, and the place of the size below it."""
+    open_ones = [name for name, (low, high) in ends.items() if low < high]
+    name = max(open_ones, key=lambda each: _off(asked, each, float(answer.design[each])) or 0.0)
+    low, high = ends[name]
+    value = float(answer.design[name])
+    below = max((k for k in range(low, high) if asked.sizes[name][k] <= value), default=low)
+    return name, below
+
+
+# What is told.
+
+
+def _told(asked: Asked, answer: Solution, nominal: Solution, best: Best) -> Solution:
+    """Return the answer with what its sizes cost, and what the claim rests on."""
+    scene, words = asked.scene, Words(asked.scene)
+    ends = {name: (own[0], own[-1], len(own)) for name, own in asked.sizes.items()}
+    rounded = Rounded(ends, asked.points, best.admissible, best.reaching, best.boxes, best.gap, nominal, best.rests)
+    costs = []
+    for name, change in risen(answer, nominal).items():
+        then, now = nominal.figures[name] or 0.0, answer.figures[name] or 0.0
+        alike = [abs(value or 0.0) for figure, value in answer.figures.items() if words.si(figure) == words.si(name)]
+        if abs(change) > AGREES * max(alike):
+            share = f" ({100 * change / abs(then):+.3g} %)" if abs(then) > AGREES * max(alike) else ""
+            costs.append(f"{name} {words.shown(name, now, 9)} instead of {words.shown(name, then, 9)}{share}")
+    chosen = ", ".join(f"{name} {words.shown(name, value)}" for name, value in (best.point or {}).items())
+    said = [f"Sizes: {chosen}.", f"They cost {', '.join(costs)}." if costs else "They cost nothing of what is sought."]
+    if best.boxes and best.gap:
+        said.append(f"Others on the lattice of {asked.points} points may be better by {best.gap:.2g} natural sizes")
+        said[-1] += f": {best.boxes} boxes were solved."
+    else:
+        kept = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
+        kept += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
+        said.append(f"None of the {asked.points} points of the lattice is better{kept}: {best.rests}.")
+    text = " ".join(said)
+    explanation = " ".join(part for part in (answer.explanation, text) if part)
+    message = f"{answer.message} {text}"
+    own = {scene.full(name): value for name, value in designs.flat(answer.design).items()}
+    here = report.evaluated(scene, asked.job, asked.target, own)
+    # A size is what was chosen and no limit; and how far today's machine is goes by the widths of the scene's bounds.
+    binding = tuple(price for price in answer.binding if price.limit not in asked.sizes)
+    figures = {**answer.figures, **{name: here.figures[name] for name in ("change",) if name in answer.figures}}
+    stops = report.stops(binding) if binding else "No limit binds beside the sizes."
+    message = message.replace(report.stops(answer.binding), stops)
+    found = replace(answer, scene=scene, limits=here.limits, binding=binding, figures=figures)
+    return replace(found, message=message, explanation=explanation, rounded=rounded)
+
+
+def _without(asked: Asked, nominal: Solution, best: Best) -> Solution:
+    """Return that no point was found."""
+    helps = "Take smaller steps or wider bounds; the design told is the optimum without sizes."
+    if best.gap:
+        message = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {asked.points} points. {helps}"
+        return replace(nominal, status="failed", message=message, certificate=None, binding=())
+    message = f"None of the {asked.points} points of the lattice keeps all limits: {best.rests}. {helps}"
+    return replace(nominal, status="infeasible", message=message, certificate=None, binding=())

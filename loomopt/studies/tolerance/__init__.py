@@ -1,0 +1,1 @@
+"""Machines as they are made: spread, yield, and what to tighten first."""
