@@ -1,5 +1,6 @@
 """The public functions: load a scene, solve it, evaluate and simulate a design."""
 
+import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,14 +15,18 @@ from loomopt.physics.tolerances import ACCURACY, SLACK
 from loomopt.scenes.designs import Given as Design
 from loomopt.scenes.scene import Call, Scene
 from loomopt.solving.answer import solution
-from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_numbers, target_name
+from loomopt.solving.options import GAP, OMITTED, SECONDS, GlobalProof, check_global_proof, check_numbers, target_name
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from pathlib import Path
 
     import pandas as pd
 
-    from loomopt.interface.finished import DesignStudy, EffectsStudy
+    from loomopt.interface.comparison import Comparison
+    from loomopt.interface.finished import AccuracyFound, DesignStudy, EffectsStudy, SensitivityStudy, ToleranceStudy
+    from loomopt.interface.torque_budget import Budget
+    from loomopt.scenes.packaged import Head
     from loomopt.solving.answer.solution import Proofs
     from loomopt.studies.front.front import Given as Ranges
     from loomopt.studies.run.rows import Row
@@ -38,16 +43,27 @@ __all__ = [
     "Answer",
     "Evaluation",
     "Scene",
+    "accuracy",
+    "budget",
+    "compare",
     "effects",
     "evaluate",
     "load",
+    "new",
     "pareto",
+    "problems",
     "prove",
     "scene",
+    "schema",
+    "sensitivity",
     "simulate",
     "solve",
     "sweep",
+    "tolerance",
 ]
+
+MACHINES = 100_000
+"""Machines that a study of tolerances draws."""
 
 
 def load(name_or_path: str | os.PathLike[str]) -> Loaded:
@@ -71,6 +87,9 @@ def solve(
     everywhere: bool = False,
     gap: float = GAP,
     seconds: float = SECONDS,
+    robust: float | None = None,
+    yield_: float | None = None,
+    steps: Mapping[str, object] | bool = False,
     on_iteration: Callable[[int], None] | None = None,
     on_start: Callable[[int, int], None] | None = None,
     on_step: Callable[[str], None] | None = None,
@@ -81,8 +100,11 @@ def solve(
     so many, the job's own first, then random ones drawn with `seed`; without it a search for the best basin. near: an
     answer to the same structure, from which the solve starts warm. prove: whether every limit is proven at every crank
     angle too. everywhere: whether it is proven that no admissible design is better by more than `gap`, relative to each
-    objective, in at most so many seconds (`answer.global_bound`). on_iteration(number), on_start(number, of),
-    on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    objective, in at most so many seconds (`answer.global_bound`). robust: standard deviations of its own figure by
+    which every limit is backed off, as [tolerances] has machines made; yield_: the share of machines that is to hold
+    all limits, instead (`answer.robust`). steps: number, or a pattern such as "l*", → the step of its sizes, such as
+    "0.5 mm", beside [steps] and [stock] of the scene; True for these alone (`answer.rounded`). on_iteration(number),
+    on_start(number, of), on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.cli.shell import below_cell
     from loomopt.solving import engine
@@ -95,21 +117,43 @@ def solve(
     if near is not None and not isinstance(near, solution.Solution):
         raise refusal("it is no answer", "", "near", near, "what `solve` has returned", "Give one, or leave it out")
     arguments.flag(everywhere, "everywhere")
+    if not isinstance(steps, bool):
+        steps = arguments.table(steps, "steps", "numbers and their steps", "Write {'l1': '0.5 mm'}, or True")
     with below_cell() as say:
         told = on_step or say
-        found = engine.solve(
-            own,
-            target,
+        proof = GlobalProof(gap, seconds, told or (lambda text: None)) if everywhere else None
+        hooks: dict[str, Any] = {"on_iteration": on_iteration, "on_start": on_start, "on_step": told}
+        anywhere = functools.partial(
+            engine.solve,
+            target=target,
             accuracy=accuracy,
             starts=starts,
             seed=seed,
             near=[near.point] if near and near.point else [],
-            prove=prove,
-            global_proof=GlobalProof(gap, seconds, told or (lambda text: None)) if everywhere else None,
-            on_iteration=on_iteration,
-            on_start=on_start,
-            on_step=told,
+            **hooks,
         )
+        once = functools.partial(anywhere, own)
+        if steps:
+            from loomopt.studies.rounding import lattice
+
+            if robust is not None or yield_ is not None:
+                remedy = "Round first, then back off with the sizes set as bounds"
+                raise refusal("sizes and back-off are not sought together", "", "steps", remedy=remedy)
+            if proof:
+                remedy = "Leave out the proof: an answer in sizes says what of the lattice was read"
+                raise refusal("what is proven of all designs is not of those in sizes", "", "steps", remedy=remedy)
+            rounding = lattice.asked(own, target, None if steps is True else steps)
+            told_last = functools.partial(anywhere, prove=prove)
+            found = lattice.solved(rounding, anywhere, told_last, told)
+        elif robust is None and yield_ is None:
+            found = once(prove=prove, global_proof=proof)
+        else:
+            from loomopt.studies.robust import backoff
+
+            asked = backoff.asked(own, target, robust, yield_, seed)
+            check_global_proof(proof)
+            last = functools.partial(once, prove=prove, global_proof=proof)
+            found = backoff.solved(asked, once, last, told)
     return results.solved(found, own, own.call.target if target is None else target)
 
 
@@ -166,6 +210,20 @@ def simulate(
     return tables.curves(own, given, accuracy, name, beside)
 
 
+def budget(
+    scene: Given, design: Design | solution.Evaluated | None = None, *, fluctuation: float | None = None
+) -> "Budget":
+    """Return where the crank torque of a design (SI; today's without one) comes from, effect by effect.
+
+    Each effect's share where the torque peaks, its rms, its energy a turn; what their sum asks of a motor. design: a
+    mapping, or an answer, of which the design alone is taken. fluctuation: (largest − least)/mean speed that a flywheel
+    is sized for. Raises BadInput, also where nothing acts on the crank.
+    """
+    from loomopt.interface.torque_budget import drawn_up
+
+    return drawn_up(*_request(scene, design), fluctuation)
+
+
 def sweep(
     scene: Given,
     over: "Over",
@@ -218,6 +276,57 @@ def effects(
     return conducted_effects(study, executor, workers, on_row)
 
 
+def sensitivity(
+    answer: Answer | Given, target: str | None = None, *, on_step: Callable[[str], None] | None = None
+) -> "SensitivityStudy":
+    """Return how an answer moves with every number of its scene, and how far its prices hold.
+
+    answer: what `solve` returned; a scene, or what `load` takes, is solved first, for `target`. on_step(what):
+    progress. Raises BadInput, also for an answer that is not certified, and KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.interface.finished import conducted_sensitivity
+    from loomopt.studies.sensitivity.study import planned
+
+    if on_step is not None:
+        arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
+    solved = answer if isinstance(answer, solution.Solution) and answer.point else solve(_scene(answer), target)
+    if solved.scene is None:
+        raise refusal("the answer knows no scene", "", "scene", remedy="Solve it again")
+    return conducted_sensitivity(planned(solved.scene, solved), on_step)
+
+
+def tolerance(
+    scene: Given,
+    design: Design | solution.Evaluated | None = None,
+    target: str | None = None,
+    executor: "Executor | Callable[[], Executor] | None" = None,
+    *,
+    samples: int = MACHINES,
+    seed: int = 0,
+    workers: int | None = None,
+    worst: bool = True,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    on_step: Callable[[str], None] | None = None,
+) -> "ToleranceStudy":
+    """Return how the machines of a design (SI; today's without one) spread as [tolerances] has them made.
+
+    design, target: as in `evaluate`. samples: machines that are drawn, over 16 scrambles of Sobol's points by `seed`.
+    worst: whether the worst case of each figure within all tolerances is proven too, which takes seconds.
+    executor, workers, store, resume: as in `sweep`, a scramble a row; the study is the same whoever computes it.
+    on_step(what): progress. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.interface.finished import conducted_tolerance
+    from loomopt.studies.tolerance.plan import planned
+
+    own, given = _request(scene, design)
+    if on_step is not None:
+        arguments.called(on_step, "on_step", "a function", "Give a function, or leave it out")
+    proving, going_on = arguments.flag(worst, "worst"), arguments.flag(resume, "resume")
+    plan = planned(own, given, target, samples, seed)
+    return conducted_tolerance(plan, executor, workers, on_step, proving, store, going_on)
+
+
 def pareto(
     scene: Given,
     axes: Sequence[str],
@@ -235,12 +344,13 @@ def pareto(
 ) -> "DesignStudy":
     """Return the front of two axes: what the first costs of the second, every point certified.
 
-    axes: figures or numbers that the scene bounds; M3_fdc counts by magnitude. target: whose demands hold at every
-    point, of all but the axes: the job's default without one, "none" for the scene's limits alone. maximise: axes of
-    which the most is sought; of the others it is the least, but of one that offers its most alone, such as a dwell, the
-    most. ranges: axis → "LO:HI UNIT", or both ends in SI, beyond which the front does not go. points: how many are
-    asked for, 40 without; those that narrow changes down come beside them. The rest is as in `sweep`. Raises BadInput,
-    also for an end that has no least value, and KeyboardInterrupt on Ctrl-C.
+    axes: figures or numbers that the scene bounds, freed where it holds them; M3_fdc counts by magnitude. target: whose
+    demands hold at every point, of all but the axes: the job's default without one, "none" for the scene's limits
+    alone. maximise: axes of which the most is sought; of the others it is the least, but of one that offers its most
+    alone, such as a dwell, or whose most a target of a linkage seeks, the most. ranges: axis → "LO:HI UNIT", or both
+    ends in SI, beyond which the front does not go. points: how many are asked for, 40 without; those that narrow
+    changes down come beside them. The rest is as in `sweep`. Raises BadInput, also for an end that has no least value,
+    and KeyboardInterrupt on Ctrl-C.
     """
     from loomopt.interface.finished import conducted
     from loomopt.studies.front import front
@@ -250,6 +360,52 @@ def pareto(
     whose = front.demanding(own, target)
     study = front.trade(own, axes, whose, maximise=maximise, ranges=asked, points=points, accuracy=accuracy)
     return conducted(study, executor, workers, store, resume, on_row)
+
+
+def accuracy(scene: Given, *, full: bool = False, on_step: Callable[[str], None] | None = None) -> "AccuracyFound":
+    """Return what accuracy costs in time, method by method; full: more settings and repeats, which take minutes.
+
+    on_step(what): called before each step. Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    from loomopt.interface.finished import accuracy_found
+
+    return accuracy_found(_scene(scene), arguments.flag(full, "full"), on_step)
+
+
+def problems() -> "tuple[Head, ...]":
+    """Return the packaged problems: name, title, job, targets and source of each. Raises BadInput."""
+    from loomopt.interface import listing
+
+    return listing.problems()[0]
+
+
+def new(job: str, path: str | os.PathLike[str]) -> "Path":
+    """Write a commented scene of a job to start from, or a packaged scene by its name; return the file.
+
+    path: one that is not there yet, and ends in .toml; of a packaged scene also in .zip, which takes all scenes of its
+    job. Raises BadInput.
+    """
+    from loomopt.interface import listing
+
+    return listing.new(job, arguments.path(path, "path", "a path that ends in .toml", "Name a file"))
+
+
+def schema(job: str) -> dict[str, object]:
+    """Return the JSON Schema of a job's scenes, for editors. Raises BadInput."""
+    from loomopt.interface.text import json_schema
+
+    return json_schema.scene(registry.declared(arguments.text(job, "job", "a loom job", "Name one, such as beatup")))
+
+
+def compare(*answers: "Evaluation | str", scene: Given | None = None) -> "Comparison":
+    """Return designs side by side in one unit, with what differs marked; their curves by `.plot()`.
+
+    answers: answers or evaluations of one job, and "today" for the first one's machine as it is. scene: in which all
+    are judged; each in its own without it. Raises BadInput.
+    """
+    from loomopt.interface import comparison
+
+    return comparison.compared(answers, None if scene is None else _scene(scene))
 
 
 def _scene(given: Given) -> Scene:

@@ -11,20 +11,30 @@ from typing import TYPE_CHECKING
 
 from loomopt.base import arguments
 from loomopt.base.errors import refusal
+from loomopt.base.files import suffix
 from loomopt.base.records import lazy
 from loomopt.interface import study_table
 from loomopt.interface.cli.shell import below_cell
+from loomopt.interface.files import outputs
 from loomopt.interface.results import PICTURE, Answer, solved
 from loomopt.scenes.scene import Scene
+from loomopt.studies.accuracy.accuracy import AccuracyStudy
 from loomopt.studies.effects import study
 from loomopt.studies.effects.study import Effects, concluded
 from loomopt.studies.run import run
 from loomopt.studies.run.rows import Findings, Row, SceneStudy, counted, digest
 from loomopt.studies.run.store import Store
+from loomopt.studies.sensitivity import study as sensitivity
+from loomopt.studies.tolerance import study as tolerance
+from loomopt.studies.tolerance.plan import SCRAMBLES, Plan
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+    from loomopt.interface.report.animation import MovingPicture
+    from loomopt.interface.report.markup import Part
+    from loomopt.interface.text.layout import Grid
 
 EXECUTORS = "an executor of concurrent.futures, or a function that makes one"
 
@@ -83,6 +93,33 @@ class DesignStudy:
         drawn: Figure = study.plot(self.study, self.solved, place)
         return drawn
 
+    def report(self, path: str | os.PathLike[str], *beside: object) -> Path:
+        """Write one self-contained page, which says first how many points are certified; return the file.
+
+        path: one that ends in .html. beside: as of an answer's `report`. Raises BadInput.
+        """
+        from loomopt.interface.report import document
+
+        place = Path(arguments.path(path, "path", "a path that ends in .html", "Name a file"))
+        document.write(place, [document.of_study(self.study, self.solved, beside)])
+        return place
+
+    def report_parts(self) -> "list[Part]":
+        """Return what a page of an answer shows of it."""
+        from loomopt.interface.report import document
+
+        return document.part_of_study(self.study, self.solved)
+
+    def animate(self, path: str | os.PathLike[str] | None = None) -> "MovingPicture":
+        """Return the designs along the study as one moving picture, which shows itself in Jupyter. Raises BadInput.
+
+        path: as of an answer's `animate`.
+        """
+        from loomopt.interface.report import animation
+
+        place = None if path is None else Path(arguments.path(path, "path", *animation.FILE))
+        return animation.morphed(self.study, self.rows, place)
+
     def as_dict(self) -> dict[str, object]:
         """Return the object that `--json` prints."""
         return {
@@ -98,6 +135,11 @@ class DesignStudy:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def __str__(self) -> str:
+        from loomopt.interface.text import studies
+
+        return printed(studies.parts(self.study, self.solved))
 
     def __repr__(self) -> str:
         certified = sum(row.certified for row in self.rows)
@@ -126,16 +168,11 @@ def conducted(
     executor, resume = who(executor, count), arguments.flag(resume, "resume")
     _check_hook(on_row)
     if store is None:
-        if resume:
-            raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
+        _check_resume(resume)
         with _told(lambda count: counted(study, count), on_row) as kept:
             return DesignStudy(study, run.run(study, executor, None, kept))
     with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
-        known = len(opened.rows(study.key))
-        if known and not resume:
-            problem = f"it holds {counted(study, known, 'of the')} of this study already"
-            remedy = "Resume (--resume, or resume=True), or name another file"
-            raise refusal(problem, str(store), "store", remedy=remedy)
+        _check_known(opened, study.key, resume, lambda known: counted(study, known, "of the"))
         opened.begin(study.key, study_identity(study))
         with _told(lambda count: counted(study, count), on_row) as kept:
             return DesignStudy(study, run.run(study, executor, opened, kept))
@@ -202,6 +239,17 @@ class EffectsStudy(study.Found):
         drawn: Figure = effects.plot(self, place)
         return drawn
 
+    def report_parts(self) -> "list[Part]":
+        """Return what a page of an answer shows of it."""
+        from loomopt.interface.report import beside
+
+        return beside.effects(self)
+
+    def __str__(self) -> str:
+        from loomopt.interface.text import effects
+
+        return printed(effects.parts(self))
+
     def __repr__(self) -> str:
         left = ", ".join(self.left_out) or "nothing"
         return f"<EffectsStudy {self.scene.name}, {self.target}: at {100 * self.tolerance:g} % {left} may be left out>"
@@ -210,6 +258,196 @@ class EffectsStudy(study.Found):
         from loomopt.interface.text import effects, notebook
 
         return notebook.page(effects.parts(self, timed=False))
+
+
+class AccuracyFound(AccuracyStudy):
+    """What accuracy costs in time, method by method; in Jupyter it shows itself."""
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return error over time, a panel per quantity; the figure shows itself in Jupyter.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        """
+        from loomopt.interface.figures import accuracy
+
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        made: Figure = accuracy.drawn(self)
+        if place:
+            suffix(place, outputs.PICTURES)
+            accuracy.write(self, place)
+        return made
+
+    def parts(self) -> "list[str | Grid]":
+        """Return what a terminal shows of it."""
+        from loomopt.interface.figures import accuracy
+
+        return accuracy.parts(self)
+
+    def report_parts(self) -> "list[Part]":
+        """Return what a page of an answer shows of it."""
+        from loomopt.interface.report.markup import Part
+
+        return [Part("What accuracy costs", tuple(self.parts()))]
+
+    def __str__(self) -> str:
+        return printed(self.parts())
+
+    def __repr__(self) -> str:
+        return f"<AccuracyFound {self.problem}: {len(self.rows)} rows; {self.advice}>"
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import notebook
+
+        return notebook.page(self.parts())
+
+
+def accuracy_found(scene: Scene, full: bool, on_step: Callable[[str], None] | None) -> AccuracyFound:
+    """Return what accuracy costs for a scene; on_step(what): called before each step. Raises BadInput."""
+    from loomopt.studies.accuracy import accuracy
+
+    if on_step is not None:
+        arguments.called(on_step, "on_step", "a function of a text", "Give a function, or leave it out")
+    with below_cell() as say:
+        found = accuracy.study(scene, full, on_step or say)
+    return AccuracyFound(**{each.name: getattr(found, each.name) for each in fields(found)})
+
+
+def printed(parts: "Sequence[str | Grid]") -> str:
+    """Return parts as the terminal shows them."""
+    from loomopt.interface.text import layout
+
+    return layout.render(parts, layout.width())
+
+
+class ToleranceStudy(tolerance.Found):
+    """Machines as they are made: how figures spread, how often limits hold; SI inside."""
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Return one line per figure; si: in SI, else in the scene's own units."""
+        from loomopt.interface.text import tolerance
+
+        return tolerance.frame(self, arguments.flag(si, "si"))
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return a histogram for each figure that judges machines, with its limits; it shows itself in Jupyter.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        """
+        from loomopt.interface.figures import tolerance
+
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        drawn: Figure = tolerance.plot(self, place)
+        return drawn
+
+    def report_parts(self) -> "list[Part]":
+        """Return what a page of an answer shows of it."""
+        from loomopt.interface.report import beside
+
+        return beside.tolerance(self)
+
+    def __repr__(self) -> str:
+        share = self.yields[tolerance.ALL].value
+        return f"<ToleranceStudy {self.plan.scene.name}, {self.plan.target}: all limits hold on {100 * share:.4g} %>"
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import notebook
+        from loomopt.interface.text import tolerance as text
+
+        return notebook.page(text.parts(self))
+
+
+class SensitivityStudy(sensitivity.Found):
+    """How an optimum moves with every number of its scene, and how far its prices hold; SI inside."""
+
+    def table(self, *, si: bool = False) -> "pd.DataFrame":
+        """Return one line per derivative; si: in SI, else in the scene's own units."""
+        from loomopt.interface.text import sensitivity
+
+        return sensitivity.frame(self, arguments.flag(si, "si"))
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return a tornado for each figure sought: by one sigma of a number's tolerance, or by 1 % of it.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput.
+        """
+        from loomopt.interface.figures import sensitivity
+
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        drawn: Figure = sensitivity.plot(self, place)
+        return drawn
+
+    def report_parts(self) -> "list[Part]":
+        """Return what a page of an answer shows of it."""
+        from loomopt.interface.report import beside
+
+        return beside.sensitivity(self)
+
+    def __repr__(self) -> str:
+        told = self.refused or f"{len(self.rows)} derivatives, {len(self.prices)} prices"
+        return f"<SensitivityStudy {self.scene.name}, {self.target}: {told}>"
+
+    def _repr_html_(self) -> str:
+        from loomopt.interface.text import notebook
+        from loomopt.interface.text import sensitivity as text
+
+        return notebook.page(text.parts(self))
+
+
+def conducted_sensitivity(study: sensitivity.Study, on_step: Callable[[str], None] | None = None) -> SensitivityStudy:
+    """Return a study of sensitivity. Raises BadInput, and KeyboardInterrupt on Ctrl-C."""
+    with below_cell() as cell:
+        found = sensitivity.conducted(study, on_step or cell)
+    return SensitivityStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
+
+
+def conducted_tolerance(
+    plan: Plan,
+    executor: Executor | run.Making | None = None,
+    count: int | None = None,
+    on_step: Callable[[str], None] | None = None,
+    worst: bool = True,
+    store: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+) -> ToleranceStudy:
+    """Return a study of tolerances after drawing its machines; count: of worker processes, without an executor.
+
+    worst: whether the worst cases are proven too; store, resume: as in `conducted`, a scramble a row.
+    Raises BadInput, and KeyboardInterrupt on Ctrl-C.
+    """
+    made = who(executor, count)
+    with below_cell() as cell, contextlib.ExitStack() as opened:
+        say = on_step or cell or (lambda text: None)
+        kept = opened.enter_context(_stored(plan, store, resume))
+        crew = made if isinstance(made, Executor) or made is None else opened.enter_context(made())
+        found = tolerance.conducted(plan, crew, say, worst, kept)
+    return ToleranceStudy(**{each.name: getattr(found, each.name) for each in fields(found)})
+
+
+@contextlib.contextmanager
+def _stored(plan: Plan, store: str | os.PathLike[str] | None, resume: bool) -> Iterator[Store | None]:
+    """Yield a store for the machines of a plan, None without one. Raises BadInput."""
+    if store is None:
+        _check_resume(resume)
+        yield None
+        return
+    drawing = tolerance.Drawing(plan, {})
+    with Store(Path(arguments.path(store, "store", "a path", "Name a file"))) as opened:
+        _check_known(opened, drawing.key, resume, lambda known: f"{known} of the {SCRAMBLES} scrambles")
+        opened.begin(drawing.key, drawing.settings)
+        yield opened
+
+
+def _check_resume(resume: bool) -> None:
+    if resume:
+        raise refusal("there is nothing to resume from", key="resume", origin="", remedy="Name the store too")
+
+
+def _check_known(store: Store, key: str, resume: bool, said: Callable[[int], str]) -> None:
+    known = len(store.rows(key))
+    if known and not resume:
+        problem = f"it holds {said(known)} of this study already"
+        remedy = "Resume (--resume, or resume=True), or name another file"
+        raise refusal(problem, str(store.path), "store", remedy=remedy)
 
 
 def concluded_effects(study: Effects, rows: Sequence[Row]) -> EffectsStudy:

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from loomopt.interface.report.animation import MovingPicture
     from loomopt.interface.text.notebook import Sketch
+    from loomopt.interface.torque_budget import Budget
     from loomopt.solving.answer.solution import Proofs
 
-PICTURE = "a path that ends in .png, .svg or .pdf", "Name a file, or leave it out"
-"""What a figure may be written to, and what to do where it is none."""
+PICTURE = arguments.PICTURE
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,13 +64,27 @@ class Evaluation(solution.Evaluated, records.Shown):
 
         path: a file to write it to as well: .png, .svg or .pdf. beside: as in `loomopt.simulate`. Raises BadInput.
         """
+        solution.demand_single(self, "curves")
         from loomopt.interface.files import outputs
 
         place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
         return outputs.plot(self, self.scene, self.target, place, beside)
 
+    def plot_forces(self, path: str | os.PathLike[str] | None = None) -> "Figure":
+        """Return the forces that an effect tells by components: size over the turn, and each one's polar diagram.
+
+        path: a file to write it to as well: .png, .svg or .pdf. Raises BadInput, also where no effect tells any.
+        """
+        from loomopt.interface import forces
+        from loomopt.interface.figures import forces as figures
+
+        place = None if path is None else Path(arguments.path(path, "path", *PICTURE))
+        drawn: Figure = figures.plot(self.scene, forces.found(self.scene, self.simulate(), self.design), place)
+        return drawn
+
     def draw(self) -> "Sketch":
         """Return the mechanism drawn at full scale, which shows itself in Jupyter. Raises BadInput."""
+        solution.demand_single(self, "drawing")
         from loomopt.interface.files import outputs
         from loomopt.interface.text import notebook
 
@@ -78,16 +93,42 @@ class Evaluation(solution.Evaluated, records.Shown):
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write linkage or cam for the workshop, as `loomopt export` does; return the file. Raises BadInput.
 
-        path: .dxf or .svg at true scale; .csv for the joints or the profile.
+        path: .dxf or .svg at true scale; .csv or .xlsx for the joints or the profile.
         """
+        solution.demand_single(self, "drawing")
         from loomopt.interface.files import outputs
 
-        place = Path(arguments.path(path, "path", "a path that ends in .dxf, .svg or .csv", "Name a file"))
+        place = Path(arguments.path(path, "path", "a path that ends in .dxf, .svg, .csv or .xlsx", "Name a file"))
         outputs.linkage(place, self.scene, self.design, outputs.what(self))
         return place
 
+    def report(self, path: str | os.PathLike[str], *beside: object) -> Path:
+        """Write one self-contained page, which says first what the design truly is; return the file. Raises BadInput.
+
+        path: one that ends in .html. beside: what was computed of the same scene, to stand on the page too: fronts,
+        sweeps, effects, sensitivities, tolerances, torque budgets, accuracy, proofs.
+        """
+        from loomopt.interface.report import document
+
+        place = Path(arguments.path(path, "path", "a path that ends in .html", "Name a file"))
+        document.write(place, document.of_answer(self, beside))
+        return place
+
+    def animate(self, path: str | os.PathLike[str] | None = None) -> "MovingPicture":
+        """Return the mechanism moving through its turn, which shows itself in Jupyter. Raises BadInput.
+
+        path: a file to write it to as well: .html, .gif, or .mp4 where ffmpeg is found.
+        """
+        solution.demand_single(self, "drawing")
+        from loomopt.interface.files import outputs
+        from loomopt.interface.report import animation
+
+        place = None if path is None else Path(arguments.path(path, "path", *animation.FILE))
+        return animation.animated(self.scene, self.design, place, outputs.what(self))
+
     def evaluate(self) -> "Evaluation":
         """Return figures and limits of the design in its own scene, judged by the limits of its own target."""
+        solution.demand_single(self, "figures to evaluate")
         design = designs.checked(self.design, self.scene)
         if self.terms:
             return _judged(self.terms.evaluation(design), self.scene, self.target)
@@ -97,16 +138,25 @@ class Evaluation(solution.Evaluated, records.Shown):
         self, *, accuracy: float | None = None, beside: str | os.PathLike[str] | None = None
     ) -> "pd.DataFrame":
         """Return the curves of the design in its own scene; accuracy, beside: as in `loomopt.simulate`."""
+        solution.demand_single(self, "curves")
         from loomopt.interface import tables
 
         if accuracy is not None:
             check_numbers(accuracy, 1)
         return tables.curves(self.scene, self.design, accuracy, self.target, beside)
 
+    def budget(self, *, fluctuation: float | None = None) -> "Budget":
+        """Return where the crank torque of the design comes from; fluctuation: as in `loomopt.budget`."""
+        solution.demand_single(self, "torque budget")
+        from loomopt.interface.torque_budget import drawn_up
+
+        return drawn_up(self.scene, designs.checked(self.design, self.scene), fluctuation)
+
     def prove(self, *, slack: float = SLACK) -> "Proofs":
         """Return proofs of the limits of its own scene and target; slack: as in `loomopt.prove`. Raises BadInput."""
         from loomopt.solving.proof import whole_cycle
 
+        solution.demand_single(self, "proofs")
         design = designs.checked(self.design, self.scene)
         return (
             self.terms.proofs(design, slack)
@@ -131,8 +181,9 @@ class Evaluation(solution.Evaluated, records.Shown):
         from loomopt.solving.answer.solution import Words
 
         sizes = dict[str, float]()
-        if not self.terms:
-            objectives = registry.of(self.scene).program(self.scene, self.target).objectives
+        if not self.terms and self.target:
+            job = registry.of_target(self.scene, self.target)
+            objectives = job.program(self.scene, self.target).objectives
             sizes = {each.figure: each.scale if each.power == 1 else 0.0 for each in objectives}
         words, all_of = Words(self.scene), {**self.design, **self.figures}
         told = list[str]()
@@ -142,6 +193,18 @@ class Evaluation(solution.Evaluated, records.Shown):
                 value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(name, 0.0) else value
                 told.append(f"{name} {words.shown(name, value)}")
         return ", ".join(told)
+
+    def __str__(self) -> str:
+        from loomopt.interface.text import answers, layout
+
+        before = None if self._is_today else evaluated(self.scene, None, self.target or None)
+        return layout.render(answers.evaluation(self, self.scene, before), layout.width())
+
+    @property
+    def _is_today(self) -> bool:
+        from loomopt.jobs import registry
+
+        return designs.flat(self.design).items() <= registry.of(self.scene).today(self.scene).items()
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.problem}, {self.sought}: {self._outcome}; {self._summary}>"
@@ -155,6 +218,11 @@ class Answer(Evaluation, solution.Solution):
     def before(self) -> Evaluation | None:
         """Today's machine, evaluated when it is first read."""
         return _judged(self.today(), self.scene, self.target) if self.today else None
+
+    def __str__(self) -> str:
+        from loomopt.interface.text import answers, layout
+
+        return layout.render(answers.solution(self, self.scene), layout.width())
 
     @property
     def _outcome(self) -> str:
@@ -187,7 +255,15 @@ def evaluated(scene: Scene, design: Mapping[str, float] | None, target: str | No
 
 def solved(found: solution.Solution, scene: Scene, target: str | None = None) -> Answer:
     """Return what a solve says as an object to work with; target: as the call named it."""
-    return Answer(**_fields(found) | {"scene": scene, "asked": target})
+    members = tuple(_member(each, scene) for each in found.members)
+    return Answer(**_fields(found) | {"scene": scene, "asked": target, "members": members})
+
+
+def _member(found: solution.Evaluated, scene: Scene) -> Evaluation:
+    """Return a member of a scene's family as an object to work with, in its own scene and for its own target."""
+    from loomopt.scenes import family
+
+    return _judged(found, found.scene or scene, family.of_target(scene))
 
 
 def _judged(found: solution.Evaluated, scene: Scene, target: str) -> Evaluation:

@@ -62,7 +62,7 @@ def rows(solution: Evaluated, scene: Scene, before: Evaluated | None = None) -> 
     binding = {price.limit: price.side for price in prices}
     found = []
     for name, value in {**solution.design, **solution.figures}.items():
-        if value is None or name == "change" or name in scene.schema.lists:
+        if value is None or getattr(name, "of", name) == "change" or name in scene.schema.lists:
             continue
         unit = words.unit(name)
         size, limit = factor(unit), limits.get(name)
@@ -83,7 +83,11 @@ def _as_written(value: float, size: float) -> float:
     return short if math.isclose(short * size, value, rel_tol=sys.float_info.epsilon) else exact
 
 
-PER_SECOND = {"travel acceleration": ("acceleration", 2), "travel jerk": ("jerk", 3)}
+PER_SECOND = {
+    "travel velocity": ("velocity", 1),
+    "travel acceleration": ("acceleration", 2),
+    "travel jerk": ("jerk", 3),
+}
 """Kind of a motion per radian of the crank → its kind in time, and the power of the speed between them."""
 
 

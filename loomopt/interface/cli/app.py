@@ -16,9 +16,31 @@ import typer
 
 from loomopt.base import __version__, interrupts
 from loomopt.base.errors import BadInput, blamed, clean
-from loomopt.interface.cli import commands, studies
-from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without, printed, remarked
-from loomopt.interface.cli.shell import DIFFERS, Progress, mistake, only, read_number, read_scene, remark, worded
+from loomopt.interface.cli import commands, pages, studies
+from loomopt.interface.cli.commands import (
+    Decimal,
+    Free,
+    Json,
+    Problem,
+    Set,
+    With,
+    Without,
+    printed,
+    remarked,
+    tell,
+    write,
+)
+from loomopt.interface.cli.shell import (
+    DIFFERS,
+    Progress,
+    mistake,
+    only,
+    read_number,
+    read_scene,
+    read_steps,
+    remark,
+    worded,
+)
 
 HEADER = Path("include", "coin-or", "IpoptConfig.h")
 """Where IPOPT says its version: beside CasADi's library in its wheel, below the prefix where both were built apart."""
@@ -84,10 +106,20 @@ def solve(
     everywhere: Annotated[bool, typer.Option("--global", help="Prove that no admissible design is better.")] = False,
     gap: Annotated[str, typer.Option(metavar="R", help="What --global leaves open, relative.")] = "1e-3",
     seconds: Annotated[str, typer.Option("--time", metavar="S", help="How long --global may take, s.")] = "60",
+    robust: Annotated[
+        str | None, typer.Option(metavar="SIGMAS", help="Back every limit off by so many sigma of its figure.")
+    ] = None,
+    least: Annotated[
+        str | None, typer.Option("--yield", metavar="Y", help="So far that this share of machines holds all limits.")
+    ] = None,
+    steps: Annotated[
+        str | None, typer.Option("--round", metavar="NAME=STEP,…", help="Put numbers to sizes; `scene`: to its own.")
+    ] = None,
     as_json: Json = False,
     outs: Annotated[
-        list[Path] | None, typer.Option("--out", metavar="DIR", help="Write answer, tables and drawing there.")
+        list[Path] | None, typer.Option("--out", metavar="DIR|F.xlsx", help="Write answer, tables and drawing there.")
     ] = None,
+    decimal: Decimal = "point",
 ) -> None:
     """Solve a problem and certify the answer."""
     from loomopt.interface import api
@@ -97,17 +129,21 @@ def solve(
     settings["starts"] = None if starts is None else read_number("--starts", starts, int)
     settings |= {"gap": read_number("--gap", gap, float), "seconds": read_number("--time", seconds, float)}
     settings |= {"prove": proven, "everywhere": everywhere}
+    settings["robust"] = None if robust is None else read_number("--robust", robust, float)
+    settings["yield_"] = None if least is None else read_number("--yield", least, float)
+    settings["steps"] = steps is not None and (steps == "scene" or read_steps(steps))
     out = only("--out", outs)
     if out:
-        from loomopt.interface.files import outputs
+        from loomopt.interface.files import outputs, sheets
 
-        outputs.check_folder(out)
+        comma = sheets.decimal_comma(decimal)
+        outputs.check_answer(out)
     with Progress() as progress:
         answer = api.solve(scene, target, **settings, on_step=progress.say)
     unwritten = None
     if out:
         try:
-            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene)))
+            remark("Wrote " + ", ".join(str(path) for path in outputs.answer(out, answer, scene, comma)))
         except BadInput as error:
             unwritten = error
     remarked(scene, answer.design)
@@ -132,15 +168,17 @@ def accuracy(
     full: Annotated[bool, typer.Option("--full", help="More settings, more repeats: minutes.")] = False,
     as_json: Json = False,
     out: Annotated[
-        list[Path] | None, typer.Option(metavar="F", help="Write the figure (.png, .svg, .pdf) or the table (.csv).")
+        list[Path] | None,
+        typer.Option(metavar="F", help="Write figure (.png, .svg, .pdf) or table (.csv, .xlsx)."),
     ] = None,
+    decimal: Decimal = "point",
 ) -> None:
     """Show what accuracy costs in time, method by method."""
     from loomopt.interface.figures import accuracy
-    from loomopt.interface.files import outputs
-    from loomopt.interface.text import layout
+    from loomopt.interface.files import sheets
     from loomopt.studies.accuracy import accuracy as study
 
+    comma = sheets.decimal_comma(decimal)
     for path in out or ():
         accuracy.check(path)
     scene = read_scene(problem, sets, on, off, free)
@@ -151,13 +189,8 @@ def accuracy(
     finally:
         if climbs:
             found = study.concluded(scene, climbs, full)
-            if as_json:
-                print(outputs.json_text(found.as_dict()))
-            else:
-                layout.show(*accuracy.parts(found))
-    for path in out or ():
-        accuracy.write(found, path)
-        remark(f"Wrote {path}")
+            tell(as_json, found.as_dict, lambda: accuracy.parts(found))
+    write(out, lambda path: accuracy.write(found, path, comma))
 
 
 def check(
@@ -192,16 +225,41 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "solve": solve,
     **commands.OF_A_DESIGN,
     **studies.STUDIES,
+    **pages.PAGES,
     "accuracy": accuracy,
     "check": check,
 }
 """Name → command, in the order that help lists them in."""
 
 
+EXAMPLES = {
+    "list": "loomopt list --json",
+    "new": "loomopt new beatup my-loom.toml",
+    "schema": "loomopt schema beatup > beatup.schema.json",
+    "show": "loomopt show beatup --equations --animate beatup.html",
+    "solve": 'loomopt solve beatup --target balance --set operation.M0="800 N*m" --out balanced',
+    "evaluate": "loomopt evaluate beatup --design answer.json --json",
+    "prove": "loomopt prove beatup --design answer.json",
+    "simulate": "loomopt simulate beatup --design answer.json --out curves.csv --out curves.png",
+    "export": "loomopt export shedding --design answer.json --out cam.dxf",
+    "sweep": 'loomopt sweep beatup --over "operation.M0=600:900:25 N*m" --out m0.xlsx --figure m0.png',
+    "pareto": "loomopt pareto beatup --minimise peak_torque --against m4e --points 20 --figure front.png",
+    "budget": "loomopt budget beatup --design answer.json --fluctuation 0.02 --figure shares.png",
+    "sensitivity": "loomopt sensitivity beatup --figure tornado.png",
+    "tolerance": "loomopt tolerance my-loom.toml --design answer.json --figure spread.png",
+    "effects": "loomopt effects beatup --tolerance 0.01 --figure effects.png",
+    "compare": "loomopt compare one.json other.json today --figure both.png",
+    "report": "loomopt report beatup answer.json front.db --out report.html",
+    "accuracy": "loomopt accuracy beatup --out accuracy.png",
+    "check": "loomopt check beatup",
+}
+"""Name of each command → a call of it, as its help shows one."""
+
+
 def application(words: list[str]) -> typer.Typer:
     """Return the command line that reads words: with the one command they begin with, else with all of them."""
     app = typer.Typer(
-        add_completion=False,
+        add_completion=not words or words[0] not in COMMANDS,  # what one command never needs
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -209,7 +267,8 @@ def application(words: list[str]) -> typer.Typer:
     )
     app.callback(invoke_without_command=True)(start)
     for name in set(words[:1]) & COMMANDS.keys() or COMMANDS:
-        app.command(name)(COMMANDS[name])
+        epilog = f"For example: {EXAMPLES[name]}" if name in EXAMPLES else None
+        app.command(name, epilog=epilog)(COMMANDS[name])
     return app
 
 
@@ -258,6 +317,8 @@ def not_ours(error: BaseException) -> str:
     told = blamed(error)
     if isinstance(told, BadInput):
         return str(told)
+    if isinstance(error, SystemExit):  # so Typer leaves where it has answered a shell's completion
+        return ""
     notes = getattr(error, "__notes__", ())
     return clean("; ".join([f"it fails: {type(error).__name__}: {error}", *notes])) + "." if notes else ""
 

@@ -1,15 +1,15 @@
 """The commands that show: scenes, figures of a design, curves, drawings, proofs. Nothing is optimised here."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from loomopt.base.errors import BadInput
 from loomopt.interface.cli.shell import DIFFERS, Progress, read_number, read_request, remark
 
 if TYPE_CHECKING:
+    from loomopt.interface.text.layout import Grid
     from loomopt.scenes.designs import Design as DesignGiven
     from loomopt.scenes.scene import Scene
     from loomopt.solving.answer.solution import Evaluated
@@ -28,9 +28,41 @@ Design = Annotated[
     Path | None, typer.Option("--design", metavar="FILE", help="A design or an answer as JSON; - for a pipe.")
 ]
 
+Decimal = Annotated[str, typer.Option(metavar="point|comma", help="The decimal sign of CSV files.")]
 Target = Annotated[
     str | None, typer.Option(help="Whose limits count; the answer's own, or the job's default, without it.")
 ]
+
+
+def checked(figures: Sequence[Path] | None, tables: Sequence[Path] | None = None) -> None:
+    """Raise BadInput for files that cannot be written, before anything is computed."""
+    from loomopt.interface.text import studies
+
+    for path in figures or ():
+        studies.check_figure(path)
+    for path in tables or ():
+        studies.check_table(path)
+
+
+def tell(
+    as_json: bool, document: Callable[[], Mapping[str, object]], parts: "Callable[[], Sequence[str | Grid]]"
+) -> None:
+    """Print what was found as one JSON object, or its parts."""
+    if as_json:
+        from loomopt.interface.files import outputs
+
+        print(outputs.json_text(document()))
+    else:
+        from loomopt.interface.text import layout
+
+        layout.show(*parts())
+
+
+def write(paths: Sequence[Path] | None, one: Callable[[Path], object]) -> None:
+    """Write every file that is asked for, and say so."""
+    for path in paths or ():
+        one(path)
+        remark(f"Wrote {path}")
 
 
 def remarked(scene: "Scene", design: "DesignGiven") -> None:
@@ -49,51 +81,51 @@ def printed(found: "Evaluated") -> None:
     print(outputs.document(found))
 
 
-def list_problems() -> None:
+def list_problems(as_json: Json = False) -> None:
     """List the packaged problems and their targets."""
-    from loomopt.interface.text import layout
-    from loomopt.scenes import packaged
+    from loomopt.interface import listing
 
-    heads, faults = [packaged.head(path) for path in packaged.problems().values()], list[BadInput]()
-    silent = [head.name for head in heads if not head.targets]
-    if silent or packaged.entry_points("loomopt.jobs"):  # whose targets only their jobs know: those are read whole
-        from loomopt.jobs import registry
+    heads, faults = listing.problems()
+    if as_json:
+        from loomopt.interface.files import outputs
 
-        others, wrong = registry.brought()
-        read, faults = registry.heads([*silent, *(others.keys() - packaged.problems().keys())])
-        heads, faults = [*(head for head in heads if head.targets), *read], [*wrong, *faults]
-    lines = [
-        row
-        for head in sorted(heads)
-        for row in (
-            (head.name, head.title),
-            ("", f"job {head.job}; targets {', '.join(head.targets)}"),
-            ("", f"source: {head.source or 'not given'}"),
-        )
-    ]
-    layout.show(layout.Grid("", ("problem", "what it is"), tuple(lines)))
+        print(outputs.json_text({"problems": [head._asdict() for head in heads]}))
+    else:
+        from loomopt.interface.text import layout
+
+        lines = [
+            row
+            for head in heads
+            for row in (
+                (head.name, head.title),
+                ("", f"job {head.job}; targets {', '.join(head.targets)}"),
+                ("", f"source: {head.source or 'not given'}"),
+            )
+        ]
+        layout.show(layout.Grid("", ("problem", "what it is"), tuple(lines)))
     for fault in faults:
         remark(f"loomopt: {fault}")
 
 
 def new(
-    job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")],
-    file: Annotated[Path, typer.Argument(help="The scene to write; it must not exist yet.")],
+    job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all. With --from, the file.")],
+    file: Annotated[Path | None, typer.Argument(help="The scene to write; it must not exist yet.")] = None,
+    start: Annotated[
+        str | None, typer.Option("--from", metavar="NAME", help="Copy this packaged problem; as .zip, all of its job.")
+    ] = None,
 ) -> None:
     """Write a commented scene to start from."""
     from loomopt.base.errors import refusal
-    from loomopt.base.files import atomically
-    from loomopt.jobs import registry
+    from loomopt.interface import listing
 
-    template = registry.template(job)
-    if file.exists():
-        raise refusal("the file exists already", str(file), remedy="Choose another name, or remove it first")
-    atomically(file, lambda place: _write(place, template))
-    remark(f"Wrote {file}. Next: loomopt show {file}, then loomopt solve {file}")
-
-
-def _write(place: Path, text: str) -> None:
-    place.write_text(text, encoding="utf-8")
+    if (file is None) == (start is None):
+        remedy = "Write `loomopt new JOB FILE`, or `loomopt new --from NAME FILE`"
+        raise refusal("it takes a job and a file, or a packaged problem and a file", "", "new", remedy=remedy)
+    path = listing.copied(start, Path(job)) if start is not None else listing.template(job, file or Path())
+    zipped = path.suffix.lower() == listing.ZIP
+    scene = f"{start}.toml" if zipped else path
+    then = "unpack it, then " if zipped else ""
+    remark(f"Wrote {path}. Next: {then}loomopt show {scene}, then loomopt solve {scene}")
 
 
 def schema(job: Annotated[str, typer.Argument(help="A loom job; a wrong name lists them all.")]) -> None:
@@ -112,26 +144,31 @@ def show(
     symbols: Annotated[bool, typer.Option("--symbols", help="Print what every symbol of its tables means.")] = False,
     sources: Annotated[bool, typer.Option("--sources", help="Print its source's figures, and as computed.")] = False,
     figure: Annotated[list[Path] | None, typer.Option(metavar="F", help="Draw it: .png, .svg or .pdf.")] = None,
+    animate: Annotated[list[Path] | None, typer.Option(metavar="F", help="Have it move: .html, .gif or .mp4.")] = None,
     design: Design = None,
     sets: Set = None,
     on: With = None,
     off: Without = None,
     free: Free = None,
 ) -> None:
-    """Show a scene: as read, its equations, symbols, sources; draw it."""
+    """Show a scene as read, its equations, symbols, sources."""
     from loomopt.interface import api
     from loomopt.interface.files import outputs
     from loomopt.interface.text import glossary, layout, scenes
 
     scene, given, name, status = read_request(problem, design, None, sets, on, off, free)
-    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and figure else None
-    for path in figure or ():
-        outputs.picture(path, scene, given, said)
-        remark(f"Wrote {path}")
+    said = outputs.what(api.evaluate(scene, given, name), name, status) if given and (figure or animate) else None
+    write(figure, lambda path: outputs.picture(path, scene, given, said))
+    if animate:
+        from loomopt.interface.report import animation
+
+        for path in animate:
+            animation.checked(path)
+        write(animate, lambda path: animation.animated(scene, given, path, said))
     shown: list[str | layout.Grid] = [*scenes.equations(scene)] if equations else []
     shown += glossary.parts(scene) if symbols else []
     shown += glossary.printed(scene) if sources else []
-    if shown or not figure:
+    if shown or not (figure or animate):
         layout.show(*(shown or scenes.parts(scene)))
 
 
@@ -170,19 +207,15 @@ def prove(
     free: Free = None,
     as_json: Json = False,
 ) -> None:
-    """Prove limits and peaks at every crank angle, or show where not."""
+    """Prove limits and peaks at every crank angle, or refute."""
     from loomopt.interface import api
-    from loomopt.interface.files import outputs
-    from loomopt.interface.text import answers, layout
+    from loomopt.interface.text import answers
 
     scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
     with Progress() as progress:
         progress.say("proving")
         found = api.prove(scene, given, name, slack=read_number("--slack", slack, float))
-    if as_json:
-        print(outputs.json_text(found.as_dict()))
-    else:
-        layout.show(*answers.proofs(found))
+    tell(as_json, found.as_dict, lambda: answers.proofs(found))
     raise typer.Exit(0 if found.passed else DIFFERS)
 
 
@@ -192,7 +225,7 @@ def simulate(
     target: Target = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(metavar="F", help="Write curves (.csv, .parquet) or a figure (.png, .svg, .pdf)."),
+        typer.Option(metavar="F", help="Write curves (.csv, .xlsx, .parquet) or a figure (.png, .svg, .pdf)."),
     ] = None,
     accuracy: Annotated[
         str | None, typer.Option(metavar="R", help="As few rows as show each peak to R; with --out.")
@@ -200,6 +233,8 @@ def simulate(
     beside: Annotated[
         Path | None, typer.Option(metavar="F.csv", help="What was measured: phi [deg] and columns of the curves.")
     ] = None,
+    forces: Annotated[bool, typer.Option("--forces", help="Forces in joints; pictures are their diagrams.")] = False,
+    decimal: Decimal = "point",
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -207,33 +242,70 @@ def simulate(
 ) -> None:
     """Compute curves over the cycle; print them without --out."""
     from loomopt.interface import api
-    from loomopt.interface.files import outputs
+    from loomopt.interface.files import outputs, sheets
     from loomopt.interface.text import layout, scenes
     from loomopt.solving.options import check_numbers
 
+    comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     asked = None if accuracy is None else read_number("--accuracy", accuracy, float)
     if asked is not None:
         check_numbers(asked, 1)
+    told = scenes.forces(scene, api.simulate(scene, given, name), given) if forces else ()
     compared = [scenes.beside(scene, api.simulate(scene, given, name, beside=beside))] if beside else []
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given and out else None
     for path in out or ():
-        outputs.curves(path, scene, given, asked, name, said, beside)
+        if forces and path.suffix.lower() in outputs.PICTURES:
+            api.evaluate(scene, given, name).plot_forces(path)
+        else:
+            outputs.curves(path, scene, given, asked, name, said, beside, comma)
         remark(f"Wrote {path}")
-    if not out:
+    if forces:
+        layout.show(*told, *compared)
+    elif not out:
         layout.show(*scenes.curves(scene, given, layout.width()), *compared)
     elif compared:
         layout.show(*compared)
     remarked(scene, given)
 
 
+def budget(
+    problem: Problem,
+    design: Design = None,
+    fluctuation: Annotated[
+        str | None, typer.Option(metavar="R", help="Size the flywheel for this change of speed, such as 0.02.")
+    ] = None,
+    figures: Annotated[
+        list[Path] | None, typer.Option("--figure", metavar="F", help="Draw the shares: .png, .svg or .pdf.")
+    ] = None,
+    sets: Set = None,
+    on: With = None,
+    off: Without = None,
+    free: Free = None,
+    as_json: Json = False,
+) -> None:
+    """Show where the crank torque comes from; size the motor."""
+    from loomopt.interface import torque_budget
+    from loomopt.interface.text import budget
+
+    checked(figures)
+    scene, given, _, _ = read_request(problem, design, None, sets, on, off, free)
+    asked = None if fluctuation is None else read_number("--fluctuation", fluctuation, float)
+    found = torque_budget.drawn_up(scene, given, asked)
+    remarked(scene, given)
+    tell(as_json, found.as_dict, lambda: budget.parts(found))
+    write(figures, found.plot)
+
+
 def export(
     problem: Problem,
     out: Annotated[
-        list[Path], typer.Option(metavar="F", help="The file: .svg, .dxf, or .csv for joints or profile; any number.")
+        list[Path],
+        typer.Option(metavar="F", help="The file: .svg, .dxf; .csv, .xlsx for joints or profile; any number."),
     ],
     design: Design = None,
     target: Target = None,
+    decimal: Decimal = "point",
     sets: Set = None,
     on: With = None,
     off: Without = None,
@@ -241,13 +313,12 @@ def export(
 ) -> None:
     """Export linkage or cam at true scale, for the workshop."""
     from loomopt.interface import api
-    from loomopt.interface.files import outputs
+    from loomopt.interface.files import outputs, sheets
 
+    comma = sheets.decimal_comma(decimal)
     scene, given, name, status = read_request(problem, design, target, sets, on, off, free)
     said = outputs.what(api.evaluate(scene, given, name), name, status) if given else None
-    for path in out:
-        outputs.linkage(path, scene, given, said)
-        remark(f"Wrote {path}")
+    write(out, lambda path: outputs.linkage(path, scene, given, said, comma))
     remarked(scene, given)
 
 
@@ -256,6 +327,7 @@ OF_A_DESIGN: dict[str, Callable[..., None]] = {
     "evaluate": evaluate,
     "prove": prove,
     "simulate": simulate,
+    "budget": budget,
     "export": export,
 }
 """Name → command, in the order that help lists them in: before and after `solve`."""

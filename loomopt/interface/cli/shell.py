@@ -19,7 +19,21 @@ if TYPE_CHECKING:
 DIFFERS = 1
 """Exit status where a comparison or a proof does not come out as it should."""
 
-OPTIONS = ("accuracy", "over", "points", "resume", "slack", "starts", "store", "target", "tolerance", "workers")
+OPTIONS = (
+    "accuracy",
+    "fluctuation",
+    "over",
+    "points",
+    "resume",
+    "robust",
+    "slack",
+    "starts",
+    "store",
+    "target",
+    "tolerance",
+    "workers",
+    "yield_",
+)
 """Arguments of the Python functions that are options of the same name here."""
 
 SILENT = 1.0
@@ -281,6 +295,20 @@ def read_number(option: str, text: str, kind: type[int] | type[float]) -> Any:
         raise refusal(f"it is not {what}", key=option, origin="", value=text, allowed=allowed, remedy=remedy) from None
 
 
+def read_steps(text: str) -> dict[str, str]:
+    """Return the steps of an option, by number or pattern. Raises BadInput."""
+    from loomopt.base.errors import refusal
+
+    pairs = [each.partition("=") for each in text.split(",")]
+    if not all(name.strip() and step.strip() for name, _, step in pairs):
+        remedy = 'Write --round "l1=0.5 mm,l2=0.5 mm", or --round scene for [steps] and [stock] of the scene'
+        raise refusal("these are no steps", "", "--round", text, "NAME=STEP,…", remedy)
+    found = {name.strip(): step.strip() for name, _, step in pairs}
+    if len(found) < len(pairs):
+        raise refusal("a number has two steps", "", "--round", text, remedy="Give each number one step")
+    return found
+
+
 def remark(text: str) -> None:
     """Say something beside the result; where nobody can hear it, the exit status still tells."""
     with contextlib.suppress(OSError):
@@ -294,7 +322,7 @@ def worded(error: BadInput) -> BadInput:
     return BadInput(
         error.problem,
         file=error.file,
-        key=f"--{error.key}",
+        key=f"--{error.key.rstrip('_')}",
         value=error.value,
         allowed=error.allowed,
         remedy=error.remedy,

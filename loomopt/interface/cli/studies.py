@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from loomopt.interface.cli.commands import Free, Json, Problem, Set, With, Without
+from loomopt.interface.cli.commands import (
+    Decimal,
+    Design,
+    Free,
+    Json,
+    Problem,
+    Set,
+    With,
+    Without,
+    checked,
+    tell,
+    write,
+)
 from loomopt.interface.cli.shell import Progress, read_number, read_scene, remark
 
 if TYPE_CHECKING:
@@ -21,9 +33,12 @@ Workers = Annotated[str | None, typer.Option(metavar="N", help="So many processe
 Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help="The scheduler of a Dask cluster instead.")]
 StoreFile = Annotated[Path | None, typer.Option("--store", metavar="FILE", help="Keep each row there as it comes.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with what the store holds.")]
-Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv or .parquet.")]
+Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
 Figure = Annotated[
     list[Path] | None, typer.Option(metavar="F", help="Draw it, with designs beside: .png, .svg or .pdf.")
+]
+Animate = Annotated[
+    list[Path] | None, typer.Option(metavar="F", help="Have the designs along it move: .html, .gif or .mp4.")
 ]
 Bars = Annotated[list[Path] | None, typer.Option("--figure", metavar="F", help="Draw it: .png, .svg or .pdf.")]
 Si = Annotated[bool, typer.Option("--si", help="Tables in SI, not in the scene's own units.")]
@@ -44,6 +59,8 @@ class Run(NamedTuple):
     figure: list[Path] | None
     si: bool
     as_json: bool
+    decimal: str = "point"
+    animate: list[Path] | None = None
 
 
 def sweep(
@@ -62,13 +79,15 @@ def sweep(
     resume: Resume = False,
     out: Out = None,
     figure: Figure = None,
+    animate: Animate = None,
+    decimal: Decimal = "point",
     si: Si = False,
     as_json: Json = False,
 ) -> None:
     """Solve for every combination of scene numbers."""
     from loomopt.studies.sweep import planned
 
-    how = Run(workers, dask, store, resume, out, figure, si, as_json)
+    how = Run(workers, dask, store, resume, out, figure, si, as_json, decimal, animate)
     scene = read_scene(problem, sets, on, off, free)
     ranges = _parted(over, "--over", "operation.M0=600:900:25 N*m", "KEY=LO:HI:STEP UNIT")
     raise typer.Exit(carried_out(planned(scene, ranges, target), how))
@@ -104,13 +123,15 @@ def pareto(
     resume: Resume = False,
     out: Out = None,
     figure: Figure = None,
+    animate: Animate = None,
+    decimal: Decimal = "point",
     si: Si = False,
     as_json: Json = False,
 ) -> None:
     """Show what two figures cost each other: the whole front."""
     from loomopt.studies.front import front
 
-    how = Run(workers, dask, store, resume, out, figure, si, as_json)
+    how = Run(workers, dask, store, resume, out, figure, si, as_json, decimal, animate)
     scene = read_scene(problem, sets, on, off, free)
     axes = _axes(minimise or [], maximise or [], against)
     ranges = front.si(scene, _parted(bounds or [], "--range", "m4e=0:5 kg", "B=LO:HI UNIT"))
@@ -156,14 +177,17 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
     """Run a study, print and write it; return the exit status. What is finished is printed after Ctrl-C too."""
     from concurrent.futures import BrokenExecutor
 
+    from loomopt.interface.files import sheets
     from loomopt.interface.finished import DesignStudy, conducted
-    from loomopt.interface.text import studies
     from loomopt.studies.run.rows import counted
 
-    for path in how.out or ():
-        studies.check_table(path)
-    for path in how.figure or ():
-        studies.check_figure(path)
+    sheets.decimal_comma(how.decimal)
+    checked(how.figure, how.out)
+    if how.animate:
+        from loomopt.interface.report import animation
+
+        for path in how.animate:
+            animation.checked(path)
     _apart(how)
     rows: dict[int, Row] = {}
 
@@ -189,23 +213,25 @@ def carried_out(study: "SceneStudy", how: Run) -> int:
 
 def _write(found: "DesignStudy", how: Run, more: str = "") -> None:
     """Write tables and figures; more: what is said of them beside their name."""
+    from loomopt.interface.files import sheets
     from loomopt.interface.text import studies
 
     for path in how.out or ():
-        studies.table(path, found.table(si=how.si))
+        studies.table(path, found.table(si=how.si), comma=sheets.decimal_comma(how.decimal))
         remark(f"Wrote {path}{more}")
     drawn = any(row.certified for row in found.rows)
-    for path in how.figure or ():
-        if drawn:
-            found.plot(path)
-        remark(f"Wrote {path}{more}" if drawn else f"{path} is not written: no row is certified")
+    for paths, draw in ((how.figure, found.plot), (how.animate, found.animate)):
+        for path in paths or ():
+            if drawn:
+                draw(path)
+            remark(f"Wrote {path}{more}" if drawn else f"{path} is not written: no row is certified")
 
 
 def _apart(how: Run) -> None:
     """Raise BadInput where a table or a figure would be written over the store."""
     from loomopt.base.errors import refusal
 
-    for path in (*(how.out or ()), *(how.figure or ())):
+    for path in (*(how.out or ()), *(how.figure or ()), *(how.animate or ())):
         if how.store and path.resolve() == how.store.resolve():
             raise refusal(
                 "it is the store's own file", str(path), "--store", remedy="Name another file for one of them"
@@ -229,13 +255,9 @@ def _executor(dask: str | None, count: int | None) -> "Iterator[Executor | None]
 
 
 def _print(found: "DesignStudy", how: Run) -> None:
-    from loomopt.interface.files import outputs
-    from loomopt.interface.text import layout, studies
+    from loomopt.interface.text import studies
 
-    if how.as_json:
-        print(outputs.json_text(found.as_dict()))
-    else:
-        layout.show(*studies.parts(found.study, found.solved, how.si))
+    tell(how.as_json, found.as_dict, lambda: studies.parts(found.study, found.solved, how.si))
 
 
 def status(rows: "tuple[Row, ...]") -> int:
@@ -262,12 +284,10 @@ def effects(
 ) -> None:
     """Show what each effect is worth, and what may be left out."""
     from loomopt.interface import finished
-    from loomopt.interface.files import outputs
-    from loomopt.interface.text import effects, layout, studies
+    from loomopt.interface.text import effects
     from loomopt.studies.effects.study import planned
 
-    for path in figure or ():
-        studies.check_figure(path)
+    checked(figure)
     count = None if workers is None else read_number("--workers", workers, int)
     scene = read_scene(problem, sets, on, off, free)
     study = planned(scene, target, read_number("--tolerance", tolerance, float))
@@ -278,10 +298,7 @@ def effects(
         progress.say(f"{len(rows)} solved")
 
     def told(found: finished.EffectsStudy) -> None:
-        if as_json:
-            print(outputs.json_text(found.as_dict()))
-        else:
-            layout.show(*effects.parts(found))
+        tell(as_json, found.as_dict, lambda: effects.parts(found))
 
     try:
         with _executor(dask, count) as executor, Progress() as progress:
@@ -299,6 +316,83 @@ def effects(
     raise typer.Exit(outcome(found.statuses))
 
 
+def sensitivity(
+    problem: Problem,
+    target: Target = None,
+    sets: Set = None,
+    on: With = None,
+    off: Without = None,
+    free: Free = None,
+    figure: Bars = None,
+    out: Out = None,
+    decimal: Decimal = "point",
+    as_json: Json = False,
+) -> None:
+    """Show how the optimum moves with every number."""
+    from loomopt.interface import api, finished
+    from loomopt.interface.files import outputs, sheets
+    from loomopt.interface.text import sensitivity, studies
+    from loomopt.studies.sensitivity.study import planned
+
+    checked(figure, out)
+    comma = sheets.decimal_comma(decimal)
+    scene = read_scene(problem, sets, on, off, free)
+    with Progress() as progress:
+        answer = api.solve(scene, target, on_step=progress.say)
+        if answer.status != "optimal":
+            if as_json:
+                refused = {"rows": [], "prices": [], "refused": answer.message}
+                print(outputs.json_text({"problem": scene.name, "target": answer.target, **refused}))
+            else:
+                remark(answer.message)
+            raise typer.Exit(INFEASIBLE if answer.status == "infeasible" else NOT_CERTIFIED)
+        found = finished.conducted_sensitivity(planned(scene, answer), progress.say)
+    tell(as_json, found.as_dict, lambda: sensitivity.parts(found))
+    write(out, lambda path: studies.table(path, found.table(), comma=comma))
+    write(figure, found.plot)
+    raise typer.Exit(NOT_CERTIFIED if found.refused else OK)
+
+
+def tolerance(
+    problem: Problem,
+    design: Design = None,
+    target: Target = None,
+    samples: Annotated[str, typer.Option(metavar="N", help="So many machines are drawn.")] = "100000",
+    seed: Annotated[str, typer.Option(metavar="S", help="Of the scrambled points they are drawn by.")] = "0",
+    worst: Annotated[bool, typer.Option(help="Prove the worst case of each figure within all tolerances.")] = True,
+    sets: Set = None,
+    on: With = None,
+    off: Without = None,
+    free: Free = None,
+    workers: Workers = None,
+    dask: Dask = None,
+    store: StoreFile = None,
+    resume: Resume = False,
+    figure: Bars = None,
+    out: Out = None,
+    decimal: Decimal = "point",
+    as_json: Json = False,
+) -> None:
+    """Show how machines spread as they are made, and how many hold."""
+    from loomopt.interface import finished
+    from loomopt.interface.cli.shell import read_request
+    from loomopt.interface.files import sheets
+    from loomopt.interface.text import studies, tolerance
+    from loomopt.studies.tolerance.plan import planned
+
+    checked(figure, out)
+    comma = sheets.decimal_comma(decimal)
+    count = None if workers is None else read_number("--workers", workers, int)
+    drawn, begin = read_number("--samples", samples, int), read_number("--seed", seed, int)
+    scene, given, name, _ = read_request(problem, design, target, sets, on, off, free)
+    plan = planned(scene, given, name, drawn, begin)
+    with _executor(dask, count) as executor, Progress() as progress:
+        found = finished.conducted_tolerance(plan, executor, count, progress.say, worst, store, resume)
+    tell(as_json, found.as_dict, lambda: tolerance.parts(found))
+    write(out, lambda path: studies.table(path, found.table(), comma=comma))
+    write(figure, found.plot)
+
+
 def outcome(statuses: Sequence[str]) -> int:
     """Return the exit status of a study by those of its solves; what need not be solved counts as it is."""
     solved = [status for status in statuses if status not in ANSWERED]
@@ -307,5 +401,11 @@ def outcome(statuses: Sequence[str]) -> int:
     return OK if all(status in ("optimal", "infeasible") for status in solved) else NOT_CERTIFIED
 
 
-STUDIES: dict[str, Callable[..., None]] = {"sweep": sweep, "pareto": pareto, "effects": effects}
+STUDIES: dict[str, Callable[..., None]] = {
+    "sweep": sweep,
+    "pareto": pareto,
+    "effects": effects,
+    "sensitivity": sensitivity,
+    "tolerance": tolerance,
+}
 """Name → command."""

@@ -9,14 +9,13 @@ from typing import Any
 from loomopt.base.files import atomically, suffix
 from loomopt.base.files import check as check_file
 from loomopt.interface.figures.figure import COLOURS, STYLES, Entry, frame, head, own_style, page, save
-from loomopt.interface.files import outputs
+from loomopt.interface.files import sheets
 from loomopt.interface.text.layout import Grid, joined
-from loomopt.scenes import provenance
 from loomopt.studies.accuracy.accuracy import AccuracyStudy, in_time
 from loomopt.studies.accuracy.readings import NUMBERS
 from loomopt.studies.accuracy.subject import LadderRow, grouped, setting_text
 
-FORMATS = (".png", ".svg", ".pdf", ".csv")
+FORMATS = (".png", ".svg", ".pdf", ".csv", ".xlsx")
 LEAST = 1e-17
 """Errors below this, zero among them, are drawn here."""
 COLUMNS = 2
@@ -63,10 +62,10 @@ def check(path: Path) -> None:
     check_file(path)
 
 
-def write(study: AccuracyStudy, path: Path) -> None:
-    """Write a study's table as CSV, or its figure, by the file's ending."""
-    if suffix(path, FORMATS) == ".csv":
-        outputs.text(path, provenance.csv(study.table()))
+def write(study: AccuracyStudy, path: Path, comma: bool = False) -> None:
+    """Write a study's table or its figure, by the file's ending; comma: whether CSV has decimal commas."""
+    if suffix(path, FORMATS) in sheets.ENDINGS:
+        sheets.write(path, {"accuracy": study.table()}, comma)
     else:
         atomically(path, functools.partial(draw, study))
 

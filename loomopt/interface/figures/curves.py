@@ -85,7 +85,7 @@ def curves(
     panels = panels or each(tuple(frame.columns))
     if not panels or ANGLE not in frame:
         raise ValueError("a table of curves needs `phi [rad]` and one more column with its unit, such as `psi [rad]`")
-    design, before = _turn(frame, marks or {}, unit), _turn(*today, unit) if today else None
+    design, before = turned(frame, marks or {}, unit), turned(*today, unit) if today else None
     with figure.own_style(title, *(marks or {}), *(text for panel in panels for text in (panel.title, *panel.labels))):
         page, cells = _grid(panels, title, f"{angle} phi [{unit}]")
         entries = [_panel(cell.axes, cell.panel, design, before) for cell in cells]
@@ -102,7 +102,7 @@ def curves(
     return page
 
 
-def _turn(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
+def turned(frame: "pd.DataFrame", marks: Marks, unit: str) -> DrawnTurn:
     """Return a table's curves with angles that never fall, closed where the table covers a turn but for its end."""
     angles = np.degrees(np.unwrap(frame[ANGLE].to_numpy(dtype=float)))
     closes = 350.0 < angles[-1] - angles[0] < 360.0 - SAME
@@ -159,17 +159,18 @@ def _both() -> list[Entry]:
 
 def _bracketed(panel: Panel) -> str:
     """Return the unit a panel is shown in, in brackets; "" of a pure number."""
-    unit = _unit(panel)
+    unit = shown_unit(panel)
     return "" if unit == "1" else f" [{unit}]"
 
 
-def _unit(panel: Panel) -> str:
+def shown_unit(panel: Panel) -> str:
+    """Return the unit a panel is shown in."""
     return panel.unit or ("deg" if panel.si == "rad" else panel.si)
 
 
 def _panel(axes: Any, panel: Panel, design: DrawnTurn, before: DrawnTurn | None) -> list[Entry]:
     """Draw a panel's columns with what is marked and limited; return what its legend says."""
-    size = factor(_unit(panel))
+    size = factor(shown_unit(panel))
     drawn = [design.of(column) / size for column in panel.columns]
     old = [before.of(column) / size for column in panel.columns] if before else []
     entries = []
@@ -241,10 +242,10 @@ def _in_g(axes: Any, size: float) -> None:
 
 def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) -> list[Entry]:
     """Mark what of a panel's first column is marked; return what is to say of it."""
-    values, unit = turn.of(panel.columns[0]), _unit(panel)
+    values, unit = turn.of(panel.columns[0]), shown_unit(panel)
     entries = []
     for how in panel.marked:
-        row = _row(values, turn, how)
+        row = marked_row(values, turn, how)
         if row is not None:
             angle, value = float(turn.angles[row]), float(values[row])
             value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
@@ -254,7 +255,7 @@ def _points(axes: Any, panel: Panel, turn: DrawnTurn, colour: str, said: str) ->
     return entries
 
 
-def _row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
+def marked_row(values: Floats, turn: DrawnTurn, how: str) -> int | None:
     """Return the row of what is marked, the first of those alike; None where nothing is known."""
     if how not in WORDS:
         mark = turn.marks.get(how, math.nan)
@@ -283,7 +284,7 @@ def _levels(axes: Any, panel: Panel, size: float) -> list[Entry]:
             low, high = min(low, value - room / 20), max(high, value + room / 20)
         axes.set_ylim(low, high)
         far = "" if values[0] / size in near else ", beyond the scale"
-        entries.append((Line2D([], [], **style), f"{text} {show(values[0], _unit(panel))}{far}"))
+        entries.append((Line2D([], [], **style), f"{text} {show(values[0], shown_unit(panel))}{far}"))
     return entries
 
 

@@ -1,4 +1,6 @@
-"""Drawings as DXF for the workshop: R2010, mm or inches, full scale, one coloured layer for each of the drawing's."""
+"""Drawings as DXF for the workshop: R2010, mm or inches, full scale, a coloured layer for each of the drawing's.
+
+Lengths between joints are dimensions too, which follow their points, on a layer of their own."""
 
 import importlib
 import math
@@ -24,6 +26,8 @@ from loomopt.picture.shapes import (
     scaled,
 )
 
+MEASURES, MEASURED, DECIMALS, AWAY = "measures", 94, 4, 6.0
+"""Layer of dimensions with its AutoCAD colour, their decimals, and how far they stand off, in text heights."""
 _TEXT_STYLE, _DASHES = "LABELS", "DASHES"
 
 
@@ -65,9 +69,35 @@ def _document(drawing: Drawing) -> Any:
     space = document.modelspace()
     for primitive in drawing.primitives:
         _append(space, primitive, drawing.height)
+    if drawing.measures:
+        _measured(document, space, drawing)
     for name in sorted(document.entitydb.dxf_types_in_use()):
         document.classes.add_class(name)  # else ezdxf adds them in the order of a set
     return document
+
+
+def _measured(document: Any, space: Any, drawing: Drawing) -> None:
+    """Add each measure as an aligned dimension that follows its points, on a layer of their own."""
+    document.layers.add(MEASURES, color=MEASURED, lineweight=18)
+    h = drawing.height
+    sizes = {"dimtxt": h, "dimasz": 0.8 * h, "dimexo": 0.5 * h, "dimexe": 0.5 * h, "dimgap": 0.4 * h}
+    style = sizes | {"dimtxsty": _TEXT_STYLE, "dimdec": DECIMALS, "dimzin": 8, "dimtad": 1, "dimlunit": 2}
+    style |= {"dimscale": 1.0, "dimclrd": MEASURED, "dimclre": MEASURED, "dimclrt": MEASURED}
+    ends = [point for each in drawing.measures for point in (each.one, each.other)]
+    middle = [sum(axis) / len(ends) for axis in zip(*ends, strict=True)]
+    for name, *both, half in drawing.measures:
+        one, other = sorted(both)  # from left to right, so that no text stands on its head
+        across = (other.x - one.x) * (middle[1] - one.y) - (other.y - one.y) * (middle[0] - one.x)
+        made = space.add_aligned_dim(
+            one,
+            other,
+            distance=-AWAY * h if across > 0 else AWAY * h,
+            text=f"{name} = <>" + (f" %%p{half:.{DECIMALS}g}" if half else ""),
+            dimstyle="STANDARD",
+            override=style,
+            dxfattribs={"layer": MEASURES},
+        )
+        made.render()
 
 
 def _append(space: Any, primitive: Primitive, text_height: float) -> None:

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, NamedTuple
 from loomopt.base import __version__
 from loomopt.base.errors import BadInput
 from loomopt.base.files import atomically, check, check_room, suffix, together
+from loomopt.base.units import factor
 from loomopt.interface import tables
+from loomopt.interface.files import sheets
 from loomopt.jobs import registry
 from loomopt.model.program import shortfall
 from loomopt.model.session import working
 from loomopt.scenes import provenance
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution
+from loomopt.solving.answer.solution import Evaluated, Solution, Words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
     from loomopt.picture.shapes import Drawing
 
 PICTURES = (".png", ".svg", ".pdf")
-CURVES = (".csv", ".parquet", *PICTURES)
+CURVES = (*sheets.ENDINGS, *PICTURES)
 ANSWER = ("answer.json", "table.csv", "curves.csv", "linkage.svg")
 """Files of an answer."""
 TODAY, GIVEN = "today's machine", "a given design"
@@ -84,22 +86,27 @@ def _put(content: str, place: Path) -> None:
     place.write_text(content, encoding="utf-8")
 
 
-def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
+def answer(folder: Path, solution: Solution, scene: Scene, comma: bool = False) -> list[Path]:
     """Write an answer into a folder: answer.json, table.csv, curves.csv, and linkage.svg where there is one to draw.
 
-    All of them or, where one cannot be written, none. Returns the files. Raises BadInput.
+    All of them or, where one cannot be written, none; a path that ends in .xlsx takes a workbook instead. comma:
+    whether CSV has decimal commas. Returns the files. Raises BadInput.
     """
     from loomopt.interface.files import svg
 
+    if _is_workbook(folder):
+        sheets.write(folder, answer_sheets(solution, scene))
+        return [folder]
+    shown = tables.meaningful(tables.answer(solution, scene))
     contents = {
         "answer.json": document(solution) + "\n",
-        "table.csv": provenance.csv(tables.meaningful(tables.answer(solution, scene))),
-        "curves.csv": provenance.csv(
-            tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
-        ),
+        "table.csv": sheets.separated(provenance.csv(shown), comma),
     }
     view = registry.of(scene).views
-    if not view.missing(scene):
+    if not solution.members:
+        curves = tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
+        contents["curves.csv"] = sheets.separated(provenance.csv(curves), comma)
+    if not solution.members and not view.missing(scene):
         contents["linkage.svg"] = svg.render(drawing(scene, solution.design, what(solution)))
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
@@ -111,6 +118,52 @@ def answer(folder: Path, solution: Solution, scene: Scene) -> list[Path]:
                 place.rmdir()
         raise
     return [folder / name for name in contents]
+
+
+WORKBOOK = ".xlsx"
+
+
+def _is_workbook(path: Path) -> bool:
+    return path.suffix.lower() == WORKBOOK and not path.is_dir()
+
+
+def answer_sheets(solution: Solution, scene: Scene) -> "dict[str, pd.DataFrame]":
+    """Return the sheets of an answer's workbook: its design, its figures, its limits and its curves."""
+    import pandas as pd
+
+    shown = tables.meaningful(tables.answer(solution, scene))
+    is_design = [name in solution.design for name in shown.index]
+    words = Words(scene)
+    rows = []
+    for limit in solution.limits:
+        unit = words.unit(limit.name)
+        ends = {"value": limit.value, "min": limit.min, "max": limit.max}
+        told = {key: None if value is None else value / factor(unit) for key, value in ends.items()}
+        rows.append({"name": limit.name, "unit": unit, **told, "held": limit.ok})
+    limits = tables.meaningful(pd.DataFrame(rows, columns=["name", "unit", "value", "min", "max", "held"]))
+    others = [not own for own in is_design]
+    found = {"design": shown[is_design], "figures": shown[others], "limits": limits}
+    if solution.members:
+        return found
+    curves = tables.filed(tables.curves(scene, solution.design, target=solution.target), scene)
+    return found | {"curves": curves}
+
+
+def check_answer(path: Path) -> None:
+    """Raise BadInput, before anything is computed, where an answer cannot be written there.
+
+    A name with an ending is a file's, never a new folder's.
+    """
+    if path.suffix and not path.is_dir():
+        if path.suffix.lower() != WORKBOOK:
+            allowed = f"{WORKBOOK}, or a folder, whose name has no ending"
+            name = path.stem or "answer"
+            remedy = f"Name another folder, such as {name}, or a workbook, {name}{WORKBOOK}"
+            problem = "the name's ending does not name a format that an answer can be written in"
+            raise BadInput(problem, file=str(path), key="--out", value=path.suffix, allowed=allowed, remedy=remedy)
+        check(path)
+    else:
+        check_folder(path)
 
 
 def _make(folder: Path, missing: Sequence[Path]) -> None:
@@ -148,18 +201,17 @@ def curves(
     target: str | None = None,
     said: DrawnSubject | None = None,
     beside: Path | None = None,
+    comma: bool = False,
 ) -> None:
-    """Write a design's curves as CSV, Parquet or a figure, by the file's ending; accuracy: of peaks, for few rows.
+    """Write a design's curves as a table or a figure, by the file's ending; accuracy: of peaks, for few rows.
 
     target: what the design was found for, to be named in the table; said: what it is, for a figure's title.
-    beside: a file of what was measured.
+    beside: a file of what was measured; comma: whether CSV has decimal commas.
     """
     ending = suffix(path, CURVES)
     frame = tables.curves(scene, design, accuracy, target, beside)
-    if ending == ".csv":
-        text(path, provenance.csv(tables.filed(frame, scene)))
-    elif ending == ".parquet":
-        atomically(path, tables.filed(frame, scene).to_parquet)
+    if ending in sheets.ENDINGS:
+        sheets.write(path, {"curves": tables.filed(frame, scene)}, comma)
     else:
         from loomopt.interface.figures import figure
 
@@ -235,14 +287,20 @@ def drawing(scene: Scene, design: Design, said: DrawnSubject | None = None) -> "
 
 
 @working()
-def linkage(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None) -> None:
-    """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`)."""
-    DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
+def linkage(path: Path, scene: Scene, design: Design, said: DrawnSubject | None = None, comma: bool = False) -> None:
+    """Write a design's linkage in the positions that matter, as its file's ending says (`DRAWINGS`).
+
+    comma: whether CSV has decimal commas.
+    """
+    if suffix(path, tuple(DRAWINGS)) == ".csv" and comma:
+        sheets.write_text(path, registry.of(scene).views.joints_csv(scene, flat(design)), "joints", comma)
+    else:
+        DRAWINGS[suffix(path, tuple(DRAWINGS))](path, scene, design, said)
 
 
 def _joints(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
-    """Write a linkage's joints as CSV."""
-    text(path, registry.of(scene).views.joints_csv(scene, flat(design)))
+    """Write a linkage's joints as CSV, or as a workbook."""
+    sheets.write_text(path, registry.of(scene).views.joints_csv(scene, flat(design)), "joints")
 
 
 def _svg(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
@@ -253,14 +311,19 @@ def _svg(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) ->
 
 
 def _dxf(path: Path, scene: Scene, design: Design, said: DrawnSubject | None) -> None:
-    """Write a linkage as DXF at true scale."""
+    """Write a linkage as DXF at true scale, its lengths with their tolerances."""
     from loomopt.interface.files import dxf
+    from loomopt.studies.tolerance.plan import toleranced
 
-    atomically(path, functools.partial(dxf.write, drawing(scene, design, said)))
+    found, made = drawing(scene, design, said), toleranced(scene)
+    nominal = registry.of(scene).numbers_of(scene, flat(design))
+    halves = {each.number: each.plus_minus(nominal[name]) for name, each in made.items() if name in nominal}
+    measures = tuple(each._replace(half=halves.get(each.name, 0.0)) for each in found.measures)
+    atomically(path, functools.partial(dxf.write, replace(found, measures=measures)))
 
 
 Writer = Callable[[Path, Scene, Design, DrawnSubject | None], None]
-DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints}
+DRAWINGS: dict[str, Writer] = {".svg": _svg, ".dxf": _dxf, ".csv": _joints, ".xlsx": _joints}
 """Ending of a file → what writes a linkage to it."""
 
 

@@ -23,6 +23,8 @@ from loomopt.picture.shapes import (
     scaled,
 )
 
+NAMESPACE = "http://www.w3.org/2000/svg"
+
 
 def render(drawing: Drawing) -> str:
     """Return the drawing as an SVG document: one user unit is 1 mm, its size in the drawing's own unit, y turned up."""
@@ -33,7 +35,7 @@ def render(drawing: Drawing) -> str:
     root = ElementTree.Element(
         "svg",
         {
-            "xmlns": "http://www.w3.org/2000/svg",
+            "xmlns": NAMESPACE,
             "width": f"{_number(size * width)}{unit}",
             "height": f"{_number(size * height)}{unit}",
             "viewBox": f"{_pair(Point(box.left, box.top))} {_pair(Point(width, -height))}",

@@ -9,9 +9,10 @@ from loomopt.base.units import factor
 from loomopt.interface.tables import largest, rows
 from loomopt.interface.text.layout import Grid, joined
 from loomopt.jobs import registry
+from loomopt.model.program import Alias
 from loomopt.physics.tolerances import SHOWN_AS_ZERO, SLACK
 from loomopt.scenes.scene import Scene
-from loomopt.solving.answer.solution import Evaluated, Solution, Words, remedies
+from loomopt.solving.answer.solution import Evaluated, Solution, Words, changed, remedies
 from loomopt.solving.certificate.verdict import GlobalBound
 
 if TYPE_CHECKING:
@@ -24,22 +25,23 @@ def solution(answer: Solution, scene: Scene) -> list[str | Grid]:
     parts: list[str | Grid] = [f"{answer.problem}, {answer.sought}: {answer.outcome}"]
     if answer.relaxation:
         clash = ", ".join(joined(limit) for limit in answer.clash)
-        parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", _relaxation(answer)]
+        parts += [f"No admissible design exists near any start. Limits that clash: {clash}.", relaxation(answer)]
     elif answer.status == "optimal" and not answer.terms:
-        parts.append(registry.of(scene).say(scene, answer.target, answer.figures))
+        parts += [] if answer.members else [registry.of(scene).say(scene, answer.target, answer.figures)]
     else:
         parts.append(answer.message)
     parts += [answer.explanation] if answer.explanation else []
     parts.append(comparison(answer, scene, answer.before, heading))
     parts += lists(answer, scene)
+    parts += [members(answer, scene)] if answer.members else []
     if answer.certificate:
-        parts += [retyped(answer, scene), _binding(answer)]
+        parts += [*([] if answer.members else [retyped(answer, scene)]), binding(answer)]
         parts += certificate(answer)
     parts += proven(answer.proofs) if answer.proofs else []
     if answer.global_bound:
         parts.append(everywhere(answer.global_bound, scene))
     if answer.solver.get("starts", 1) > 1:
-        parts.append(_starts(answer, scene))
+        parts.append(starts(answer, scene))
     time = answer.time
     parts.append(
         f"Time: {time['total_s']:.3f} s (import {time['import_s']:.3f}, build {time['build_s']:.3f}, "
@@ -61,17 +63,24 @@ def evaluation(found: Evaluated, scene: Scene, before: Evaluated | None) -> list
 
 def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading: str) -> Grid:
     """Return design and figures beside today's machine and the limits; what binds and what is reached is marked."""
-    table = rows(found, scene, before)
+    table = [row for row in rows(found, scene, before) if not (found.members and _of_member(row["name"], found))]
+    words = Words(scene)
+    apart = {
+        limit.name: f", {words.shown(limit.name, limit.backed_off, 4)} apart"
+        for limit in found.limits
+        if limit.backed_off
+    }
     marked = [name for name in ("binds", "reached") if any(row[name] for row in table)]
     missed = {limit.name: "exceeded by rounding" if limit.rounding else "not held" for limit in found.limits}
     lines = []
     for row in table:
         today = [] if before is None else ["" if row["today"] is None else f"{row['today']:.6g}"]
         limit = joined(_limit(row["min"], row["max"]) + ("" if row["ok"] else f"  <- {missed[row['name']]}"))
+        limit += apart.get(row["name"], "")
         unit = "" if row["unit"] == "1" else row["unit"]
         lines.append((row["name"], *today, f"{row['design']:.6g}", unit, limit, *(row[name] for name in marked)))
     shown = {row["name"] for row in table}
-    words, pads, sizes = Words(scene), [""] * len(marked), largest(table)
+    pads, sizes = [""] * len(marked), largest(table)
     for each in found.limits:
         # Of the margins that every design keeps, and that no scene can set, only those that are not held are told.
         if each.name not in shown and (not each.ok or each.name not in scene.schema.margins):
@@ -79,6 +88,7 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
             size = factor(unit)
             low, high = (None if end is None else end / size for end in (each.min, each.max))
             told = joined(_limit(low, high) + ("" if each.ok else f"  <- {missed[each.name]}"))
+            told += apart.get(each.name, "")
             value = each.value / size
             value = 0.0 if abs(value) <= SHOWN_AS_ZERO * sizes.get(unit, 0.0) else value
             cells = (f"{value:.6g}", "" if unit == "1" else unit, told, *pads)
@@ -90,6 +100,12 @@ def comparison(found: Evaluated, scene: Scene, before: Evaluated | None, heading
     return Grid("", (*first, heading, "unit", "limits", *marked), tuple(lines), right, first=asked, more="--json")
 
 
+def _of_member(name: str, found: Evaluated) -> bool:
+    """Say whether a name is that of one member's figure, which is told beside the member."""
+    own = [each for each in found.figures if isinstance(each, Alias)]
+    return name in own or name.removesuffix("_t") in own
+
+
 def lists(found: Evaluated, scene: Scene) -> list[str]:
     """Return one line for each part of a design that is a list of numbers."""
     told = registry.of(scene).views.lists
@@ -98,6 +114,29 @@ def lists(found: Evaluated, scene: Scene) -> list[str]:
         for name, values in found.design.items()
         if name in told and values
     ]
+
+
+def members(found: Solution, scene: Scene) -> Grid:
+    """Return what each member of a family changes, and what it reaches of what is sought."""
+    words, levels = Words(scene), found.certificate.levels if found.certificate else ()
+    own = [name for name in found.members[0].design if name not in found.design]
+    # A sum of what members reach is named after their figure.
+    sought = {word.strip("|") for level in levels for word in level.objective.split()}
+    names = [*own, *(name for name in found.members[0].figures if name in sought)]
+    sizes = {name: factor(words.unit(name)) for name in names}
+    values = [{name: {**each.design, **each.figures}[name] or 0.0 for name in names} for each in found.members]
+    least = {
+        name: SHOWN_AS_ZERO * max(abs(each[other]) for each in values for other in names if sizes[other] == sizes[name])
+        for name in names
+    }
+    lines = []
+    for place, (member, each) in enumerate(zip(found.members, values, strict=True)):
+        cells = [f"{each[name] / sizes[name] if abs(each[name]) > least[name] else 0.0:.6g}" for name in names]
+        missed = ", ".join(name for name, met in member.reached.items() if not met)
+        lines.append((str(place + 1), joined(changed(member)), *cells, f"{missed} not" if missed else ""))
+    units = ["" if words.unit(name) == "1" else f" [{words.unit(name)}]" for name in names]
+    head = ("member", "change", *(f"{name}{unit}" for name, unit in zip(names, units, strict=True)), "reached")
+    return Grid("Each member by itself", head, tuple(lines), right=tuple(range(2, 2 + len(names))))
 
 
 def retyped(found: Evaluated, scene: Scene) -> str:
@@ -119,7 +158,7 @@ def _limit(low: float | None, high: float | None) -> str:
     return f">= {low:.6g}" if low is not None else f"<= {high:.6g}" if high is not None else ""
 
 
-def _relaxation(answer: Solution) -> Grid:
+def relaxation(answer: Solution) -> Grid:
     """Return what would have to give way."""
     lines: list[tuple[str, str]] = []
     for remedy in remedies(answer.relaxation):
@@ -129,10 +168,10 @@ def _relaxation(answer: Solution) -> Grid:
     return Grid("The least relaxation that helps", ("loosen", "limit"), tuple(lines))
 
 
-def _binding(answer: Solution) -> str | Grid:
+def binding(answer: Solution) -> str | Grid:
     """Return the limits that bind, each with its price."""
     if not answer.binding:
-        return "No limit binds."
+        return "No limit binds beside the sizes." if answer.rounded else "No limit binds."
     lines = tuple((price.text, next(iter(price.worth)), price.reading) for price in answer.binding)
     return Grid("What binds, and what loosening it is worth", ("limit", "moves", "by"), lines)
 
@@ -174,7 +213,7 @@ def everywhere(found: GlobalBound, scene: Scene) -> str:
     return f"{head}{': ' if said else ''}{'; '.join(said)}{cost}"
 
 
-def _starts(answer: Solution, scene: Scene) -> str:
+def starts(answer: Solution, scene: Scene) -> str:
     """Return how many starts found the best, and what other optima there are."""
     solver, words = answer.solver, Words(scene)
     if not solver["starts_at_best"]:

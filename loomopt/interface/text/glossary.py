@@ -6,15 +6,18 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from pydantic import BaseModel
+
 from loomopt.base.errors import BadInput
-from loomopt.base.quantities import quantity_of
+from loomopt.base.quantities import quantity_of, table_inside
 from loomopt.base.units import SI_UNIT
 from loomopt.interface.tables import PER_SECOND
 from loomopt.interface.text.layout import Grid
 from loomopt.jobs import registry
 from loomopt.model.curves import split
+from loomopt.model.model import COMPONENTS
 from loomopt.physics.effects.kinds import Check, Load
-from loomopt.physics.schema import Figure, Table
+from loomopt.physics.schema import Figure
 from loomopt.picture.job_views import JobViews
 from loomopt.picture.shapes import Text
 from loomopt.scenes.scene import Scene
@@ -96,7 +99,9 @@ def _tables(scene: Scene) -> dict[str, list[Symbol]]:
         "Operation": _numbers(scene, schema.operation),
         "Mechanism; what [bounds] frees of it is the design": _numbers(scene, schema.mechanism),
         "Values of effects": [
-            each for effect in schema.effects.values() for each in _numbers(scene, effect.own, f"{effect.name}.")
+            each
+            for effect in dict.fromkeys([*schema.effects.values(), *scene.active])
+            for each in _numbers(scene, effect.own, f"{effect.name}.")
         ],
         "Columns of the curves": list(columns(scene)),
         "Figures": [each for figure in schema.figures.values() for each in _figure(figure, scene, words)],
@@ -118,10 +123,14 @@ def _grid(title: str, symbols: list[Symbol], drawn: frozenset[str]) -> Grid:
     return Grid(title, ("symbol", "unit", "what it is", "in the sketch"), lines)
 
 
-def _numbers(scene: Scene, model: type[Table], path: str = "") -> list[Symbol]:
+def _numbers(scene: Scene, model: type[BaseModel], path: str = "") -> list[Symbol]:
     """Return the keys of a table with their units and descriptions; a word or a list has no unit."""
     found = []
     for name, field in model.model_fields.items():
+        inner = table_inside(model, name)
+        if inner:
+            found += _numbers(scene, inner, f"{path}{name}.")
+            continue
         quantity = quantity_of(model, name)
         unit = scene.shown_in(quantity.kind) if quantity else "1"
         found.append(Symbol(path + name, unit, field.description or ""))
@@ -134,7 +143,12 @@ def columns(scene: Scene) -> Iterator[Symbol]:
     said = {getattr(load, "symbol", "") or load.name: load.summary for load in model.loads if isinstance(load, Load)}
     for check in scene.active:
         if isinstance(check, Check):
-            said |= {name: f"at each angle; its peak is the figure {name}" for name in check.quantities}
+            said |= {name: f"at each angle; its peak is the figure {name}" for name in check.over_cycle}
+            said |= {
+                f"{name}_{axis}": f"{name} along {axis} of the mechanism's axes"
+                for name in check.vectors
+                for axis in COMPONENTS
+            }
     said |= SHARED
     for column in job.curves(scene, job.today(scene), steps=4):
         name, unit = split(column)

@@ -6,18 +6,24 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
-from loomopt.base.quantities import QUANTITY_PATTERN, Quantity, foreign, quantity_of, told
+from loomopt.base.quantities import NUMBER_PATTERN, QUANTITY_PATTERN, Quantity, foreign, quantity_of, told
 from loomopt.base.units import DISPLAY_UNIT
 from loomopt.physics.effects.kinds import Effect, Load, required
 from loomopt.physics.schema import Table
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import TABLES
 from loomopt.scenes.tables import Problem, SceneSchema
+from loomopt.scenes.tolerance_classes import CLASSES
+from loomopt.scenes.tolerances import SPREADS
 
 Json = dict[str, Any]
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _NAME = r"^[^\s!-,./:-@\[-`{-~_-][^\s!-,./:-@\[-^`{-~]{0,63}$"
 """A scene's name: as its reader has it, in words that every dialect of patterns understands alike."""
+
+
+NAMED_BY_SCENE = ("mechanism", "effects", "available", "bounds", "limits", "targets")
+"""Tables whose keys follow from the scene where its job reads further tables."""
 
 
 def scene(schema: SceneSchema) -> Json:
@@ -30,10 +36,17 @@ def scene(schema: SceneSchema) -> Json:
         "available": _effects,
         "bounds": _bounds,
         "limits": _limits,
+        "tolerances": _tolerances,
+        "accept": _accept,
+        "steps": lambda of: _by_number(of, lambda quantity: _quantity(Quantity(quantity.kind, above=0))),
+        "stock": lambda of: _by_number(of, _stock),
         "display": display,
         "targets": lambda of: _closed({name: _model(target.own, target.text) for name, target in of.targets.items()}),
     }
     tables = {name: makers[name](schema) for name in TABLES}
+    # What a job reads of further tables it checks itself; numbers, figures and targets are then named by the scene.
+    open_tables = (*schema.tables, *(NAMED_BY_SCENE if schema.tables else ()))
+    tables |= {name: {"type": "object"} for name in open_tables}
     whole = _closed(tables, [name for name, table in tables.items() if table.get("required")])
     rules = [_given(each) for each in schema.needs]
     rules += [_given(key, effect) for effect in schema.effects.values() for key in effect.needs]
@@ -71,6 +84,11 @@ def _effects(schema: SceneSchema) -> Json:
 
 def _bounds(schema: SceneSchema) -> Json:
     """Return [bounds]: every number by its name, as a range or as one value."""
+    return _by_number(schema, lambda each: _bound(_quantity(each)))
+
+
+def _by_number(schema: SceneSchema, made: Callable[[Quantity], Json]) -> Json:
+    """Return a table with a key for every number; made: what stands there, of what the number may be."""
     kinds: dict[str, list[Quantity]] = {}
     effects = [effect for effect in schema.effects.values() if not effect.many]
     for model in (schema.mechanism, schema.operation, *(effect.own for effect in effects)):
@@ -79,7 +97,7 @@ def _bounds(schema: SceneSchema) -> Json:
                 kinds.setdefault(name, []).append(quantity)
     for name, kind in schema.variables.items():
         kinds[name] = kinds.get(name, [Quantity(kind)])[:1]
-    found = _closed({name: _any([_bound(_quantity(each)) for each in of]) for name, of in kinds.items()})
+    found = _closed({name: _any([made(each) for each in of]) for name, of in kinds.items()})
     if len(effects) < len(schema.effects):  # instances are named by the scene
         found["additionalProperties"] = {"type": "object"}
     return found
@@ -89,6 +107,38 @@ def _bound(value: Json) -> Json:
     free = {"enum": [True, False, "true", "false"], "description": "false: held at today's value until it is freed"}
     ends = _closed({"min": value, "max": value, "free": free}, ["min", "max"])
     return {"if": {"type": "object"}, "then": ends, "else": value}
+
+
+def _tolerances(schema: SceneSchema) -> Json:
+    """Return [tolerances]: every number by its name, how it is made."""
+    return _by_number(schema, _tolerance)
+
+
+def _tolerance(quantity: Quantity) -> Json:
+    percent = {"type": "string", "pattern": rf"^[ \t]*{NUMBER_PATTERN} *%[ \t]*$"}
+    half: Json = {"anyOf": [percent, _quantity(Quantity(quantity.kind, least=0))], "description": "to each side"}
+    positive, share = _quantity(Quantity("number", above=0)), _quantity(Quantity("number", least=0))
+    keys = {
+        "plus_minus": half,
+        "class": {"enum": list(CLASSES), "description": "of a length, by its nominal"},
+        "sigmas": positive | {"description": "standard deviations that plus_minus is worth, 3 without it"},
+        "spread": {"enum": list(SPREADS)},
+        "group": {"type": "string", "description": "what numbers are made together by"},
+        "correlation": share | {"description": "with the others of the group"},
+    }
+    one: Json = {"oneOf": [{"required": ["plus_minus"]}, {"required": ["class"]}]}
+    together = {"dependentRequired": {"group": ["correlation"], "correlation": ["group"]}}
+    return {"if": {"type": "object"}, "then": _closed(keys) | one | together, "else": half}
+
+
+def _accept(schema: SceneSchema) -> Json:
+    """Return [accept]: half the band around an equality or a goal by which machines are judged, by figure."""
+    figures = schema.figures.values()
+    return _closed({each.name: _quantity(Quantity(each.kind, above=0)) for each in figures})
+
+
+def _stock(quantity: Quantity) -> Json:
+    return {"type": "array", "minItems": 1, "items": _quantity(Quantity(quantity.kind, above=0))}
 
 
 def _limits(schema: SceneSchema) -> Json:

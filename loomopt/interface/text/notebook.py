@@ -33,8 +33,13 @@ class Sketch:
         """The drawing as SVG text."""
         return svg.render(self.drawing)
 
-    def _repr_svg_(self) -> str:
+    @property
+    def on_page(self) -> str:
+        """The drawing as SVG text, as large as a page takes."""
         return _SIZE.sub(_on_page, self.svg, count=1)
+
+    def _repr_svg_(self) -> str:
+        return self.on_page
 
     def __repr__(self) -> str:
         return f"<Sketch {self.drawing.title}>"

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +13,14 @@ from loomopt.jobs import registry
 from loomopt.model.curves import split
 from loomopt.model.numbers import told
 from loomopt.physics.cycle import Floats
-from loomopt.physics.effects.kinds import label, owned
+from loomopt.physics.effects.kinds import keys, label, owned, value_at
 from loomopt.physics.schema import Table
 from loomopt.picture.job_views import Marks, Span
+from loomopt.scenes import family
 from loomopt.scenes.designs import Design, flat
 from loomopt.scenes.display import KINDS
 from loomopt.scenes.scene import Scene, given
+from loomopt.scenes.tables import FAMILY
 from loomopt.solving.answer.solution import Words
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ def parts(scene: Scene) -> list[str | Grid]:
         unit = words.si(name) if number else "1"
         size = f"{value:.9g}" if isinstance(value, int | float) else listed(value)
         lines.append((key, scene.given(key) or "(default)", size, "" if unit == "1" else unit))
-    effects = tuple((name, scene.schema.effects[name].summary) for name in scene.effects)
+    effects = tuple((effect.name, effect.summary) for effect in scene.active)
     off = [name for name in scene.schema.effects if name not in scene.effects]
     figures = tuple((figure.name, figure.text) for figure in scene.schema.figures.values())
     return [
@@ -50,6 +52,7 @@ def parts(scene: Scene) -> list[str | Grid]:
         *told(scene),
         f"Effects that are off, and not in the equations: {', '.join(off) or 'none'}",
         Grid("Targets", ("target", "what it asks", "expected"), tuple(_targets(scene))),
+        *_family(scene),
         Grid("Figures", ("figure", "what it is"), figures),
     ]
 
@@ -70,6 +73,18 @@ def _targets(scene: Scene) -> list[tuple[str, str, str]]:
     return lines
 
 
+def _family(scene: Scene) -> list[str | Grid]:
+    """Return the members of the scene's family, where it has one. Raises BadInput for one that is no scene."""
+    if FAMILY not in scene.schema.targets:
+        return []
+    table, members = family.table(scene), family.members(scene)
+    changes = [", ".join(f"{key} = {value}" for key, value in each.items()) for each in family.changes(scene)]
+    lines = tuple((str(place + 1), changes[place]) for place in range(len(members)))
+    own = f"; each has its own {', '.join(table.own)}" if table.own else ""
+    said = f"A family of target {family.of_target(scene)}: the least {table.combine} of its members{own}"
+    return [said, Grid("Members of the family", ("member", "what it changes"), lines)]
+
+
 def listed(values: str | Sequence[float]) -> str:
     """Return a list of numbers in a few words; "" for a word."""
     return "" if isinstance(values, str) else f"{len(values)} numbers, {min(values):.3g} ... {max(values):.3g}"
@@ -85,7 +100,8 @@ def _values(scene: Scene) -> Iterator[tuple[str, str, float | str | Sequence[flo
             else:
                 yield f"{table}.{name}", name, value
     for effect in scene.active:
-        for key, value in scene.effects[effect.name].model_dump().items():
+        for key in keys(effect.own):
+            value = value_at(scene.effects[effect.name], key)
             if isinstance(value, int | float | str):
                 yield f"effects.{owned(effect, key)}", label(effect, key), value
     for table in ("bounds", "limits"):
@@ -180,3 +196,18 @@ def _curve(scene: Scene, name: str, values: Floats) -> tuple[str, list[str]]:
     places = min(9, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0 else 0
     texts = ["" if math.isnan(number) else f"{round(float(number), places) + 0.0:.{places}f}" for number in numbers]
     return f"{symbol}\n[{unit}]", texts
+
+
+def forces(scene: Scene, frame: "pd.DataFrame", design: Mapping[str, float]) -> list[str | Grid]:
+    """Return a line for each force of curves (SI): its peak, where that is, and the means that bearings go by."""
+    from loomopt.interface.forces import CUBIC, ROLLER, found
+
+    lines, force, angle = [], scene.shown_in("force"), scene.shown_in("angle")
+    for name, each in found(scene, frame, design).items():
+        means = (f"{each.mean(power) / factor(force):.6g}" for power in (1.0, CUBIC, ROLLER))
+        turning = " and ".join(each.headings)
+        lines.append((name, turning, f"{each.peak / factor(force):.6g}", f"{each.at / factor(angle):.6g}", *means))
+    sizes = f"peak\n{force}", f"at\n{angle}", f"mean\n{force}", f"p = 3\n{force}", f"p = 10/3\n{force}"
+    heads = "force", "turning\nparts", *sizes
+    said = f"{scene.name}: forces over the turn; p: mean of their powers, for the life of ball and of roller bearings"
+    return [said, Grid("", heads, tuple(lines), tuple(range(2, 7)))]

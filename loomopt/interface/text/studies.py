@@ -5,19 +5,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from loomopt.base.files import atomically, check, suffix
+from loomopt.base.files import check, suffix
 from loomopt.base.units import show
 from loomopt.interface import study_table, tables
-from loomopt.interface.files import outputs
+from loomopt.interface.files import outputs, sheets
 from loomopt.interface.study_table import Column
 from loomopt.interface.text.layout import Grid, joined
-from loomopt.scenes.provenance import csv
 from loomopt.studies.run.rows import Change, Row, SceneStudy, counted
 
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLES = (".csv", ".parquet")
 SAME = 1e-9
 """Relative spread of a column below which its number is the same in all rows."""
 
@@ -31,7 +29,7 @@ MOST_REASONS = 5
 
 def check_table(path: Path) -> None:
     """Raise BadInput, before anything is computed, where a table cannot be written as this file."""
-    suffix(path, TABLES)
+    suffix(path, sheets.ENDINGS)
     check(path)
 
 
@@ -41,12 +39,13 @@ def check_figure(path: Path) -> None:
     check(path)
 
 
-def table(path: Path, frame: "pd.DataFrame") -> None:
-    """Write a table as CSV or Parquet, its provenance in it. Raises BadInput."""
-    if suffix(path, TABLES) == ".csv":
-        outputs.text(path, csv(tables.meaningful(frame)))
-    else:
-        atomically(path, frame.to_parquet)
+def table(path: Path, frame: "pd.DataFrame", name: str = "points", comma: bool = False) -> None:
+    """Write a table as its file's ending says, its provenance in it. Raises BadInput.
+
+    name: of its sheet in a workbook; comma: whether CSV has decimal commas.
+    """
+    shown = frame if suffix(path, sheets.ENDINGS) == ".parquet" else tables.meaningful(frame)
+    sheets.write(path, {name: shown}, comma)
 
 
 def shown_columns(study: SceneStudy, rows: Sequence[Row], si: bool = False) -> list[Column]:

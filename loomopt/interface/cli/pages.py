@@ -1,0 +1,199 @@
+"""The commands that hand over: a page of answers and studies, designs side by side."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from loomopt.interface.cli.commands import Decimal, Free, Json, Set, With, Without, checked, remarked, tell, write
+from loomopt.interface.cli.shell import Progress, only, read_scene, remark
+
+if TYPE_CHECKING:
+    from loomopt.interface.report.page import Chapter
+    from loomopt.interface.results import Evaluation
+
+NOT_CERTIFIED, INFEASIBLE = 4, 3
+"""Exit statuses."""
+Problems = Annotated[
+    list[str], typer.Argument(metavar="PROBLEM|ANSWER|STORE...", help="Scenes, which are solved; answers; stores.")
+]
+Page = Annotated[list[Path], typer.Option("--out", metavar="F.html", help="The page to write.")]
+Beside = Annotated[
+    list[str] | None,
+    typer.Option("--study", metavar="S", help="Beside each: budget, tolerance, sensitivity, effects, accuracy, proof."),
+]
+Out = Annotated[list[Path] | None, typer.Option(metavar="F", help="Write the table: .csv, .xlsx or .parquet.")]
+Answers = Annotated[
+    list[str], typer.Argument(metavar="A.json B.json ... [today]", help="Answers; today for the machine as it is.")
+]
+
+
+def report(
+    things: Problems,
+    out: Page,
+    target: Annotated[str | None, typer.Option(help="What scenes are solved for; their job's default without.")] = None,
+    sets: Set = None,
+    free: Free = None,
+    on: With = None,
+    off: Without = None,
+    proven: Annotated[
+        bool, typer.Option("--prove", help="Prove every limit of scenes at every crank angle too.")
+    ] = False,
+    studies: Beside = None,
+) -> None:
+    """Write one self-contained page of scenes, answers and studies."""
+    from loomopt.base.errors import refusal
+    from loomopt.base.files import check, suffix
+    from loomopt.interface.report import document
+
+    path = only("--out", out)
+    assert path is not None
+    suffix(path, document.PAGES)
+    check(path)
+    for name in studies or ():
+        if name not in STUDIES:
+            raise refusal("there is no such study", "", "--study", name, ", ".join(STUDIES), "Choose one of them")
+    chapters: list[Chapter] = []
+    with Progress() as progress:
+        for thing in things:
+            chapters += _chapters(thing, target, (sets, on, off, free), proven, studies or (), progress)
+        progress.say("writing the page")
+        document.write(path, chapters)
+    remark(f"Wrote {path}")
+    for each in chapters:
+        if each.status.level != "ok":
+            remark(f"{each.heading}: {each.status.verdict}")
+    raise typer.Exit(max((each.status.exit for each in chapters), default=0))
+
+
+def _chapters(
+    thing: str,
+    target: str | None,
+    asked: "tuple[list[str] | None, list[str] | None, list[str] | None, list[str] | None]",
+    prove: bool,
+    studies: Sequence[str],
+    progress: Progress,
+) -> "list[Chapter]":
+    """Return the chapters of one argument: a scene is solved, an answer is judged, a store's studies are read."""
+    from loomopt.base.errors import refusal
+    from loomopt.interface import api
+    from loomopt.interface.files import answer_file, store_file
+    from loomopt.interface.report import document
+    from loomopt.jobs import registry
+    from loomopt.scenes.tables import FAMILY
+
+    answer, store = registry.answer_path(thing), store_file.is_store(Path(thing))
+    if (answer or store) and (target or any(asked)):
+        remedy = "Leave out --target, --set, --with, --without and --free, or evaluate the design in a scene of its own"
+        raise refusal("it is judged as it was found", "", thing, remedy=remedy)
+    if studies and (store or target == FAMILY):
+        remedy = "Leave out --study, or report one design by itself"
+        raise refusal("studies are of one design in its scene", "", "--study", studies[0], remedy=remedy)
+    if store:
+        return [document.of_study(each.study, each.solved) for each in store_file.recalled(Path(thing))]
+    if answer:
+        found = answer_file.recalled(answer)
+        return document.of_answer(found.found, _beside(found.found, studies, progress.say), found.doubts)
+    from loomopt.studies.tolerance.plan import demand_made
+
+    sets, on, off, free = asked
+    scene = read_scene(thing, sets, on, off, free)
+    if "tolerance" in studies:
+        demand_made(scene)
+    progress.say(f"solving {scene.name}")
+    solved = api.solve(scene, target, prove=prove, on_step=progress.say)
+    remarked(scene, solved.design)
+    return document.of_answer(solved, _beside(solved, studies, progress.say))
+
+
+def _beside(found: "Evaluation", studies: Sequence[str], say: Callable[[str], None]) -> list[object]:
+    """Return what studies find of a design in its scene, each as its own command does by default. Raises BadInput."""
+    made = []
+    for name in studies:
+        say(f"{name} of {found.problem}")
+        made.append(STUDIES[name](found, say))
+    return made
+
+
+def _tolerance(found: "Evaluation", say: Callable[[str], None]) -> object:
+    from loomopt.interface import api
+
+    return api.tolerance(found.scene, found, found.target or None, on_step=say)
+
+
+def _sensitivity(found: "Evaluation", say: Callable[[str], None]) -> object:
+    from loomopt.interface import api
+    from loomopt.interface.results import Answer
+
+    return api.sensitivity(
+        found if isinstance(found, Answer) and found.point else found.scene, found.target, on_step=say
+    )
+
+
+def _effects(found: "Evaluation", say: Callable[[str], None]) -> object:
+    from loomopt.interface import api
+
+    return api.effects(found.scene, found.target or None)
+
+
+def _accuracy(found: "Evaluation", say: Callable[[str], None]) -> object:
+    from loomopt.interface import api
+
+    return api.accuracy(found.scene, on_step=say)
+
+
+STUDIES: "dict[str, Callable[[Evaluation, Callable[[str], None]], object]]" = {
+    "budget": lambda found, say: found.budget(),
+    "tolerance": _tolerance,
+    "sensitivity": _sensitivity,
+    "effects": _effects,
+    "accuracy": _accuracy,
+    "proof": lambda found, say: found.prove(),
+}
+"""What may stand on a page beside a design → how it is computed."""
+
+
+def compare(
+    answers: Answers,
+    within: Annotated[str | None, typer.Option("--in", metavar="PROBLEM", help="Judge all in this scene.")] = None,
+    figure: Annotated[
+        list[Path] | None, typer.Option(metavar="F", help="Lay their curves over each other: .png, .svg or .pdf.")
+    ] = None,
+    out: Out = None,
+    decimal: Decimal = "point",
+    as_json: Json = False,
+) -> None:
+    """Show designs side by side, what differs marked."""
+    from loomopt.interface import comparison
+    from loomopt.interface.files import answer_file, sheets
+    from loomopt.interface.text import studies
+    from loomopt.jobs import registry
+
+    comma = sheets.decimal_comma(decimal)
+    checked(figure, out)
+    found: list[Any] = [
+        each if each == comparison.TODAY else answer_file.recalled(_answer(each)).found for each in answers
+    ]
+    scene = registry.load(within) if within else None
+    names = ["" if each == comparison.TODAY else Path(each).stem for each in answers]
+    made = comparison.compared(found, scene, names)
+    tell(as_json, made.as_dict, made.parts)
+    write(out, lambda path: studies.table(path, made.table(), "designs", comma))
+    write(figure, made.plot)
+
+
+def _answer(given: str) -> Path:
+    """Return the path of an answer's file. Raises BadInput for what is none."""
+    from loomopt.base.errors import refusal
+    from loomopt.jobs import registry
+
+    path = registry.answer_path(given)
+    if path is None:
+        allowed = "what `loomopt solve PROBLEM --json` prints, in files that end in .json, and today"
+        raise refusal("it is no answer's file", "", given, allowed=allowed, remedy="Solve it first, into a file")
+    return path
+
+
+PAGES: dict[str, Callable[..., None]] = {"compare": compare, "report": report}
+"""Name → command."""

@@ -1,0 +1,179 @@
+"""An answer read back from its JSON file: its figures and limits computed anew, the rest as the file tells it.
+
+What the file says of its status is believed only as far as its design bears it out.
+"""
+
+import functools
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from loomopt.base.errors import refusal
+from loomopt.base.units import factor
+from loomopt.interface import results
+from loomopt.interface.results import Answer, Evaluation
+from loomopt.jobs import registry
+from loomopt.model.objectives import Sought
+from loomopt.physics.tolerances import FEASIBLE, STATIONARY
+from loomopt.scenes import designs
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Price, Proof, Proofs, Relaxation, Words
+from loomopt.solving.certificate.verdict import Certificate, GlobalBound, GlobalLevel, Level
+
+AGREES = 1e-6
+"""Relative; a figure computed anew that differs by less is the one in the file: another machine may have made that."""
+MOST_TOLD = 3
+"""Figures that are told one by one where a file contradicts its design."""
+STATUSES = ("optimal", "infeasible", "uncertified", "failed", "interrupted")
+NUMBER = re.compile(r"[-+]?[\d.]+(?:e[-+]?\d+)?")
+Read = TypeVar("Read")
+
+
+class Recalled(NamedTuple):
+    """An answer of a file in its own scene; doubts: why its status is not to be believed, a sentence each."""
+
+    found: Evaluation
+    doubts: tuple[str, ...] = ()
+
+
+def recalled(path: Path) -> Recalled:
+    """Return the answer in a JSON file, judged in its own scene. Raises BadInput."""
+    scene, handed = registry.answered(path)
+    evaluation = results.evaluated(scene, designs.checked(handed.design, scene, scene.origin), None)
+    told = designs.loaded(path)
+    if not isinstance(told, Mapping) or told.get("status") not in STATUSES:
+        return Recalled(evaluation)
+    try:
+        found = _answer(told, evaluation, scene)
+    except (AttributeError, KeyError, TypeError, ValueError, ArithmeticError):
+        remedy = "Give the answer as it was printed, or its design object alone"
+        raise refusal("it is no answer as solve prints it", str(path), remedy=remedy) from None
+    return Recalled(found, tuple(_doubts(told, found)))
+
+
+def _answer(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> Answer:
+    """Return what the file tells as an answer, with what was computed anew. Raises what a damaged file makes fail."""
+    target, limits = told.get("target"), evaluation.limits
+    if target is None or not _of_target(told, evaluation, scene):  # a point of a front, of which its message tells
+        target = None
+        named = {str(each["name"]) for each in told["limits"]}
+        limits = tuple(limit for limit in limits if limit.name in named)
+    certificate = _certificate(told["certificate"]) if told.get("certificate") else None
+    bound = _everywhere(told["global"], told["figures"]) if told.get("global") else None
+    fields = {name: getattr(evaluation, name) for name in ("problem", "effects", "design", "figures", "units")}
+    return Answer(
+        **fields,
+        limits=limits,
+        reached=evaluation.reached,
+        scene=scene,
+        target="" if target is None else evaluation.target,
+        status=str(told["status"]),
+        message=str(told.get("message", "")),
+        binding=tuple(_price(each, Words(scene)) for each in told.get("binding", ())),
+        certificate=certificate,
+        relaxation=tuple(_record(Relaxation, each) for each in told.get("relaxation", ())),
+        clash=tuple(map(str, told.get("clash", ()))),
+        solver={str(name): value for name, value in told.get("solver", {}).items()},
+        time={str(name): float(value) for name, value in told.get("time", {}).items()},
+        proofs=_proofs(told["proofs"], evaluation) if told.get("proofs") else None,
+        global_bound=bound,
+        today=functools.partial(report.evaluate, scene, None, evaluation.target or None),
+    )
+
+
+def _of_target(told: Mapping[str, Any], evaluation: Evaluation, scene: Scene) -> bool:
+    """Say whether an optimum's message is that of its target, numbers apart: of a point of a front it is another."""
+    if told["status"] != "optimal":
+        return True
+    said = registry.of(scene).say(scene, evaluation.target, evaluation.figures)
+    return NUMBER.sub("", str(told["message"])).startswith(NUMBER.sub("", said))
+
+
+def _record(kind: Callable[..., Read], entries: Mapping[str, Any]) -> Read:
+    return kind(**{str(name): value for name, value in entries.items()})
+
+
+def _price(told: Mapping[str, Any], words: Words) -> Price:
+    """Return a limit's price with its reading in the scene's units."""
+    (figure, worth), *_ = told["worth"].items()
+    limit, side = str(told["limit"]), str(told["side"])
+    unit, per = words.unit(figure), words.unit(limit)
+    amount = float(worth) * factor(per) / factor(unit)
+    reading = f"{amount:.3g}{'' if unit == '1' else f' {unit}'} per {'unit' if per == '1' else per}"
+    return Price(
+        limit, side, float(told["value"]), str(told["text"]), {figure: float(worth)}, dict(told["unit"]), reading
+    )
+
+
+def _certificate(told: Mapping[str, Any]) -> Certificate:
+    levels = tuple(
+        Level(str(each["objective"]), float(each["stationarity"]), float(each["complementarity"]), 0.0)
+        for each in told["levels"]
+    )
+    return Certificate(
+        bool(told["passed"]),
+        tuple(map(str, told["reasons"])),
+        levels,
+        float(told["feasibility"]),
+        float(told["whole_cycle"]["violation"]),
+        bool(told["minimum"]),
+        bool(told["unique"]),
+        by=str(told["by"]),
+        whole_cycle=str(told["whole_cycle"]["by"]),
+        settled=tuple(map(str, told.get("settled", ()))),
+    )
+
+
+def _everywhere(told: Mapping[str, Any], figures: Mapping[str, Any]) -> GlobalBound:
+    """Return what is proven of all designs; of which side of a bound the best is, the bound itself tells."""
+    gap = math.inf if told["gap"] is None else float(told["gap"])
+    levels = []
+    for name, bound in told["bound"].items():
+        best = float(figures[name])
+        sense: Sought = "most" if bound > best else "least"
+        levels.append(
+            GlobalLevel(
+                name, sense, best, float(bound), gap, float(told.get("band", {}).get(name, 0.0)), bool(told["proven"])
+            )
+        )
+    return GlobalBound(tuple(levels), int(told["boxes"]), float(told["seconds"]), str(told["why"] or ""))
+
+
+def _proofs(told: Sequence[Mapping[str, Any]], evaluation: Evaluation) -> Proofs:
+    found = []
+    for each in told:
+        name, kind = str(each["limit"]), "peak" if str(each["limit"]).startswith("peak ") else "limit"
+        entries = {key: value for key, value in each.items() if key != "limit"}
+        found.append(Proof(name=name.removeprefix("peak "), kind=kind, **entries))  # type: ignore[arg-type]
+    return Proofs(evaluation.problem, evaluation.target, tuple(found), evaluation.scene)
+
+
+def _doubts(told: Mapping[str, Any], found: Answer) -> Iterator[str]:
+    """Yield what speaks against the status that a file tells: figures, limits, thresholds."""
+    sizes: dict[str, float] = {}
+    for name, value in found.figures.items():
+        unit = found.units.get(name, "1")
+        sizes[unit] = max(sizes.get(unit, 0.0), abs(value or 0.0))
+    differing = 0
+    for name, value in found.figures.items():
+        said = told.get("figures", {}).get(name)
+        if value is None or not isinstance(said, int | float):
+            continue
+        if not abs(said - value) <= AGREES * max(abs(value), 1e-3 * sizes[found.units.get(name, "1")]):
+            differing += 1
+            if differing <= MOST_TOLD:
+                now, then = (Words(found.scene).shown(name, each, 9) for each in (value, float(said)))
+                yield f"{name} is {now} for its design, the file says {then}."
+    if differing > MOST_TOLD:
+        yield f"So it is with {differing - MOST_TOLD} more of its figures."
+    if found.status != "optimal":
+        return
+    yield from (f"It says optimal, and limit {limit.name} does not hold." for limit in found.limits if not limit.ok)
+    certificate = found.certificate
+    if certificate is None or not certificate.passed:
+        yield "It says optimal, and holds no certificate that has passed."
+    elif certificate.reasons or not (certificate.feasibility <= FEASIBLE and certificate.residual <= STATIONARY):
+        yield "It says optimal, and its certificate's own numbers are beyond their thresholds."

@@ -1,0 +1,79 @@
+"""The studies of a store, made again from what it says of them: their rows as they were written."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from loomopt.base.errors import BadInput, refusal
+from loomopt.base.units import factor
+from loomopt.interface.finished import DesignStudy
+from loomopt.jobs.registry import REGISTERED
+from loomopt.scenes.document import Paths
+from loomopt.scenes.numbers import quantity
+from loomopt.scenes.scene import Scene, build
+from loomopt.studies.front import front
+from loomopt.studies.run.rows import SceneStudy
+from loomopt.studies.run.store import Store
+from loomopt.studies.sweep import planned
+
+HEAD = b"SQLite format 3\x00"
+
+
+def is_store(path: Path) -> bool:
+    """Say whether a file is a database, as a store is."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(HEAD)) == HEAD
+    except OSError:
+        return False
+
+
+def recalled(path: Path) -> list[DesignStudy]:
+    """Return every study of a store with the rows that are there, in the order they were begun. Raises BadInput.
+
+    Machines as they are made are no designs, and left out.
+    """
+    with Store(path) as store:
+        told = {key: (about, tuple(store.rows(key))) for key, about in store.studies().items()}
+    found = [DesignStudy(_study(about, path), rows) for about, rows in told.values() if rows and "samples" not in about]
+    if not found:
+        raise refusal("the store holds no row yet", str(path), "store", remedy="Run its study first")
+    return found
+
+
+def _study(told: Mapping[str, Any], path: Path) -> SceneStudy:
+    """Return the plan that a store tells of. Raises BadInput."""
+    try:
+        paths = Paths(path.absolute().parent, texts=dict(told["files"]))
+        scene = build(told["document"], REGISTERED, str(path), paths)
+        if "axes" in told:
+            return _front(told, scene)
+        return planned(scene, _over(told, scene), told["target"], accuracy=told["accuracy"], seed=told["seed"])
+    except BadInput:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise refusal("what it says of a study is damaged", str(path), "store", remedy="Run the study again") from None
+
+
+def _front(told: Mapping[str, Any], scene: Scene) -> SceneStudy:
+    senses: Mapping[str, str] = told["axes"]
+    named = {sense: [name for name, own in senses.items() if own == sense] for sense in ("least", "most")}
+    return front.trade(
+        scene,
+        tuple(senses),
+        told["target"],
+        maximise=named["most"],
+        minimise=named["least"],
+        ranges={name: (float(low), float(high)) for name, (low, high) in told["ranges"].items()},
+        points=told["points"],
+        accuracy=told["accuracy"],
+    )
+
+
+def _over(told: Mapping[str, Any], scene: Scene) -> dict[str, list[str | float]]:
+    """Return key → its values as a scene gives them, in the unit in which that shows them."""
+    found: dict[str, list[str | float]] = {}
+    for key, values in told["over"]:
+        unit = told["units"][quantity(scene, key).kind]
+        found[key] = [value if unit == "1" else f"{value / factor(unit):.15g} {unit}" for value in values]
+    return found

@@ -1,0 +1,9 @@
+"""One self-contained page of answers and studies: markup, own SVG, and a script that only looks positions up."""
+
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+
+def report_path(name: str) -> Traversable:
+    """Return a file of the page's own, such as its script."""
+    return files(__name__).joinpath(name)

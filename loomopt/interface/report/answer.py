@@ -1,0 +1,273 @@
+"""The parts of a page on one design: its true status first, then the machine, what binds, the certificate, curves."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from loomopt.base.records import lazy
+from loomopt.interface import forces, tables
+from loomopt.interface.files import outputs, svg
+from loomopt.interface.report import machine, mathml, turn
+from loomopt.interface.report.markup import Block, Markup, Part
+from loomopt.interface.text import answers, scenes
+from loomopt.interface.text.layout import Grid
+from loomopt.jobs import registry
+from loomopt.physics.tolerances import FEASIBLE, STATIONARY
+from loomopt.scenes import family as family_table
+from loomopt.scenes.designs import flat
+from loomopt.scenes.scene import Scene, kept
+from loomopt.solving.answer import report
+from loomopt.solving.answer.solution import Evaluated, Solution, changed
+from loomopt.solving.certificate.certificate import COMPLEMENTARY
+
+
+class Status(NamedTuple):
+    """What a design truly is: level is "ok", "open" or "bad"; verdict in a few words; told: sentences.
+
+    exit: the status that a command ends with.
+    """
+
+    level: str
+    verdict: str
+    told: tuple[str, ...] = ()
+    exit: int = 0
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A design to report on, in its scene; doubts: why what its file says is not believed, none for one just computed.
+
+    target: whose limits it was judged by; sought: what it answers.
+    """
+
+    found: Evaluated
+    scene: Scene
+    target: str = ""
+    sought: str = ""
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def heading(self) -> str:
+        """Problem and what is sought."""
+        return ", ".join(each for each in (self.found.problem, self.sought) if each)
+
+    @lazy
+    def before(self) -> Evaluated | None:
+        """Today's machine; None where the design is that."""
+        if isinstance(self.found, Solution):
+            return self.found.before
+        now = registry.of(self.scene).today(self.scene)
+        is_now = flat(self.found.design).items() <= now.items()
+        return None if is_now else report.evaluate(self.scene, None, self.target or None)
+
+
+NOT_CERTIFIED = 4
+EXIT = {"infeasible": 3, "interrupted": 130}
+"""Status of a solve → what a command ends with, where that is not `NOT_CERTIFIED`."""
+VERDICTS = {
+    "infeasible": "NO ADMISSIBLE DESIGN EXISTS near any start",
+    "uncertified": "NOT CERTIFIED",
+    "failed": "FAILED: no design was found",
+    "interrupted": "INTERRUPTED: not solved to its end",
+}
+"""Status of a solve that is no optimum → what the page says first."""
+
+
+def status(subject: Subject) -> Status:
+    """Return what a design truly is, from what was checked, not from one word of its solver."""
+    found = subject.found
+    broken = tuple(limit.name for limit in found.limits if not limit.ok and not limit.rounding)
+    kept = (f"Limits NOT held: {', '.join(broken)}.",) if broken else ()
+    if subject.doubts:
+        return Status("bad", "NOT CONFIRMED: the file contradicts itself", (*subject.doubts, *kept), NOT_CERTIFIED)
+    if not isinstance(found, Solution):
+        verdict = "NOT ADMISSIBLE" if broken else "All limits held"
+        return Status("bad" if broken else "open", f"{verdict}; evaluated, nothing was optimised", kept)
+    if found.status != "optimal":
+        told = (found.message, found.explanation, *kept)
+        verdict = VERDICTS.get(found.status, found.status.upper())
+        return Status("bad", verdict, tuple(each for each in told if each), EXIT.get(found.status, NOT_CERTIFIED))
+    if found.certificate is None or not found.certificate.passed or broken:
+        reasons = found.certificate.reasons if found.certificate else ("there is no certificate",)
+        return Status("bad", "NOT CERTIFIED", (*(f"{reason}." for reason in reasons), *kept), NOT_CERTIFIED)
+    return _certified(found, subject.scene)
+
+
+def _certified(found: Solution, scene: Scene) -> Status:
+    """Return what a certified optimum is, and what of what was asked for is not proven."""
+    opened, told = list[str](), list[str]()
+    missed = found.outcome.partition(" but ")[2]
+    if missed:
+        opened.append(missed)
+    if found.proofs and not found.proofs.passed:
+        opened.append("NOT PROVEN at every crank angle")
+    if found.global_bound:
+        opened += [] if found.global_bound.proven else ["NOT PROVEN best of all admissible designs"]
+        told.append(answers.everywhere(found.global_bound, scene) + ".")
+    else:
+        told.append("No admissible design nearby is better; that none anywhere is was not asked (--global).")
+    said = (
+        found.message if found.terms or not found.target else registry.of(scene).say(scene, found.target, found.figures)
+    )
+    verdict = "; ".join(["Optimal and certified", *opened])
+    unproven = found.global_bound is not None and not found.global_bound.proven
+    return Status("open" if opened else "ok", verdict, (said, *told), NOT_CERTIFIED if unproven else 0)
+
+
+def parts(subject: Subject) -> list[Part]:
+    """Return the parts of a design's page, in order; none that has nothing to say, of a family none of one machine."""
+    made = [make for make in PARTS if make not in ONE_MACHINE] if subject.found.members else PARTS
+    return [part for make in made for part in make(subject)]
+
+
+def members(family: Subject) -> list[tuple[str, Status, list[Part]]]:
+    """Return the heading, the status and the parts of each member of a family: what the whole cannot show."""
+    whole, found = status(family), list[tuple[str, Status, list[Part]]]()
+    for place, member in enumerate(family.found.members, 1):
+        assert member.scene is not None
+        subject = Subject(member, member.scene, family_table.of_target(family.scene))
+        broken = [limit.name for limit in member.limits if not limit.ok and not limit.rounding]
+        held = f"Limits NOT held: {', '.join(broken)}" if broken else f"Member {place}: all limits held"
+        told = Status("bad" if broken else whole.level, held, (f"Of the family: {whole.verdict}.",))
+        shown = [part for make in (_compared, *ONE_MACHINE) for part in make(subject)]
+        found.append((f"{family.heading}, member {place}: {changed(member)}", told, shown))
+    return found
+
+
+def _compared(subject: Subject) -> Iterator[Part]:
+    found, scene, before = subject.found, subject.scene, subject.before
+    heading = "nearest" if isinstance(found, Solution) and found.relaxation else "design" if before else "today"
+    blocks: list[Block] = [answers.comparison(found, scene, before, heading), *answers.lists(found, scene)]
+    yield Part("Today against the design" if before else "Today's machine", tuple(blocks))
+
+
+def _moving(subject: Subject) -> Iterator[Part]:
+    found = machine.part(subject.scene, subject.found.design)
+    if found:
+        yield found
+
+
+def _clash(subject: Subject) -> Iterator[Part]:
+    found = subject.found
+    if isinstance(found, Solution) and found.relaxation:
+        clash = f"Limits that clash: {', '.join(found.clash)}. The design below is the nearest one, and not admissible."
+        yield Part("What stands in the way", (clash, answers.relaxation(found)))
+
+
+def _binding(subject: Subject) -> Iterator[Part]:
+    if isinstance(subject.found, Solution) and subject.found.certificate:
+        told = "By how much the best gets better for each unit that a limit is loosened; solving again confirms it."
+        bound = answers.binding(subject.found)
+        shown = (bound,) if isinstance(bound, str) else (told, replace(bound, title=""))
+        yield Part("What binds, and what it is worth", shown)
+
+
+def _certificate(subject: Subject) -> Iterator[Part]:
+    """Say the certificate in words: what was asked of the design, what was found."""
+    found = subject.found.certificate if isinstance(subject.found, Solution) else None
+    if found is None:
+        return
+    lines = [
+        ("every limit holds, by its own size", f"{found.feasibility:.1e}", f"{FEASIBLE:.0e}"),
+        (f"whole-cycle values between the points, {found.whole_cycle}", f"{found.violation:.1e}", "the accuracy asked"),
+    ]
+    for place, level in enumerate((*found.levels, *([found.change] if found.change else [])), 1):
+        lines += [
+            (
+                f"{place}. {level.objective}: slopes balance, nothing better nearby",
+                f"{level.stationarity:.1e}",
+                f"{STATIONARY:.0e}",
+            ),
+            (
+                f"{place}. {level.objective}: only limits that are met carry a price",
+                f"{level.complementarity:.1e}",
+                f"{COMPLEMENTARY:.0e}",
+            ),
+        ]
+    head = "Passed" if found.passed else "NOT PASSED"
+    curved = "the curvature says a minimum" if found.minimum else "the curvature does NOT say a minimum"
+    unique = "the only one nearby" if found.unique else "not the only one: others are as good"
+    told: list[Block] = [
+        f"{head}. It was checked apart from the solver, by {found.by}: {curved}, and it is {unique}.",
+        Grid("", ("what was checked", "found", "at most"), tuple(lines), right=(1, 2)),
+        *(f"Reason: {reason}." for reason in found.reasons),
+    ]
+    told += [f"Chosen among equals: {'; '.join(found.choices)}."] if found.choices else []
+    yield Part("The certificate in words", tuple(told))
+
+
+def _proofs(subject: Subject) -> Iterator[Part]:
+    found = subject.found.proofs if isinstance(subject.found, Solution) else None
+    if found:
+        yield Part("Proof at every crank angle", tuple(answers.proofs(found)))
+
+
+def _curves(subject: Subject) -> Iterator[Part]:
+    yield turn.part(subject.scene, subject.found.design)
+
+
+def _forces(subject: Subject) -> Iterator[Part]:
+    """Tell what each joint carries, where an effect that is on says so."""
+    scene, design = subject.scene, flat(subject.found.design)
+    if forces.tells(scene):
+        yield Part("Forces in the joints", tuple(scenes.forces(scene, tables.curves(scene, design), design)))
+
+
+def _members(subject: Subject) -> Iterator[Part]:
+    if isinstance(subject.found, Solution) and subject.found.members:
+        yield Part("Each member by itself", (replace(answers.members(subject.found, subject.scene), title=""),))
+
+
+def _remarks(subject: Subject) -> Iterator[Part]:
+    told = registry.of(subject.scene).views.remarks(subject.scene, flat(subject.found.design))
+    if told:
+        yield Part("Remarks", tuple(f"{each}." for each in told))
+
+
+def _sketch(subject: Subject) -> Iterator[Part]:
+    """Draw the mechanism at scale with its dimensions, where the scene gives what a drawing needs."""
+    from loomopt.interface.text import notebook
+
+    if not registry.of(subject.scene).views.missing(subject.scene):
+        drawn = notebook.sketch(subject.scene, subject.found.design, outputs.what(subject.found))
+        picture = drawn.on_page.replace(f' xmlns="{svg.NAMESPACE}"', "")  # which a page does not need
+        yield Part("Dimensions", (Markup(f'<div class="sheet">{picture}</div>'),))
+
+
+def _scene(subject: Subject) -> Iterator[Part]:
+    """Tell the scene as it was read, with where its numbers come from, and its equations."""
+    shown = scenes.parts(subject.scene)
+    yield Part("The scene", tuple(shown))
+    scene = subject.scene
+    written = kept(scene, "equations", lambda: mathml.page(registry.of(scene).views.equations(scene)))
+    yield Part("Equations of this scene", (Markup(written),))
+
+
+def _search(subject: Subject) -> Iterator[Part]:
+    found = subject.found
+    if isinstance(found, Solution) and found.time:
+        time = found.time
+        told = [answers.starts(found, subject.scene)] if found.solver.get("starts", 1) > 1 else []
+        told.append(f"IPOPT said {found.solver.get('status', 'nothing')}; {time.get('total_s', 0.0):.3f} s in all.")
+        told.append(answers.retyped(found, subject.scene))
+        yield Part("How it was found", tuple(told))
+
+
+PARTS: tuple[Callable[[Subject], Iterator[Part]], ...] = (
+    _clash,
+    _moving,
+    _compared,
+    _members,
+    _binding,
+    _certificate,
+    _proofs,
+    _curves,
+    _forces,
+    _remarks,
+    _sketch,
+    _search,
+    _scene,
+)
+"""What a page on a design shows, in order; one more part is one more function."""
+ONE_MACHINE = (_moving, _curves, _forces, _remarks, _sketch)
+"""Of them those on a machine by itself, which a family has for each of its members."""

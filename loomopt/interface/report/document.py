@@ -1,0 +1,93 @@
+"""What a page is made of: answers and studies, each a chapter of its own, others as parts of one."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from loomopt.base.errors import refusal
+from loomopt.base.files import suffix
+from loomopt.interface.files import outputs
+from loomopt.interface.report import answer, study
+from loomopt.interface.report.answer import Status, Subject
+from loomopt.interface.report.markup import Part
+from loomopt.interface.report.page import Chapter, page
+from loomopt.scenes.scene import Scene
+from loomopt.solving.answer.solution import Evaluated, Proofs
+from loomopt.studies.run.rows import Row, SceneStudy
+
+PAGES = (".html",)
+ALLOWED = "fronts, sweeps, effects, sensitivities, tolerances, torque budgets, accuracy, proofs"
+
+
+@runtime_checkable
+class Reported(Protocol):
+    """What was computed beside an answer, and says itself what a page shows of it."""
+
+    def report_parts(self) -> list[Part]:
+        """Return its parts of a page."""
+
+
+def of_answer(found: Evaluated, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> list[Chapter]:
+    """Return the chapter of an answer, of a family one for each of its members too; the rest as of `of_design`."""
+    first = of_design(found, beside, doubts)
+    if not found.members:
+        return [first]
+    return [first, *(Chapter(heading, "", told, parts) for heading, told, parts in answer.members(_subject(found)))]
+
+
+def of_design(found: Evaluated, beside: Sequence[object] = (), doubts: Sequence[str] = ()) -> Chapter:
+    """Return the chapter of an answer or an evaluation, which knows its scene.
+
+    beside: what was computed of the same scene; doubts: why what its file says is not believed. Raises BadInput.
+    """
+    subject = _subject(found, doubts)
+    return _chapter(subject.heading, subject.scene, answer.status(subject), [*answer.parts(subject), *_more(beside)])
+
+
+def _subject(found: Evaluated, doubts: Sequence[str] = ()) -> Subject:
+    if found.scene is None:
+        raise refusal("the answer knows no scene", "", "scene", remedy="Give the scene it was found for")
+    target, sought = (str(getattr(found, name, "")) for name in ("target", "sought"))
+    return Subject(found, found.scene, target, sought, tuple(doubts))
+
+
+def of_study(plan: SceneStudy, solved: Sequence[Row], beside: Sequence[object] = ()) -> Chapter:
+    """Return the chapter of a study; solved: the rows of all points that were. Raises BadInput."""
+    parts = [*study.parts(plan, solved), *_more(beside)]
+    return _chapter(f"{plan.name} of {plan.heading}", plan.scene, study.status(plan, solved), parts)
+
+
+def _chapter(heading: str, scene: Scene, status: Status, parts: Sequence[Part]) -> Chapter:
+    return Chapter(heading, scene.title, status, parts, f"Source: {scene.source}" if scene.source else "")
+
+
+def _more(beside: Sequence[object]) -> list[Part]:
+    return [part for each in beside for part in _parts(each)]
+
+
+def _parts(thing: object) -> list[Part]:
+    """Return what was computed beside an answer as parts of its chapter. Raises BadInput for what is no such thing."""
+    if isinstance(thing, Reported):
+        return thing.report_parts()
+    if isinstance(thing, Proofs):
+        from loomopt.interface.text import answers
+
+        return [Part("Proof at every crank angle", tuple(answers.proofs(thing)))]
+    raise refusal("a page does not show this", "", "report", type(thing).__name__, ALLOWED, "Give one of them")
+
+
+def part_of_study(plan: SceneStudy, solved: Sequence[Row]) -> list[Part]:
+    """Return a study as parts of another chapter, its own status first."""
+    told = study.status(plan, solved)
+    return [Part(f"{plan.name} of {plan.heading}", (told.verdict, *told.told)), *study.parts(plan, solved)]
+
+
+def html(chapters: Sequence[Chapter]) -> str:
+    """Return the page of chapters as text."""
+    return page(chapters)
+
+
+def write(path: Path, chapters: Sequence[Chapter]) -> None:
+    """Write a page of chapters to a file. Raises BadInput."""
+    suffix(path, PAGES)
+    outputs.text(path, html(chapters))

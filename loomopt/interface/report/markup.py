@@ -1,0 +1,77 @@
+"""Markup of a page: parts with a title, paragraphs, tables, pictures; every text is escaped here."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+from loomopt.interface.text.layout import JOINED, Grid, spaced
+
+NUMBER = re.compile(r"[-+]?\d")
+"""How a cell begins that stands to the right."""
+DENSE, DENSER = 8, 13
+"""Columns from which on a table is set smaller, so that paper takes it."""
+
+
+@dataclass(frozen=True)
+class Markup:
+    """What is markup already: a picture, an equation."""
+
+    html: str
+
+
+Block = str | Grid | Markup
+"""A paragraph, a table, or markup."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a page: its title, and what stands below it."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+
+def text(told: str) -> str:
+    """Return text escaped, with places in long names where a line may break, and none in what is joined."""
+    return escape(spaced(told.replace(JOINED, "\u00a0"))).replace("_", "_<wbr>")
+
+
+def part(shown: Part) -> str:
+    """Return a part as a section."""
+    return f"<section><h3>{text(shown.title)}</h3>{''.join(map(block, shown.blocks))}</section>"
+
+
+def block(shown: Block) -> str:
+    """Return a paragraph, a table or markup."""
+    if isinstance(shown, Markup):
+        return shown.html
+    if isinstance(shown, Grid):
+        return table(shown)
+    return "".join(f"<p>{text(line)}</p>" for line in shown.split("\n") if line.strip())
+
+
+def table(grid: Grid) -> str:
+    """Return a table that scrolls by itself where it is too wide, and breaks between rows on paper."""
+    dense = " denser" if len(grid.columns) > DENSER else " dense" if len(grid.columns) > DENSE else ""
+    heads = "".join(
+        f'<th{_right(place in grid.right)} scope="col">{_lines(cell)}</th>' for place, cell in enumerate(grid.columns)
+    )
+    rows = "".join(_row(line, grid.right) for line in grid.lines)
+    caption = f"<caption>{text(grid.title)}</caption>" if grid.title else ""
+    head = f"<thead><tr>{heads}</tr></thead>" if any(grid.columns) else ""
+    return f'<div class="table{dense}"><table>{caption}{head}<tbody>{rows}</tbody></table></div>'
+
+
+def _row(line: Sequence[str], right: Sequence[int]) -> str:
+    marked = ' class="missed"' if any("<- " in spaced(cell) for cell in line) else ""
+    cells = "".join(f"<td{_right(place in right)}>{_lines(cell)}</td>" for place, cell in enumerate(line))
+    return f"<tr{marked}>{cells}</tr>"
+
+
+def _right(right: bool) -> str:
+    return ' class="n"' if right else ""
+
+
+def _lines(cell: str) -> str:
+    return "<br>".join(map(text, cell.split("\n")))

@@ -1,0 +1,62 @@
+"""The page itself: one file that asks for nothing beside it; its style and its script stand in it."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from html import escape
+
+from loomopt.base import __version__
+from loomopt.interface.report import report_path
+from loomopt.interface.report.answer import Status
+from loomopt.interface.report.markup import Part, part, text
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """One answer or study of a page: its heading, what it truly is, its parts; source: where it comes from."""
+
+    heading: str
+    title: str
+    status: Status
+    parts: Sequence[Part]
+    source: str = ""
+
+
+def page(chapters: Sequence[Chapter]) -> str:
+    """Return a page of chapters; the status of each stands before all else."""
+    title = "; ".join(f"{each.status.verdict}: {each.heading}" for each in chapters)
+    toc = _contents(chapters) if len(chapters) > 1 else ""
+    body = "".join(_chapter(place, each) for place, each in enumerate(chapters, 1))
+    made = f"Made by loomopt {__version__}, {date.today().isoformat()}. The page holds all it shows."
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<link rel="icon" href="data:,">'
+        f"<title>{escape(title)}</title><style>{_own('report.css')}</style></head>\n"
+        f"<body><main>{toc}{body}</main><footer><p>{text(made)}</p></footer><script>{_own('report.js')}</script></body></html>\n"
+    )
+
+
+def _contents(chapters: Sequence[Chapter]) -> str:
+    rows = "".join(
+        f'<li class="{each.status.level}"><a href="#c{place}">{text(each.heading)}</a>: '
+        f"{text(each.status.verdict)}</li>"
+        for place, each in enumerate(chapters, 1)
+    )
+    return f"<nav><h1>{len(chapters)} reports</h1><ul>{rows}</ul></nav>"
+
+
+def _chapter(place: int, shown: Chapter) -> str:
+    told = "".join(f"<p>{text(each)}</p>" for each in shown.status.told)
+    sub = "".join(f"<p>{text(line)}</p>" for line in (shown.title, shown.source) if line)
+    return (
+        f'<article id="c{place}"><header class="status {shown.status.level}">'
+        f'<p class="verdict">{text(shown.status.verdict)}</p><h2>{text(shown.heading)}</h2>{told}</header>'
+        f'<div class="source">{sub}</div>{"".join(map(part, shown.parts))}</article>'
+    )
+
+
+@functools.cache
+def _own(name: str) -> str:
+    return report_path(name).read_text(encoding="utf-8").strip()

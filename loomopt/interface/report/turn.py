@@ -1,0 +1,155 @@
+"""Charts of a design's curves over the turn, today's machine dashed beside it, from the panels that figures draw."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from loomopt.base.units import factor, show
+from loomopt.interface import tables
+from loomopt.interface.figures.curves import ROUNDING, SAME, WORDS, DrawnTurn, marked_row, shown_unit, turned
+from loomopt.interface.report.charts import COLOURS, Axis, Chart, Series, figure, headed
+from loomopt.interface.report.markup import Markup, Part, text
+from loomopt.jobs import registry
+from loomopt.model.session import working
+from loomopt.physics.cycle import Floats
+from loomopt.picture.job_views import Span
+from loomopt.picture.panels import Panel, in_units
+from loomopt.scenes.designs import Design, flat
+from loomopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+EVERY = 2.0
+"""Degrees between the points that a curve is drawn through; corners and marked points are drawn all the same."""
+TICKS = 90.0
+"""Degrees between the numbers below a chart."""
+
+
+@working()
+def part(scene: Scene, design: Design) -> Part:
+    """Return the curves of a design, SI, over the turn, beside today's machine where it is another."""
+    job, view, own = registry.of(scene), registry.of(scene).views, flat(design)
+    now = job.today(scene)
+    full = {**now, **own}
+    unit = scene.shown_in("angle")
+    shown = _turn(scene, full, unit)
+    before = None if full == now else _turn(scene, now, unit)
+    known = view.panels(scene, own, tuple(shown.columns.columns))
+    panels = [in_units(scene, panel) for panel in sorted(known, key=lambda panel: not panel.wide)]
+    charts = "".join(figure(chart(panel, shown, before)) for panel in panels)
+    key = _key(shown, before is not None)
+    said = f"Over the {view.angle} phi, {unit}."
+    return Part(
+        "Curves over the turn", (Markup(f'<p class="marks">{text(said)} {key}</p><div class="charts">{charts}</div>'),)
+    )
+
+
+def _turn(scene: Scene, full: Design, unit: str) -> DrawnTurn:
+    return turned(tables.curves(scene, full), registry.of(scene).views.marks(scene, flat(full)), unit)
+
+
+def _key(shown: DrawnTurn, beside: bool) -> str:
+    """Return what vertical lines and shaded stretches are."""
+    told = []
+    for name, mark in shown.marks.items():
+        if isinstance(mark, Span):
+            ends = f"{shown.told(math.degrees(mark.begin))} to {shown.told(math.degrees(mark.end))}"
+            told.append(f'<span class="k-span"><i></i>{text(f"{name} {ends}")}</span>')
+        elif math.isfinite(mark):
+            told.append(f'<span class="k-place"><i></i>{text(f"{name} {shown.told(math.degrees(mark))}")}</span>')
+    told += ['<span class="k-today"><i></i>today, dashed</span>'] if beside else []
+    return " ".join(told)
+
+
+def chart(panel: Panel, shown: DrawnTurn, before: DrawnTurn | None) -> Chart:
+    """Return a panel as a chart."""
+    unit = shown_unit(panel)
+    size, angle = factor(unit), math.degrees(factor(shown.unit))
+    kept = _kept(panel, shown)
+    series = [
+        Series(shown.angles[kept] / angle, shown.of(column)[kept] / size, f"c{place % COLOURS}", label)
+        for place, (column, label) in enumerate(zip(panel.columns, panel.labels, strict=True))
+    ]
+    key = [(each.kind, each.label) for each in series if len(series) > 1 or each.label != panel.title]
+    ghosts = []
+    if before:
+        old = _kept(panel, before)
+        old = old[before.angles[old] <= shown.angles.max() + SAME]  # one that parts may repeat after several turns
+        ghosts = [
+            Series(
+                before.angles[old] / angle,
+                before.of(column)[old] / size,
+                f"today c{place % COLOURS}" if len(series) > 1 else "today",
+            )
+            for place, column in enumerate(panel.columns)
+            if column in before.columns
+        ]
+    dots = []
+    for turn, kind, word in ((shown, "c0", ""), (before, "ghost", "today: ")):
+        for told in _marked(panel, turn, unit) if turn else ():
+            dots.append((told[0] / angle, told[1], kind))
+            key.append((f"dot {kind}", f"{word}{told[2]}"))
+    levels = [value / size for values in panel.levels.values() for value in values]
+    key += [("k-level", f"{name} {show(values[0], unit)}") for name, values in panel.levels.items()]
+    whole = shown.whole
+    places = [math.degrees(m) for m in shown.marks.values() if not isinstance(m, Span) and math.isfinite(m)]
+    low, high = float(shown.angles.min()), float(shown.angles.max())
+    spans = [each for mark in shown.marks.values() if isinstance(mark, Span) for each in _parts(mark, low, high, whole)]
+    step = TICKS * whole / 360.0
+    numbered = [step * k / angle for k in range(math.ceil(low / step), math.floor(high / step + 1e-9) + 1)]
+    return Chart(
+        headed(panel.title, unit),
+        Axis(low / angle, high / angle, numbered),
+        [*ghosts, *series],
+        levels,
+        [(a / angle, b / angle) for a, b in spans],
+        [(low + (place - low) % whole) / angle for place in places],
+        dots,
+        key,
+        cursor=True,
+    )
+
+
+def _kept(panel: Panel, turn: DrawnTurn) -> "NDArray[np.intp]":
+    """Return the rows a curve is drawn through: every so many degrees, corners, the last, and what is marked."""
+    kept = thinned(turn.angles)
+    for how in panel.marked:
+        row = marked_row(turn.of(panel.columns[0]), turn, how)
+        if row is not None:
+            kept[row] = True
+    return np.flatnonzero(kept)
+
+
+def thinned(angles: Floats) -> "NDArray[np.bool_]":
+    """Return which rows at angles, deg, a curve is drawn through: every so many degrees, corners, and both ends."""
+    near = np.abs(angles / EVERY - np.round(angles / EVERY)) < 1e-9
+    half = np.abs(2 * angles - np.round(2 * angles)) < 1e-7
+    again = np.concatenate([[False], np.diff(angles) < 1e-6])
+    kept = near | ~half | again | np.append(again[1:], False)
+    kept[[0, -1]] = True
+    return np.asarray(kept)
+
+
+def _marked(panel: Panel, turn: DrawnTurn, unit: str) -> list[tuple[float, float, str]]:
+    """Return what of a panel's first column is marked: angle, deg, value in the unit, and words."""
+    values, found = turn.of(panel.columns[0]), []
+    for how in panel.marked:
+        row = marked_row(values, turn, how)
+        if row is not None:
+            value = float(values[row])
+            value = 0.0 if abs(value) <= ROUNDING * float(np.nanmax(np.abs(values))) else value
+            where = f" at {turn.told(float(turn.angles[row]))}" if how in WORDS else ""
+            told = f"{WORDS.get(how, f'at {how}')} {show(value, unit)}{where}"
+            found.append((float(turn.angles[row]), value / factor(unit), told))
+    return found
+
+
+def _parts(span: Span, low: float, high: float, whole: float) -> Sequence[tuple[float, float]]:
+    """Return where a stretch falls between two angles, deg."""
+    begin = low + (math.degrees(span.begin) - low) % whole
+    end = begin + (math.degrees(span.end) - math.degrees(span.begin)) % whole
+    both = ((max(a, low), min(b, high)) for a, b in ((begin, end), (begin - whole, end - whole)))
+    return [(a, b) for a, b in both if a < b]
